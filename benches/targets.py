@@ -1,61 +1,146 @@
-"""Calibrations with targets, all covariances and maps of 60 x 40 pixels included: docs/targets.md.
+"""Calibrations with targets beside mrcal.
 
-python benches/targets.py FOLDER     of opencv8-0.cameramodel and splined-0.cameramodel of mrcal
+python benches/targets.py FOLDER [--mrcal PYTHON] [--repetitions N] [--only NAME]
 
-Where mrcal can be imported, its own optimization from the same start stands beside it.
+Of opencv8-0.cameramodel and splined-0.cameramodel of mrcal, from the values that they hold: ours with all
+covariances, all redundancy numbers, the verdict, and two maps of 60 x 40 pixels, at infinity and at 1 m;
+mrcal's optimization, without a new search for outliers, and one map, at infinity. Both in turn, medians of
+processor time (and of what a clock says). mrcal runs by a Python that has it: `--mrcal`, or the first python3
+that does; the splined one is computed once, mrcal's optimization only.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
+import json
 import math
+import shutil
+import statistics
+import subprocess
 import time
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 from photogram.targets import read
 from photogram.targets.uncertainty import uncertainty_map
 
-MODELS = ("opencv8-0", "splined-0")
+MODELS = {"opencv8-0": (0.5, "optimization and one map"), "splined-0": (0.1, "optimization")}
+"""What part of mrcal's time ours may take, and of what."""
+PYTHONS = ("python3", "/usr/bin/python3")
+PEER = """
+import json, sys, time, mrcal
+from mrcal import cameramodel
+def clock():
+    return time.process_time(), time.perf_counter()
+inputs = cameramodel(sys.argv[1]).optimization_inputs()
+inputs["do_apply_outlier_rejection"] = False
+start = clock()
+found = mrcal.optimize(**inputs)
+optimized = clock()
+if sys.argv[2] == "map":
+    model = cameramodel(optimization_inputs=inputs, icam_intrinsics=0)
+    rays, _ = mrcal.sample_imager_unproject(60, 40, *model.imagersize(), *model.intrinsics(), normalize=True)
+    mrcal.projection_uncertainty(rays, model, atinfinity=True, what="worstdirection-stdev")
+end = clock()
+seconds = [b - a for a, b in zip(start, optimized)], [b - a for a, b in zip(optimized, end)]
+print(json.dumps([*seconds, float(found["x"] @ found["x"])]))
+"""
+"""What mrcal computes: processor and clock seconds of optimization and map, the cost."""
+
+Pair = tuple[float, float]
+"""Seconds of the processor, and of a clock."""
 
 
-def row(path: Path) -> str:
-    """Return a row of the table."""
+def clock() -> Pair:
+    """Return both times."""
+    return time.process_time(), time.perf_counter()
+
+
+def ours(path: Path) -> tuple[list[Pair], str]:
+    """Return the times of adjustment and maps, and how it has ended."""
     calibration = read(path)
-    start = time.perf_counter()
+    times = [clock()]
     found = calibration.adjust()
-    adjusted = time.perf_counter()
+    times.append(clock())
     for distance in (math.inf, 1.0):
         uncertainty_map(found, 0, distance)
-    mapped = time.perf_counter()
+    times.append(clock())
     result = found.result
-    cost = result.sums_of_squares.total
-    return (
-        f"{path.stem:12} {adjusted - start:8.2f} s {mapped - adjusted:8.2f} s {_of_mrcal(path)}"
-        f"   {result.status}, {len(result.iterations)} iterations, {cost:.6f}"
-    )
+    cost, iterations = result.sums_of_squares.total, len(result.iterations)
+    return between(times), f"{result.status}, {iterations} iterations, cost {cost:.6f}"
 
 
-def _of_mrcal(path: Path) -> str:
-    """Return what mrcal's optimization takes."""
-    try:
-        mrcal = importlib.import_module("mrcal")
-    except ImportError:
-        return "      no mrcal"
-    inputs = mrcal.cameramodel(str(path)).optimization_inputs()
-    start = time.perf_counter()
-    mrcal.optimize(**inputs)
-    return f"{time.perf_counter() - start:12.2f} s"
+def between(times: Sequence[Pair]) -> list[Pair]:
+    """Return the differences."""
+    return [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(times)]
+
+
+def of_mrcal(python: str, path: Path, *, with_map: bool) -> tuple[list[Pair], str]:
+    """Return the times of optimization and map, and the cost."""
+    command = [python, "-c", PEER, str(path), "map" if with_map else "none"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    *seconds, cost = json.loads(done.stdout.splitlines()[-1])
+    return [(each[0], each[1]) for each in seconds], f"cost {cost:.6f}"
+
+
+def with_mrcal() -> str | None:
+    """Return a Python that has mrcal."""
+    for python in PYTHONS:
+        path = shutil.which(python)
+        if path and not subprocess.run([path, "-c", "import mrcal"], capture_output=True).returncode:
+            return path
+    return None
+
+
+def median(runs: Sequence[list[Pair]]) -> list[Pair]:
+    """Return the medians of what several runs have taken."""
+    parts = zip(*runs, strict=True)
+    return [(statistics.median(p for p, _ in part), statistics.median(c for _, c in part)) for part in parts]
+
+
+def row(name: str, what: str, times: Sequence[Pair], told: str) -> str:
+    """Return a row of the table: two parts and their sum, on the processor and by the clock."""
+    parts = "".join(f"{processor:9.2f} ({by_clock:.2f})".rjust(20) for processor, by_clock in times)
+    return f"{name:10} {what:10}{parts}   {told}"
+
+
+def compared(path: Path, python: str | None, repetitions: int) -> None:
+    """Print the rows of a calibration, and the ratio."""
+    limit, of_what = MODELS[path.stem]
+    with_map = "map" in of_what
+    sides: dict[str, Callable[[], tuple[list[Pair], str]]] = {"photogram": lambda: ours(path)}
+    if python is not None:
+        sides["mrcal"] = lambda: of_mrcal(python, path, with_map=with_map)
+    runs: dict[str, list[list[Pair]]] = {side: [] for side in sides}
+    told = {}
+    for _ in range(repetitions if with_map else 1):
+        for side, run in sides.items():
+            times, told[side] = run()
+            runs[side].append(times)
+    sums = {}
+    for side in sides:
+        found = median(runs[side])
+        sums[side] = [sum(part[k] for part in found) for k in (0, 1)]
+        print(row(path.stem, side, found, told[side]), flush=True)
+    if "mrcal" in sums:
+        ratios = [own / other for own, other in zip(sums["photogram"], sums["mrcal"], strict=True)]
+        print(f"{'':10} ratio to {of_what}: {ratios[0]:.3f} ({ratios[1]:.3f}); at most {limit}", flush=True)
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
-    print(f"{'':12} {'adjusted':>10} {'two maps':>10} {'mrcal':>14}")
-    for name in MODELS:
-        print(row(folder / f"{name}.cameramodel"), flush=True)
+    parser.add_argument("--mrcal", help="a Python that has mrcal")
+    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--only", choices=MODELS, help="one of them")
+    asked = parser.parse_args()
+    python = asked.mrcal or with_mrcal()
+    print("seconds of the processor (of a clock); " + (python or "no Python has mrcal"))
+    print(f"{'':21}{'solution':>20}{'maps':>20}")
+    for name in [asked.only] if asked.only else MODELS:
+        compared(asked.folder / f"{name}.cameramodel", python, asked.repetitions)
 
 
 if __name__ == "__main__":

@@ -49,9 +49,11 @@ def _read(
             column, row = WIDTH / 2, HEIGHT / 2
             for _ in range(20):
                 share = {"down": row / HEIGHT, "up": 1 - row / HEIGHT, "right": column / WIDTH}[direction]
-                time = share * readout
+                time, before = share * readout, (column, row)
                 u = (matrix @ exponential(w * time)).T @ (place - centre - v * time)
                 column, row = WIDTH / 2 - F * u[0] / u[2], HEIGHT / 2 + F * u[1] / u[2]
+                if (column, row) == before:
+                    break
             if 0 < column < WIDTH and 0 < row < HEIGHT:
                 photos.append(photo)
                 seen.append(point)
@@ -241,7 +243,9 @@ def scanned(
             for _ in range(100):
                 centre, turned = place(strip, time)
                 u = turned.T @ (ground - centre)
-                time += u[1] / SPEED
+                before, time = time, time + u[1] / SPEED
+                if time == before:
+                    break
             sample, line = C * u[0] / u[2] / PITCH + SAMPLES / 2, (time + half) / LINE
             if 0 < sample < SAMPLES and 0 < line < 2 * half / LINE:
                 kinds.append((strip, point))

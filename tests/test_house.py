@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -52,6 +53,7 @@ def modules():
     return found
 
 
+@cache
 def imports():
     """Return what each file imports of the package: within functions, by a string, for types only, too."""
     found = modules()

@@ -17,6 +17,24 @@ except SystemExit as end:
 HEAVY = ("matplotlib", "jinja2", "pandas", "pyarrow", "pyproj", "geopandas", "scipy", "erfa", "tetra3rs")
 SHOWING = ("rich", "typer", "photogram.results.report", "photogram.results.html", "photogram.show.page")
 NUMERICAL = ("numpy", "orjson", "photogram._photocore")
+SELDOM = (
+    "numpy.ma",
+    "photogram.network.simulated_scanner",
+    "photogram.results.reliability",
+    "photogram.statistics.snooping.suspects",
+)
+OF_OTHERS = (
+    "photogram.diagnosis.conventions",
+    "photogram.film.certificate",
+    "photogram.formats.blocks_exchange.writing",
+    "photogram.formats.isis.assembling",
+    "photogram.giant.printout",
+    "photogram.targets.first",
+    "urllib.request",
+)
+"""Modules for blocks of other kinds, and for adjustments that fail."""
+MOST = 420
+"""Modules of the package that the adjustment of a project loads, with its report and page."""
 
 
 def loaded(program, among, folder):
@@ -42,6 +60,12 @@ def test_examples_load_what_they_need(command, tmp_path):
     assert loaded(program, (*HEAVY, *others, "photogram._photocore"), tmp_path) == ["photogram._photocore"]
 
 
+def test_a_project_loads_what_is_of_it(tmp_path):
+    program = COMMAND.format(arguments=["adjust", "--example", "--quiet"])
+    program += "\nassert len([each for each in sys.modules if each.startswith('photogram.')]) <= " + str(MOST)
+    assert loaded(program, OF_OTHERS, tmp_path) == []
+
+
 def test_giant_does_not_wait_for_readers_of_other_formats(tmp_path):
     program = COMMAND.format(arguments=["giant", "--example", "--no-html", "--quiet"])
     among = ("photogram.formats.registry", "photogram.formats.colmap", "photogram.formats.planes")
@@ -50,7 +74,7 @@ def test_giant_does_not_wait_for_readers_of_other_formats(tmp_path):
 
 def test_adjust_and_its_block_load_no_pictures(tmp_path):
     program = "from photogram import Block, adjust, simulate\nassert adjust(simulate().block).converged"
-    assert loaded(program, (*HEAVY, *SHOWING), tmp_path) == []
+    assert loaded(program, (*HEAVY, *SHOWING, *SELDOM), tmp_path) == []
 
 
 def test_a_command_loads_no_other(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import subprocess
@@ -184,15 +185,29 @@ def test_a_limit_of_addresses_is_divided_among_fewer_threads(machine, monkeypatc
     assert memory.available_memory(tmp_path) == 0
 
 
+EXITING = 0x4
+"""A flag of the kernel: all work of a thread is done; it may be listed for a moment after it was joined."""
+
+
+def alive():
+    """Return the threads of this process that have not ended."""
+    found = set()
+    for task in os.listdir("/proc/self/task"):
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            flags = Path("/proc/self/task", task, "stat").read_text().rpartition(")")[2].split()[6]
+            found |= set() if int(flags) & EXITING else {task}
+    return found
+
+
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="this system does not list threads")
 def test_threads_have_ended_when_an_adjustment_returns():
     """Until they have, they keep buffers that those of the next adjustment may need."""
     block = simulate(strips=1, photos_per_strip=3, points_per_photo=8, seed=1).block
     adjust(block, threads=1)
-    before = set(os.listdir("/proc/self/task"))
+    before = alive()
     for _ in range(20):
         adjust(block, threads=3)
-        assert set(os.listdir("/proc/self/task")) <= before
+        assert alive() <= before
 
 
 SHORT = """

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from photogram.on_demand import on_demand
 
 if TYPE_CHECKING:
     from photogram import absolute_orientation as absolute_orientation
@@ -190,7 +191,6 @@ _HOMES = {
 NumPy and the engine take a while, in which the command line could not yet end cleanly by a signal.
 """
 
-
 MODULES = (
     "absolute_orientation",
     "collection",
@@ -208,17 +208,4 @@ MODULES = (
 )
 """The packages that users know by name: loaded when they are first asked for, too."""
 
-
-def __getattr__(name: str) -> object:
-    if name in _HOMES:
-        value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    elif name in MODULES:
-        value = import_module(f"{__name__}.{name}")
-    else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *MODULES})
+__getattr__, __dir__ = on_demand(__name__, {**_HOMES, **dict.fromkeys(MODULES, "")})

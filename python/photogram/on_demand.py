@@ -24,7 +24,7 @@ def on_demand(
     package
         Its `__name__`.
     homes
-        The module below it where each name stands.
+        The module below it where each name stands; empty for a name that is a module itself.
     check
         What lets names check their arguments, `arguments.check_arguments`; None: they do it themselves.
     unchecked
@@ -35,7 +35,8 @@ def on_demand(
     def load(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        names[name] = getattr(import_module(f"{package}.{homes[name]}"), name)
+        home = import_module(f"{package}.{homes[name] or name}")
+        names[name] = getattr(home, name) if homes[name] else home
         if check is not None and name not in unchecked:
             check(names, [name])
         return names[name]

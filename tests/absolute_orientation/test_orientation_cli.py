@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from orientation_golden import cards_of, cases, csv_of
 
+pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLE = files("photogram") / "examples" / "absolute_orientation"
 MEMBERS = {
     "scale",

@@ -14,6 +14,7 @@ from plates import case_2_session, noisy
 
 from photogram.comparator import Correction, read, read_grid, to_cards, to_csv
 
+pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "python" / "photogram" / "examples" / "comparator" / "comparator-3.txt"
 TEXTS = {"listing.txt", "correction.json", "correction-joint.json"}

@@ -219,7 +219,9 @@ def test_a_plan_is_what_is_needed(block, tmp_path):
     engine, contributions = CoreEngine(), {}
     for node, children in enumerate(read_manifest(tmp_path).tree.children):
         own = engine.node(tmp_path, node)
-        formed = own.form(own.initial, [contributions.pop(c) for c in children], damping=0.0, threads=1)
+        formed = own.form(
+            own.initial, [contributions.pop(c) for c in children], damping=0.0, curved=False, threads=1
+        )
         contributions[node] = formed.contribution
         sent = sum(each.nbytes for each in contributions[node])
         assert sent == plan.predictions[node]["contribution_bytes"]

@@ -19,6 +19,8 @@ from photogram.cli.projects import Additions
 from photogram.distributed import Division
 from photogram.formats import read
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):

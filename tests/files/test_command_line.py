@@ -105,7 +105,9 @@ def test_integers_beyond_all_counts_are_usage_errors(run, tmp_path, option):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("line", [["--help"], ["giant", "--help"], ["--version"], ["giant", "--example"]])
+@pytest.mark.parametrize(
+    "line", [["--help"], ["giant", "--help"], ["--version"], ["giant", "--example", "--no-html"]]
+)
 def test_a_full_device_and_a_closed_pipe(tmp_path, line):
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run(
@@ -155,7 +157,8 @@ def test_a_document_that_its_reader_leaves_changes_nothing(tmp_path):
 
 @pytest.fixture(scope="module")
 def trials(tmp_path_factory):
-    return Trials(tmp_path_factory.mktemp("trials"), seed=random.Random(7).randrange(1000))
+    # Without pictures, which take longer than all else and write nothing: most moments would be theirs.
+    return Trials(tmp_path_factory.mktemp("trials"), random.Random(7).randrange(1000), "--no-html")
 
 
 @pytest.mark.parametrize("kind", range(5))

@@ -52,7 +52,9 @@ def rolling(unit: str = "px", direction: str = "down") -> Block:
             for _ in range(30):
                 turn = Attitudes.of("rotation_vector", [rates[-1] * time]).matrices[0]
                 xy = camera.project([(matrix @ turn).T @ (place - centres[-1] - velocities[-1] * time)])
-                time = float(shutter.times(xy)[0]) * readout
+                before, time = time, float(shutter.times(xy)[0]) * readout
+                if time == before:
+                    break
             if (np.abs(xy[0] - middle) < half).all():
                 rows.append((photo, point, *xy[0]))
     photos, seen, x, y = (np.array(column) for column in zip(*rows, strict=True))
@@ -205,6 +207,8 @@ def _line_of(strip, mount, camera, ground, begin):
         return None
     for _ in range(60):
         middle = (lower + upper) / 2
+        if middle in (lower, upper):
+            break
         lower, upper = (middle, upper) if at(middle)[1] * at(lower)[1] > 0 else (lower, middle)
     return middle, camera.project([at(middle)])[0]
 

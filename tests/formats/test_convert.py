@@ -12,6 +12,8 @@ from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.network.directions import image_directions
 from photogram.network.geometry import lengths_of_units
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 @pytest.mark.parametrize(
     ("out", "name", "files"),

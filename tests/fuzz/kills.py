@@ -46,21 +46,24 @@ class Trials:
         An empty directory.
     seed
         Of the moments.
+    further
+        Words of the command.
     """
 
-    def __init__(self, place: Path, seed: int = SEED) -> None:
+    def __init__(self, place: Path, seed: int = SEED, *further: str) -> None:
         self.place = place
+        self.command = (*COMMAND, *further)
         self.random = random.Random(seed)
         self.counts: Counter[str] = Counter()
         self._run(*SIMULATE)
         start = time.monotonic()
-        self._run(*COMMAND)
+        self._run(*self.command)
         self.duration = time.monotonic() - start
 
     def killed(self) -> None:
         """Kill the command at a random moment of its life; see that results are of one run, or marked."""
         self._put_old()
-        process = self._start(*COMMAND)
+        process = self._start(*self.command)
         time.sleep(self.random.uniform(0, self.duration))
         process.kill()
         process.communicate()
@@ -70,7 +73,7 @@ class Trials:
     def told_to_end(self, number: signal.Signals) -> None:
         """Send the command a signal, from when it has taken the signals over to its end; check its end."""
         self._put_old()
-        process = self._start(*COMMAND)
+        process = self._start(*self.command)
         wait_until_caught(process, number)
         time.sleep(self.random.uniform(0, self.duration))
         process.send_signal(number)
@@ -111,7 +114,7 @@ class Trials:
 
     def put_in_order(self) -> None:
         """See that the next run removes whatever dead ones have left."""
-        self._run(*COMMAND)
+        self._run(*self.command)
         self._run("-c", WRITER.replace("count(1)", "[0]"), "one/a", "one/b", "two/c", "d")
         assert not leftovers(self.place), leftovers(self.place)
         assert not list(self.place.rglob(MARK))

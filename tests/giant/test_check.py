@@ -23,6 +23,7 @@ from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
 from photogram.network.strips import strips_of
 
+pytestmark = pytest.mark.usefixtures("sketched")
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 
 

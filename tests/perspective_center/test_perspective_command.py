@@ -17,6 +17,7 @@ from photogram.perspective_center.document import to_json
 from photogram.perspective_center.listing import listing
 from photogram.perspective_center.plot import draw
 
+pytestmark = pytest.mark.usefixtures("sketched")
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = files("photogram") / "examples" / "perspective_center" / "grid.deck"
 SET = {

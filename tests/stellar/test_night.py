@@ -27,6 +27,7 @@ from photogram.stellar.pointing import attitude_of, axis_of
 from photogram.stellar.skies import calibrate_exposures, project_sky, stars_near
 from photogram.stellar.transformation import pole_matrix, terrestrial
 
+pytestmark = pytest.mark.usefixtures("sketched")
 TRUTH = MAKER["CAMERA"].values
 
 

@@ -15,6 +15,7 @@ from photogram.stellar import calibrate
 from photogram.stellar.combination import combine
 from photogram.stellar.parameters import INDEX, NAMES
 
+pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar"))
 
 

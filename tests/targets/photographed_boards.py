@@ -37,8 +37,10 @@ def circles(board):
 
     def at(places):
         found = np.zeros(len(places), dtype=bool)
+        across, along = np.ascontiguousarray(places.T)
         for x, y, _ in board.places:
-            found |= np.hypot(places[:, 0] - x, places[:, 1] - y) < radius
+            near = np.flatnonzero(np.abs(across - x) < radius)
+            found[near] |= np.hypot(across[near] - x, along[near] - y) < radius
         return found
 
     return at

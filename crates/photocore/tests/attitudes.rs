@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
-mod golden;
-
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use photocore::geometry::angle_axis::{
@@ -17,7 +15,7 @@ use photocore::geometry::{
 use proptest::prelude::*;
 use serde_json::Value;
 
-use golden::{golden, list, rows};
+use crate::golden::{golden, list, rows};
 
 const ALL: [fn() -> AttitudeNumbers; 9] = [
     || AttitudeNumbers::OmegaPhiKappa(RotationSense::GroundToPhoto),

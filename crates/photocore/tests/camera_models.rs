@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
-mod golden;
-
 use photocore::geometry::camera::{LensDirection, RadialLimit};
 use photocore::geometry::{Camera, Vector3};
 use serde_json::Value;
 
-use golden::{golden, list, rows};
+use crate::golden::{golden, list, rows};
 
 /// Values by name in the order of a model; `more` are those that the golden data do not list. The names of the model differ in case.
 fn values(model: &str, entry: &Value, names: &str, more: &[(&str, f64)]) -> (Vec<f64>, Vec<Option<usize>>) {

@@ -2,8 +2,7 @@
 
 #![allow(clippy::panic, clippy::unwrap_used)]
 
-mod forward;
-
+use crate::forward;
 use photocore::geometry::{
     Ellipsoid, GeometryError, Matrix3, ObjectSpace, Point, RotationSense, Vector3, View, rotation,
     rotation_angles,

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
-mod golden;
-
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
@@ -17,7 +15,7 @@ use photocore::network::{
 };
 use serde_json::Value;
 
-use golden::{golden, list, rows};
+use crate::golden::{golden, list, rows};
 
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
 const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(SENSE);

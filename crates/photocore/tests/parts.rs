@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-mod cut;
-
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
-use cut::{Cut, TREES};
+use crate::cut::{Cut, TREES};
 use photocore::normals::{
     Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
     Prior, SolveOptions, System, Tie, TieRows,

@@ -3,10 +3,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod forward;
-
 use std::f64::consts::PI;
 
+use crate::forward;
 use num_complex::Complex64 as C;
 use photocore::geometry::atmosphere::Air;
 use photocore::geometry::{AirModel, ObjectSpace, Point, Refraction, RotationSense, View, Water, WaterModel};

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
-mod golden;
-
 use std::sync::Arc;
 
 use num_complex::Complex64 as C;
@@ -12,7 +10,7 @@ use photocore::geometry::{Camera, Vector3};
 use proptest::prelude::*;
 use serde_json::Value;
 
-use golden::{golden_of, golden_text, list, rows};
+use crate::golden::{golden_of, golden_text, list, rows};
 
 const NAME: &str = "splined_stereographic";
 

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::geometry::Vector3;
-use photocore::network::film::{FilmAt, FilmOf};
+use photocore::network::film::{FilmAt, FilmOf, Read};
 use pyo3::prelude::*;
 
 use crate::arrays::{InputError, blocks, numbers, rows, table};
@@ -38,8 +38,12 @@ fn film_readings<'py>(
 ) -> PyResult<Readings<'py>> {
     let (own, at) = film(&numbers, &vectors)?;
     let places = rows::<2>("places", &places)?;
-    let read = |&place: &[f64; 2]| at.read(place, own.cell(place)).reading;
-    let found: Vec<_> = places.iter().map(read).collect();
+    let mut read = Read::default();
+    let reading = |&place: &[f64; 2]| {
+        at.read(place, own.cell(place), &mut read);
+        read.reading
+    };
+    let found: Vec<_> = places.iter().map(reading).collect();
     let partials = found.iter().map(|own| {
         [0, 1].map(|row| {
             let parts = [&own.by_q[row][..], &own.by_film[row], &own.by_bend[row]];

@@ -20,7 +20,6 @@ from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.motion import timed_photos
-from photogram.network.observations import observation_rows
 from photogram.network.refracted import check_cameras
 from photogram.results.exchanged import Exchange, exchanged_names
 from photogram.results.held import held_remark, held_tested
@@ -345,11 +344,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     # Nothing is left that determines them: they stay where they are. Coefficients of trajectories do anyway.
     alone = sorted(out.photos - set(np.flatnonzero(timed_photos(block)).tolist()))
     position_sd[alone], attitude_sd[alone] = 0.0, 0.0
-    rows = [
-        row
-        for own, _ in observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
-        for row in own
-    ]
+    rows = [row for own, _ in block.observation_groups for row in own]
     dropped = {rows[index] for index in gone(trial, out, OBSERVATION)[0].tolist()}
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
     return block.replace(

@@ -14,7 +14,6 @@ from photogram.distributed.parts import Names, Part
 from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
 from photogram.io.structure import Decoder, Encoder
 from photogram.network.core import block_network
-from photogram.network.observations import observation_rows
 from photogram.results.datum import datum_of
 from photogram.results.result import Result
 from photogram.results.saved_block import block_files
@@ -133,10 +132,7 @@ class _Scaled:
 
 def _outcome(part: Part, solution: BlockSolution) -> dict[str, Any]:
     """Return what tables have no place for; rows are those of the whole block."""
-    groups = observation_rows(
-        part.block.observations, part.block.point_ids, part.block.photo_ids, part.block.unknowns
-    )
-    places = [int(part.observations[row]) for rows, _ in groups for row in rows]
+    places = [int(part.observations[row]) for rows, _ in part.block.observation_groups for row in rows]
     observed = zip(places, solution.adjusted_observations, strict=True)
     return {
         "sums_of_squares": solution.sums_of_squares,

@@ -20,7 +20,6 @@ from photogram.distributed.parts import shared_cameras
 from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
-from photogram.network.observations import observation_rows
 from photogram.results.datum import datum_messages, datum_of
 from photogram.results.result import Result
 from photogram.results.saved import read_summary
@@ -188,8 +187,7 @@ def _added(tables: Iterable[dict[str, float]]) -> dict[str, float]:
 def _observed(block: Block, details: list[dict[str, Any]]) -> list[Any]:
     """Return what has become of observations, in the order of the groups of the whole block."""
     by_row = dict(_all(details, "observed"))
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
-    return [by_row[row] for rows, _ in groups for row in rows]
+    return [by_row[row] for rows, _ in block.observation_groups for row in rows]
 
 
 def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> list[Any]:

@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -32,6 +33,7 @@ from photogram.network.observations import (
     of_records,
 )
 from photogram.network.observations.knots import with_knots
+from photogram.network.observations.observation import Group
 from photogram.network.observations.smoothness import with_smoothness
 from photogram.network.passages import Figure, Passage, checked_passages
 from photogram.network.photo_cameras import checked_cameras, photo_indices
@@ -432,7 +434,9 @@ class Block(Valued, Brief):
         self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
         self._set("observations", with_smoothness(self.observations, self.trajectories))
         self._set("observations", with_knots(self.observations, self.cameras))
-        observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
+        self._set("_unknowns", self._different_unknowns())
+        groups = observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
+        self._set("_observation_groups", groups)
         self._check_figures()
         of_photos = self.photo_cameras if self.cameras else None
         check_scans(self.passages, self.photo_ids, self.cameras, of_photos, self.image_photos)
@@ -512,9 +516,19 @@ class Block(Valued, Brief):
         splined = [(row, each.knot_unknowns) for row, each in enumerate(self.cameras) if each.knot_unknowns]
         return [*self.passages, *(Knots(row, knots) for row, knots in splined)]
 
-    @property
+    @cached_property
     def unknowns(self) -> list[Unknown]:
         """What observations, and photos on frames or trajectories, have in common, in order."""
+        own: list[Unknown] = vars(self)["_unknowns"]
+        return own
+
+    @property
+    def observation_groups(self) -> list[tuple[list[int], Group]]:
+        """The observations kind by kind: their rows, and what the core takes."""
+        own: list[tuple[list[int], Group]] = vars(self)["_observation_groups"]
+        return own
+
+    def _different_unknowns(self) -> list[Unknown]:
         of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
         sensors = [mount.sensor for mount in self.mounts]
         sensors += [each.sensor for each in self.timed if each.sensor is not None]

@@ -12,7 +12,6 @@ from photogram.arguments.types import Floats
 from photogram.memory import available_memory
 from photogram.network.block import Block
 from photogram.network.flown import flown
-from photogram.network.observations import observation_rows
 from photogram.network.passages import passage_rows
 from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
@@ -64,7 +63,6 @@ def block_network(
     """
     unknowns = [*block.unknowns, *further]
     own = flown(block, unknowns)
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, unknowns)
     cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
     known = np.zeros_like(own.positions)
@@ -87,7 +85,7 @@ def block_network(
         block.image_points,
         own.image_xy,
         block.image_sd,
-        observation_groups=[group for _, group in groups],
+        observation_groups=[group for _, group in block.observation_groups],
         unknowns=[each.row() for each in unknowns],
         mounts=mount_rows(block.mounts, block.timed, block.photo_ids, unknowns),
         trajectories=own.trajectories,

@@ -6,7 +6,11 @@ WAYS = {
     "document_of": ("document",),
     "files_of": ("saved_block",),
     "findings_of": ("findings", "judged"),
-    "page_of": ("page",),
+    "page_of": {
+        "Result": ("page.block",),
+        "Snooped": ("page.removed",),
+        "VarianceComponents": ("page.weights",),
+    },
     "pictured": ("pictured",),
     "report_of": ("report",),
     "statement_of": ("statement.made",),

@@ -10,7 +10,6 @@ import numpy as np
 from photogram.arguments.arrays import freeze_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.network.block import Block
-from photogram.network.observations import observation_rows
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
@@ -83,8 +82,7 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
     """Return what has become of the observations of a block, by the names of their kinds."""
     found = iter(solution.adjusted_observations)
     kinds: dict[str, ObservedKind] = {}
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
-    for rows, (*_, covariances) in groups:
+    for rows, (*_, covariances) in block.observation_groups:
         first = block.observations[rows[0]]
         kind = first.label
         components = first.components(geographic=block.geographic)
@@ -93,11 +91,13 @@ def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str
             observed = ~np.isnan([block.observations[row].observed for row in rows])
         tables = np.full((3, *observed.shape), np.nan)
         single = np.full((2, len(rows)), np.nan)
-        for k in range(len(rows)):
-            adjusted = next(found)
-            if adjusted is not None:
-                tables[:, k, observed[k]] = adjusted[:3]
-                single[:, k] = adjusted[3:]
+        adjusted = [next(found) for _ in rows]
+        taken = np.array([each is not None for each in adjusted])
+        some = [each for each in adjusted if each is not None]
+        if some:
+            parts = zip(*some, strict=True)
+            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(parts)) for _ in range(3)]
+            single[:, taken] = list(parts)
         variances = np.diagonal(covariances, axis1=1, axis2=2)
         own = ObservedKind(
             kind=kind,

@@ -10,7 +10,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Indices
 from photogram.network.block import Block
-from photogram.network.observations import Observation, Smoothness, observation_rows
+from photogram.network.observations import Observation, Smoothness
 from photogram.network.trajectories import Trajectory
 from photogram.results.network_trial import (
     ATTITUDE,
@@ -63,8 +63,7 @@ def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = 
 
 def observations_of_core(block: Block) -> list[Observation]:
     """Return the observations beside images in the order of the core: kind by kind."""
-    groups = observation_rows(block.observations, block.point_ids, block.photo_ids, block.unknowns)
-    return [block.observations[row] for rows, _ in groups for row in rows]
+    return [block.observations[row] for rows, _ in block.observation_groups for row in rows]
 
 
 class _Named(NamedSuspects):

@@ -46,7 +46,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 class Way(Generic[P, R]):
     """A function with one definition for each class of its first argument, a `functools.singledispatch`.
 
-    A package names in `WAYS` its files that define it for its classes, by the name of the function.
+    A package names in `WAYS` its files that define it for its classes, by the name of the function; or those
+    of each class by its name, where many wait for what few need.
     """
 
     __name__: str
@@ -65,7 +66,8 @@ class Way(Generic[P, R]):
         if kind not in self._sought:
             for each in kind.__mro__:
                 package = each.__module__.rpartition(".")[0]
-                for file in getattr(sys.modules.get(package), "WAYS", {}).get(self.__name__, ()):
+                files = getattr(sys.modules.get(package), "WAYS", {}).get(self.__name__, ())
+                for file in files.get(each.__name__, ()) if isinstance(files, Mapping) else files:
                     import_module(f"{package}.{file}")
             self._sought.add(kind)
         return self._function.dispatch(kind)

@@ -5,8 +5,10 @@ use super::camera::inverse::{inverted, times, way_back};
 
 /// Coefficients of each polynomial.
 pub const COEFFICIENTS: usize = 9;
+/// Parameters of its linear part: scales and lean.
+pub const LINEAR: usize = 3;
 /// Parameters of a correction: scales, lean, the coefficients of x, those of y.
-pub const PARAMETERS: usize = 3 + 2 * COEFFICIENTS;
+pub const PARAMETERS: usize = LINEAR + 2 * COEFFICIENTS;
 /// Exponents of the terms of a polynomial, the constant behind them: x^4, y^4, x^3, y^3, x^2, y^2, x, y.
 const DEGREES: [i32; COEFFICIENTS - 1] = [4, 4, 3, 3, 2, 2, 1, 1];
 
@@ -39,6 +41,25 @@ pub struct Placed {
     pub by_parameters: [[f64; PARAMETERS]; 2],
 }
 
+/// The linear part of a correction, made ready for many places.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear {
+    /// From a reading to a place.
+    pub matrix: Matrix2,
+    /// Its inverse.
+    pub back: Matrix2,
+    /// Partials of a place by Sx, Sy, alpha: of a reading of 1 along x, y, y.
+    by_parameters: [[f64; 2]; LINEAR],
+}
+
+impl Linear {
+    /// Partials of the place of a reading by Sx, Sy, alpha, one after the other.
+    pub fn by_parameters(&self, [x, y]: [f64; 2]) -> [[f64; 2]; LINEAR] {
+        let [by_x, by_y, by_lean] = self.by_parameters;
+        [by_x.map(|by| by * x), by_y.map(|by| by * y), by_lean.map(|by| by * y)]
+    }
+}
+
 impl Correction {
     /// Of an instrument that is true.
     pub const NONE: Self =
@@ -55,14 +76,16 @@ impl Correction {
     /// With these parameters.
     #[must_use]
     pub fn with_parameters(&self, all: &[f64; PARAMETERS]) -> Self {
-        let polynomials = [0, 1].map(|axis| std::array::from_fn(|k| all[3 + COEFFICIENTS * axis + k]));
+        let polynomials = [0, 1].map(|axis| std::array::from_fn(|k| all[LINEAR + COEFFICIENTS * axis + k]));
         Self { scales: [all[0], all[1]], lean: all[2], polynomials, half_range: self.half_range }
     }
 
     /// The linear part.
-    fn matrix(&self) -> Matrix2 {
+    pub fn linear(&self) -> Linear {
         let ([sx, sy], (sin, cos)) = (self.scales, self.lean.sin_cos());
-        [[sx, sy * sin], [0.0, sy * cos]]
+        let matrix = [[sx, sy * sin], [0.0, sy * cos]];
+        let by_parameters = [[1.0, 0.0], [sin, cos], [sy * cos, -sy * sin]];
+        Linear { matrix, back: inverted(matrix), by_parameters }
     }
 
     /// The nine functions of a linearly corrected place, and their derivatives by it.
@@ -90,30 +113,28 @@ impl Correction {
 
     /// The true place of a reading.
     pub fn place(&self, reading: [f64; 2]) -> [f64; 2] {
-        self.bowed(times(&self.matrix(), reading)).0
+        self.bowed(times(&self.linear().matrix, reading)).0
     }
 
     /// The true place of a reading, with all partials.
     pub fn linearize(&self, reading: [f64; 2]) -> Placed {
-        let ([x, y], linear) = (reading, self.matrix());
-        let ([_, sy], (sin, cos)) = (self.scales, self.lean.sin_cos());
-        let straight = times(&linear, reading);
+        let linear = self.linear();
+        let straight = times(&linear.matrix, reading);
         let (xy, by_straight) = self.bowed(straight);
         let (functions, _) = self.functions(straight);
-        let by_linear = [[x, 0.0], [sin * y, cos * y], [sy * cos * y, -sy * sin * y]];
-        let by_linear = by_linear.map(|column| times(&by_straight, column));
+        let by_linear = linear.by_parameters(reading).map(|column| times(&by_straight, column));
         let mut by_parameters = [[0.0; PARAMETERS]; 2];
         for (row, own) in by_parameters.iter_mut().enumerate() {
-            (0..3).for_each(|k| own[k] = by_linear[k][row]);
-            own[3 + COEFFICIENTS * row..][..COEFFICIENTS].copy_from_slice(&functions);
+            (0..LINEAR).for_each(|k| own[k] = by_linear[k][row]);
+            own[LINEAR + COEFFICIENTS * row..][..COEFFICIENTS].copy_from_slice(&functions);
         }
-        let columns = [0, 1].map(|k| times(&by_straight, linear.map(|row| row[k])));
+        let columns = [0, 1].map(|k| times(&by_straight, linear.matrix.map(|row| row[k])));
         Placed { xy, by_reading: [0, 1].map(|row| columns.map(|column| column[row])), by_parameters }
     }
 
     /// The reading of a true place; None where the polynomials turn over.
     pub fn reading(&self, place: [f64; 2]) -> Option<[f64; 2]> {
         let straight = way_back(place, place, |straight| self.bowed(straight))?;
-        Some(times(&inverted(self.matrix()), straight))
+        Some(times(&self.linear().back, straight))
     }
 }

@@ -58,7 +58,7 @@ pub(super) fn adjusted_photos(
     let placed = model.placed(&unknowns[model.of_stations()]);
     let photo = |index: usize| {
         let photo = &network.photos[index];
-        let range = model.of_block(index);
+        let range = model.of_photo(index);
         let (first, end) = (range.start, range.end);
         let values = &unknowns[range];
         let angles = reported_angles(model, index, values);
@@ -90,7 +90,11 @@ pub(super) fn adjusted_photos(
             camera,
             cofactors: cofactors.map_or_else(
                 || DMatrix::repeat(values.len(), values.len(), f64::NAN),
-                |all| in_angles(model, index, values, model.cofactors_of_block(all, index)),
+                |all| {
+                    let (width, own) = (model.of_block(index).len(), values.len());
+                    let square = DMatrix::from_row_slice(width, width, model.cofactors_of_block(all, index));
+                    in_angles(model, index, values, square.view((0, 0), (own, own)).into_owned())
+                },
             ),
             redundancy: redundancy
                 .map_or_else(|| vec![f64::NAN; end - first], |all| all[first..end].to_vec()),
@@ -130,9 +134,7 @@ fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64;
 
 /// Cofactors of a photo's unknowns: where its attitude has stepped by a rotation vector rho = K d(angles), taken to the angles by
 /// diag(I, K^-1, I). NaN for angles that are not determined, phi being 90 degrees.
-fn in_angles(model: &Bundle, photo: usize, values: &[f64], cofactors: &[f64]) -> DMatrix<f64> {
-    let width = values.len();
-    let mut found = DMatrix::from_row_slice(width, width, cofactors);
+fn in_angles(model: &Bundle, photo: usize, values: &[f64], mut found: DMatrix<f64>) -> DMatrix<f64> {
     let Some(sense) = model.turning_sense(photo) else { return found };
     let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
     let inverse = numbers.rates(angles).try_inverse().filter(|_| !numbers.is_singular(angles));

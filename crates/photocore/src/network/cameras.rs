@@ -70,7 +70,7 @@ impl Network {
             camera.images += photo.images;
             if model.has_own_camera(index) {
                 camera.take_over(photo);
-                let own = model.of_block(index);
+                let own = model.of_photo(index);
                 camera.inform(problem, own.start + 6..own.end, adjustment);
             }
         }

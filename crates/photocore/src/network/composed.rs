@@ -97,7 +97,7 @@ impl Bundle {
             return self.observe_passing((stations, bent), group, local, rows, own);
         }
         let timed = self.compose_timed((stations, bent), group, own);
-        bent.write(self.space, stations, timed.then_some(&*own), (&self.images[group], 0), local, rows);
+        bent.write(self.space, stations, timed.then_some(&*own), &self.images[group], local, rows);
     }
 
     /// The point of an image that is not plain, in the axes of its photo.

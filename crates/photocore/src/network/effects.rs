@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::NetworkError;
+use super::model::Bundle;
 use super::predictions::OnPoint;
 use super::suspects::Home;
 use super::trial::Trial;
@@ -92,6 +93,7 @@ impl Trial {
             let photo = match suspect.home {
                 Home::Group { group, .. } => Some(model.carrier(model.images[group].photo)),
                 Home::Block(block) if block < model.cameras.len() => Some(block),
+                Home::Tie(tie) => model.photo_of_tie(tie),
                 _ => None,
             };
             let turning = photo.and_then(|photo| Some((photo, model.turning_sense(photo)?)));
@@ -150,5 +152,16 @@ impl Trial {
             }
         }
         found
+    }
+}
+
+impl Bundle {
+    /// The first photo whose block a tie touches.
+    fn photo_of_tie(&self, tie: usize) -> Option<usize> {
+        let is_photo = |&block: &usize| block < self.cameras.len();
+        match tie.checked_sub(self.tied_images()) {
+            None => Some(self.main_block(self.point_images.start[self.locals] + tie)).filter(is_photo),
+            Some(observation) => self.observations[observation].blocks.iter().copied().find(is_photo),
+        }
     }
 }

@@ -131,10 +131,14 @@ impl Evaluated for At<'_> {
             Sight { point: &stations.points[locals[t] as usize], image, sd }
         };
         if let Some(bent) = &stations.bent {
+            let together = bundle.observe_all_passing((stations, bent), locals, groups, rows);
             let mut pose = Composed::new(true);
             for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
                 let mut own = rows.part(t, locals.len());
-                bundle.observe_bent((stations, bent), group as usize, local as usize, &mut own, &mut pose);
+                if !together {
+                    let image = (group as usize, local as usize);
+                    bundle.observe_bent((stations, bent), image.0, image.1, &mut own, &mut pose);
+                }
                 own.weigh(&sd[2 * group as usize..][..2]);
             }
             return true;

@@ -52,13 +52,13 @@ pub struct Readings {
 }
 
 impl Readings {
-    /// The scanner with the given parameters of its correction, as far as there are any.
-    fn scanner(&self, parameters: impl Iterator<Item = f64>) -> Scanner {
+    /// The scanner with the given parameters of its correction, as far as there are any; `curved`: with polynomials.
+    fn scanner(&self, parameters: impl Iterator<Item = f64>, curved: bool) -> Scanner {
         let Self { pitch, origin, down, half_range } = *self;
         let mut all = Correction::NONE.parameters();
         all.iter_mut().zip(parameters).for_each(|(own, given)| *own = given);
         let correction = Correction { half_range, ..Correction::NONE }.with_parameters(&all);
-        Scanner { correction, pitch, origin, down }
+        Scanner::new((correction, curved), pitch, origin, down)
     }
 }
 
@@ -76,6 +76,12 @@ pub struct Read {
     /// The reading with its partials; NaN where the scanner has none.
     pub reading: Reading,
     functions: Functions,
+}
+
+impl Default for Read {
+    fn default() -> Self {
+        Self { reading: Reading::NONE, functions: Functions::new() }
+    }
 }
 
 impl FilmOf {
@@ -169,61 +175,67 @@ impl FilmOf {
             if self.projective { Bend::Projective([first, second]) } else { Bend::Bilinear([first, second]) }
         });
         let parameters = std::iter::once(&self.scanner).chain(&self.curves).flat_map(|&own| vector(own));
-        let scanner = self.readings.scanner(parameters);
+        let scanner = self.readings.scanner(parameters, !self.curves.is_empty());
         let pair = |&own: &usize| {
             let [first, second, _] = vector(own);
             [first, second]
         };
         FilmAt {
-            film: Film { mirrored: self.mirrored, placement: vector(self.placement), size, bend },
+            film: Film::new(self.mirrored, vector(self.placement), size, bend),
             scanner,
             pattern: self.pattern.map(|pattern| (pattern, self.weights.iter().map(pair).collect())),
         }
     }
 
-    /// The partials of a reading by the offset of each common unknown of [`Self::commons`].
+    /// The partials of a reading by the offset of each common unknown of [`Self::commons`], to be added up.
     pub(super) fn partials(&self, read: &Read, mut add: impl FnMut(usize, &Matrix2x3<f64>)) {
         let Read { reading, functions } = read;
         let three = |rows: [&[f64]; 2]| Matrix2x3::from_fn(|row, k| rows[row].get(k).copied().unwrap_or(0.0));
+        let mut slot = 0;
+        let mut next = |by: &Matrix2x3<f64>| {
+            add(slot, by);
+            slot += 1;
+        };
         let [x, y] = &reading.by_film;
-        let size = three([&x[3..], &y[3..]]);
-        let mut all: SmallVec<[Matrix2x3<f64>; 16]> = SmallVec::new();
-        all.extend([three([&x[..3], &y[..3]]), size]);
-        all.extend(self.bend.map(|_| three([&reading.by_bend[0], &reading.by_bend[1]])));
-        all.extend(self.roll.map(|_| three([&[size[(0, 0)]], &[size[(1, 0)]]])));
+        next(&three([&x[..3], &y[..3]]));
+        next(&three([&x[3..], &y[3..]]));
+        if self.bend.is_some() {
+            next(&three([&reading.by_bend[0], &reading.by_bend[1]]));
+        }
+        if self.roll.is_some() {
+            next(&three([&x[3..4], &y[3..4]]));
+        }
         let [x, y] = &reading.by_scanner;
         let groups = x.chunks_exact(3).zip(y.chunks_exact(3)).take(1 + self.curves.len());
-        all.extend(groups.map(|(x, y)| three([x, y])));
-        let pairs = functions.iter().map(|own| own.weight / 2 + 1).max().unwrap_or(0);
-        let first = all.len();
-        all.extend((0..pairs).map(|_| Matrix2x3::zeros()));
+        groups.for_each(|(x, y)| next(&three([x, y])));
         for own in functions {
-            for row in 0..2 {
-                let by = reading.by_shift[row][own.axis] * own.value;
-                all[first + own.weight / 2][(row, own.weight % 2)] += by;
-            }
+            let by = [0, 1].map(|row| reading.by_shift[row][own.axis] * own.value);
+            let mut all = Matrix2x3::zeros();
+            (0..2).for_each(|row| all[(row, own.weight % 2)] = by[row]);
+            add(slot + own.weight / 2, &all);
         }
-        all.iter().enumerate().for_each(|(slot, by)| add(slot, by));
     }
 }
 
 impl FilmAt {
-    /// The reading of a place in the frame of the camera, with the functions of a cell of the pattern.
-    pub fn read(&self, q: [f64; 2], cell: usize) -> Read {
-        let (functions, deformation) = self.deformation(q, cell);
+    /// Puts the reading of a place in the frame of the camera, with the functions of a cell of the pattern, in the place of another.
+    pub fn read(&self, q: [f64; 2], cell: usize, read: &mut Read) {
+        let deformation = self.deformation(q, cell, &mut read.functions);
         let reading = self.film.read(q, &deformation, &self.scanner);
-        Read { reading: reading.unwrap_or(Reading::NONE), functions }
+        read.reading = reading.unwrap_or(Reading::NONE);
     }
 
     /// A reading less that of a place in the frame of the camera.
     pub(super) fn missing(&self, q: [f64; 2], cell: usize, reading: [f64; 2]) -> [f64; 2] {
-        let xy = self.read(q, cell).reading.xy;
+        let deformation = self.deformation(q, cell, &mut Functions::new());
+        let read = self.film.read(q, &deformation, &self.scanner);
+        let xy = read.map_or([f64::NAN; 2], |read| read.xy);
         [0, 1].map(|k| reading[k] - xy[k])
     }
 
     /// The place in the frame of the camera that has a reading.
     pub fn place(&self, reading: [f64; 2], cell: usize) -> Option<[f64; 2]> {
-        self.film.place(reading, |q| self.deformation(q, cell).1, &self.scanner)
+        self.film.place(reading, |q| self.deformation(q, cell, &mut Functions::new()), &self.scanner)
     }
 
     /// The cell of the pattern where a reading is.
@@ -234,13 +246,14 @@ impl FilmAt {
 
     /// Units of readings in a mm.
     pub(super) fn units(&self) -> f64 {
-        1.0 / self.scanner.pitch
+        self.scanner.scale()
     }
 
-    fn deformation(&self, q: [f64; 2], cell: usize) -> (Functions, Deformation) {
-        let Some((pattern, weights)) = &self.pattern else { return Default::default() };
-        let (functions, pairs) = (pattern.at(cell, q), pattern.pairs(cell));
-        let deformation = Deformation::new(&functions, |k| weights[pairs[k / 2]][k % 2]);
-        (functions, deformation)
+    /// D, with the functions that it is the sum of.
+    fn deformation(&self, q: [f64; 2], cell: usize, functions: &mut Functions) -> Deformation {
+        let Some((pattern, weights)) = &self.pattern else { return Deformation::default() };
+        *functions = pattern.at(cell, q);
+        let pairs = pattern.pairs(cell);
+        Deformation::new(functions, |k| weights[pairs[k / 2]][k % 2])
     }
 }

@@ -15,8 +15,14 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
     if !(model.blocks.shared.is_empty() && model.mounts.is_empty() && model.passages.is_empty()) {
         let (mut shared_ptr, mut shared) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
         shared_ptr.push(0);
-        for image in 0..groups {
-            shared.extend(model.blocks_of_image(image).skip(1).map(|block| block as u32));
+        let beside = |image| model.blocks_of_image(image).skip(1).map(|block| block as u32).collect();
+        let mut alike: Vec<Option<Vec<u32>>> = vec![None; model.cameras.len()];
+        for (index, image) in model.images[..groups].iter().enumerate() {
+            if model.pass_alike(image.photo) {
+                shared.extend_from_slice(alike[image.photo].get_or_insert_with(|| beside(index)));
+            } else {
+                shared.extend(beside(index));
+            }
             shared_ptr.push(shared.len());
         }
         layout = layout.with_shared(shared_ptr, shared)?;

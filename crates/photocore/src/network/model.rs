@@ -107,9 +107,16 @@ impl Bundle {
         start + self.blocks.first[block]..start + self.blocks.first[block + 1]
     }
 
+    /// The unknowns of a photo that are those of its pose and, unless that is held or shared, its camera, of all: the first of its block.
+    pub fn of_photo(&self, photo: usize) -> Range<usize> {
+        let all = self.of_block(photo);
+        let beside = self.blocks.commons_of(photo).first().and_then(|&common| self.of_common(common));
+        all.start..beside.map_or(all.end, |beside| beside.start)
+    }
+
     /// Whether a photo has a camera with unknown parameters that is no other's.
     pub fn has_own_camera(&self, photo: usize) -> bool {
-        self.of_block(photo).len() > POSE
+        self.of_photo(photo).len() > POSE
     }
 
     /// Where the coordinates of a point stand among the unknowns.
@@ -256,7 +263,7 @@ impl Bundle {
             lenses.map(|own| own.map(|&knot| commons[knot].vector().xy().into()).collect()).collect();
         let photo = |photo: usize| {
             let (pose, camera) =
-                unknowns[self.blocks.first[photo]..self.blocks.first[photo + 1]].split_at(POSE);
+                unknowns[self.blocks.first[photo]..][..self.of_photo(photo).len()].split_at(POSE);
             let pose = std::array::from_fn(|k| pose[k]);
             let shared = self.blocks.of_camera[photo]
                 .map(|block| self.blocks.first[block]..self.blocks.first[block + 1]);
@@ -297,15 +304,14 @@ impl Bundle {
 
     /// What a block of photos, shared cameras and common unknowns belongs to, with the unknowns of each, of all.
     pub fn owners(&self, block: usize) -> Vec<(Owner, Range<usize>)> {
-        let (photos, cameras) = (self.cameras.len(), self.blocks.shared.len());
-        if block < photos {
-            vec![(Owner::Photo(block), self.of_block(block))]
-        } else if block < photos + cameras {
-            vec![(Owner::Camera(self.blocks.shared[block - photos]), self.of_block(block))]
-        } else {
-            let own = self.blocks.commons[block - photos - cameras].iter();
-            own.filter_map(|&common| Some((Owner::Common(common), self.of_common(common)?))).collect()
-        }
+        let photos = self.cameras.len();
+        let first = match self.blocks.shared.get(block.wrapping_sub(photos)) {
+            _ if block < photos => Some((Owner::Photo(block), self.of_photo(block))),
+            camera => camera.map(|&camera| (Owner::Camera(camera), self.of_block(block))),
+        };
+        let commons = self.blocks.commons_of(block).iter();
+        let commons = commons.filter_map(|&common| Some((Owner::Common(common), self.of_common(common)?)));
+        first.into_iter().chain(commons).collect()
     }
 
     /// What one of their unknowns, of all, belongs to, and its number there; None for those of points.
@@ -340,7 +346,7 @@ impl Bundle {
     /// The common unknown before another in their block.
     pub fn former_in_block(&self, common: usize) -> Option<usize> {
         let InBlock { block, .. } = self.blocks.of_common[common]?;
-        let own = &self.blocks.commons[block - self.cameras.len() - self.blocks.shared.len()];
+        let own = self.blocks.commons_of(block);
         let place = own.iter().position(|&other| other == common)?;
         Some(own[place.checked_sub(1)?])
     }

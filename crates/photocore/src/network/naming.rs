@@ -116,7 +116,7 @@ impl Network {
             parts[2] += share(first + 3) + share(first + 4);
             parts[3] += share(first + 5);
             let camera = &mut parameters[self.photos[index].camera];
-            let own = (first + 6..model.of_block(index).end).map(share);
+            let own = (first + 6..model.of_photo(index).end).map(share);
             camera.iter_mut().zip(own).for_each(|(sum, share)| *sum += share);
         }
         for (place, &camera) in model.blocks.shared.iter().enumerate() {

@@ -1,22 +1,29 @@
 //! Images that pass more than pose and camera: their blocks, and the equations there.
 
+use std::ops::Range;
+
 use smallvec::{SmallVec, smallvec};
 
 use super::Image;
 use super::commons::CommonState;
-use super::film::FilmOf;
+use super::film::{FilmOf, Read};
 use super::in_block::InBlock;
+use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::model::Bundle;
 use super::mounts::Composed;
 use super::passages::Own;
-use super::stations::{Bent, Stations};
-use crate::geometry::camera::SplinedStereographic;
+use super::stations::{Bent, Station, Stations};
+use crate::geometry::camera::{LensDirection, Matrix2, SplinedStereographic, each_camera};
 use crate::geometry::{Camera, CameraModel, Matrix3, Vector3};
 use crate::normals::{Cofactors, GroupRows};
 use crate::parallel;
 
 /// How far an image may move, in distances of knots, before it depends on others than those that it may step with.
 const MARGIN: f64 = 0.25;
+/// Leads rows to themselves.
+const UNIT: Matrix2 = [[1.0, 0.0], [0.0, 1.0]];
+/// An image amid the frame: what is observed minus computed of it is the place that is computed, taken off.
+const NOWHERE: Image = Image { photo: 0, point: 0, xy: [0.0; 2], sd: [1.0; 2] };
 
 /// Where the columns of a block are among those that an image has in common with others; None of the main block.
 #[derive(Debug, Clone, Copy)]
@@ -25,23 +32,63 @@ struct Slot {
     first: Option<usize>,
 }
 
-/// The rows of an image, and where the columns of each block stand.
-struct Columns<'a, 'b> {
-    rows: &'a mut GroupRows<'b>,
+/// Where the columns of an image that passes something stand: in the main block those of pose and camera first; beside it those of other
+/// blocks of the pose, of what it passes, of the camera.
+pub(super) struct Columns {
     slots: SmallVec<[Slot; 32]>,
+    /// How many pose and camera have in the main block.
+    main: usize,
+    /// How many other blocks of the pose have, where those of the camera begin, and how many there are.
+    poses: usize,
+    camera: usize,
+    all: usize,
 }
 
-impl Columns<'_, '_> {
+impl Columns {
     /// Adds the partials of the computed position by one of the unknowns at a place.
-    fn add(&mut self, place: InBlock, k: usize, by: [f64; 2]) {
+    #[inline]
+    fn add(&self, rows: &mut GroupRows<'_>, place: InBlock, k: usize, by: [f64; 2]) {
         let slot = self.slots.iter().find(|slot| slot.block == place.block);
         let (to, start) = match slot.map(|slot| slot.first) {
-            Some(Some(first)) => (&mut *self.rows.shared, first),
-            Some(None) => (&mut *self.rows.retained, 0),
+            Some(Some(first)) => (&mut *rows.shared, first),
+            Some(None) => (&mut *rows.retained, 0),
             None => return,
         };
         let width = to.len() / 2;
         (0..2).for_each(|row| to[width * row + start + place.first + k] += by[row]);
+    }
+
+    /// Makes room for the equations of pose, point and camera alone of so many images.
+    fn with_plain(&self, count: usize, take: impl FnOnce(&mut GroupRows<'_>)) {
+        let beside = self.poses + self.all - self.camera;
+        let ends = [1, 3, self.main, beside].map(|width| 2 * count * width);
+        let mut room = vec![0.0; ends.iter().sum()];
+        let (constant, rest) = room.split_at_mut(ends[0]);
+        let (local, rest) = rest.split_at_mut(ends[1]);
+        let (retained, shared) = rest.split_at_mut(ends[2]);
+        take(&mut GroupRows { constant, local, retained, shared });
+    }
+
+    /// Puts the equations of pose, point and camera where they belong, their rows led by `by`; all others are zero.
+    fn spread(&self, plain: &GroupRows<'_>, by: &Matrix2, rows: &mut GroupRows<'_>) {
+        let beside = plain.shared.len() / 2;
+        lead(by, (&*plain.local, 0..3), (&mut *rows.local, 0));
+        rows.retained.fill(0.0);
+        lead(by, (&*plain.retained, 0..self.main), (&mut *rows.retained, 0));
+        rows.shared.fill(0.0);
+        lead(by, (&*plain.shared, 0..self.poses), (&mut *rows.shared, 0));
+        lead(by, (&*plain.shared, self.poses..beside), (&mut *rows.shared, self.camera));
+    }
+}
+
+/// Two rows of columns, led by a matrix, to columns from another one on.
+#[inline(always)]
+fn lead(by: &Matrix2, (from, columns): (&[f64], Range<usize>), (to, first): (&mut [f64], usize)) {
+    let ((x, y), width) = (from.split_at(from.len() / 2), to.len() / 2);
+    let (to_x, to_y) = to.split_at_mut(width);
+    let sources = x[columns.clone()].iter().zip(&y[columns]);
+    for ((x, y), (to_x, to_y)) in sources.zip(to_x[first..].iter_mut().zip(&mut to_y[first..])) {
+        (*to_x, *to_y) = (by[0][0] * x + by[0][1] * y, by[1][0] * x + by[1][1] * y);
     }
 }
 
@@ -60,9 +107,29 @@ impl Bundle {
             let windows = self.of_seen(unknowns, |own, u| own.window(u, MARGIN));
             self.passages.open(windows);
         }
-        for image in 0..self.images.len() {
-            self.passed_by(image).into_iter().for_each(|common| self.commons[common].uses += 1);
+        if self.passages.is_empty() {
+            return;
         }
+        // How many images of each photo pass the same, and one of them.
+        let mut alike = vec![(0, 0); self.cameras.len()];
+        let mut passing = vec![];
+        for (index, image) in self.images.iter().enumerate() {
+            if self.pass_alike(image.photo) {
+                alike[image.photo] = (alike[image.photo].0 + 1, index);
+            } else {
+                passing.push((1, index));
+            }
+        }
+        for (count, image) in alike.into_iter().chain(passing).filter(|&(count, _)| count > 0) {
+            self.passed_by(image).into_iter().for_each(|common| self.commons[common].uses += count);
+        }
+    }
+
+    /// Whether all images of a photo have the same retained blocks, whatever the point and where they are.
+    pub(super) fn pass_alike(&self, photo: usize) -> bool {
+        let cells = || self.passages.film(photo).is_some_and(FilmOf::has_cells);
+        let apart = || self.passages.have_figures() || self.passages.lens(photo).is_some() || cells();
+        !self.mounts.are_timed(photo) && (self.passages.is_empty() || !apart())
     }
 
     /// Whether there are images of which the knots are others than those that they may step with.
@@ -98,14 +165,16 @@ impl Bundle {
         parallel::map(self.points.len(), 64, of_point).into_iter().flatten().collect()
     }
 
-    /// The retained blocks of these, each once.
+    /// The retained blocks of these, each once, without the main one.
     pub(super) fn blocks_of_passages(&self, image: usize) -> SmallVec<[usize; 32]> {
         let mut blocks = SmallVec::new();
         if self.passages.is_empty() {
             return blocks;
         }
+        let main = self.main_block(image);
         for common in self.passed_by(image) {
             if let Some(place) = self.blocks.of_common[common]
+                && place.block != main
                 && !blocks.contains(&place.block)
             {
                 blocks.push(place.block);
@@ -114,18 +183,10 @@ impl Bundle {
         blocks
     }
 
-    /// Writes the equations of an image that passes more than pose and camera: those of pose, point and camera first.
-    pub(super) fn observe_passing(
-        &self,
-        (stations, bent): (&Stations, &Bent),
-        group: usize,
-        local: usize,
-        rows: &mut GroupRows<'_>,
-        own: &mut Composed,
-    ) {
-        let (photo, cell) = (self.images[group].photo, self.passages.cell(group));
-        let (main, all) = (self.main_block(group), rows.shared.len() / 2);
-        let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block: main, first: None }];
+    /// Where the columns of an image that passes something stand; it has so many in common with others.
+    fn columns(&self, image: usize, all: usize) -> Columns {
+        let (photo, block) = (self.images[image].photo, self.main_block(image));
+        let mut slots: SmallVec<[Slot; 32]> = smallvec![Slot { block, first: None }];
         let mut place = |blocks: &mut dyn Iterator<Item = usize>, mut first: usize| {
             for block in blocks {
                 slots.push(Slot { block, first: Some(first) });
@@ -133,34 +194,112 @@ impl Bundle {
             }
             first
         };
-        let poses = place(&mut self.blocks_of_pose(photo, self.time_of(group)).skip(1), 0);
-        let passed = place(&mut self.blocks_of_passages(group).into_iter(), poses);
-        let plain = poses + all - passed;
-        let mut shared: SmallVec<[f64; 64]> = smallvec![0.0; 2 * plain];
-        let (constant, point, retained) = (&mut *rows.constant, &mut *rows.local, &mut *rows.retained);
-        let mut inner = GroupRows { constant, local: point, retained, shared: &mut shared };
-        let timed = self.compose_timed((stations, bent), group, own);
-        let own = timed.then_some(&*own);
-        let read = bent.write(self.space, stations, own, (&self.images[group], cell), local, &mut inner);
-        for (row, to) in rows.shared.chunks_exact_mut(all.max(1)).enumerate() {
-            let from = &shared[plain * row..][..plain];
-            to[..poses].copy_from_slice(&from[..poses]);
-            to[poses..passed].fill(0.0);
-            to[passed..].copy_from_slice(&from[poses..]);
+        let poses = place(&mut self.blocks_of_pose(photo, self.time_of(image)).skip(1), 0);
+        let camera = place(&mut self.blocks_of_passages(image).into_iter(), poses);
+        let main = if block == photo { self.of_photo(photo) } else { self.of_block(block) }.len();
+        Columns { slots, main, poses, camera, all }
+    }
+
+    /// Writes the equations of an image that passes more than pose and camera: those of pose, point and camera first.
+    pub(super) fn observe_passing(
+        &self,
+        at: (&Stations, &Bent),
+        group: usize,
+        local: usize,
+        rows: &mut GroupRows<'_>,
+        own: &mut Composed,
+    ) {
+        let columns = self.columns(group, rows.shared.len() / 2);
+        columns.with_plain(1, |plain| {
+            let timed = self.compose_timed(at, group, own).then_some(&*own);
+            at.1.write(self.space, at.0, timed, &self.images[group], local, plain);
+            self.pass(at, (group, local), &columns, plain, rows, &mut Read::default());
+        });
+    }
+
+    /// Writes the equations of images of one photo side by side, where all of them pass the same; false where they may not.
+    pub(super) fn observe_all_passing(
+        &self,
+        at: (&Stations, &Bent),
+        locals: &[u32],
+        groups: &[u32],
+        rows: &mut GroupRows<'_>,
+    ) -> bool {
+        let (stations, bent) = at;
+        let (first, count) = (groups[0] as usize, groups.len());
+        let photo = self.images[first].photo;
+        if self.passages.is_empty() || !self.pass_alike(photo) || bent.mounted.is_some() || count < FEWEST {
+            return false;
         }
-        let mut columns = Columns { rows, slots };
-        self.step_figure(local, &mut columns);
-        if let (Some(film), Some(read)) = (self.passages.film(photo), read) {
-            let commons = film.commons(cell);
-            film.partials(&read, |slot, by| {
-                let common = commons[slot].0;
-                let Some(place) = self.blocks.of_common[common] else { return };
-                for (k, &(_, component, _)) in self.commons[common].kind.unknowns().iter().enumerate() {
-                    columns.add(place, k, [by[(0, component)], by[(1, component)]]);
+        let columns = self.columns(first, rows.shared.len() / (2 * count));
+        columns.with_plain(count, |plain| {
+            if !self.place_in_lanes(at, locals, groups, plain) {
+                for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
+                    let image = &self.images[group as usize];
+                    bent.write(self.space, stations, None, image, local as usize, &mut plain.part(t, count));
                 }
-            });
-        }
-        self.step_knots((stations, bent), group, local, &mut columns);
+            }
+            let mut read = Read::default();
+            for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
+                let (image, own) = ((group as usize, local as usize), &mut rows.part(t, count));
+                self.pass(at, image, &columns, &plain.part(t, count), own, &mut read);
+            }
+        });
+        true
+    }
+
+    /// Writes the equations of pose, point and camera alone of images of one photo, in lanes; false where that cannot be.
+    fn place_in_lanes(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        locals: &[u32],
+        groups: &[u32],
+        plain: &mut GroupRows<'_>,
+    ) -> bool {
+        let photo = self.images[groups[0] as usize].photo;
+        let Station { orientation, camera } = &stations.photos[photo];
+        let scanned = bent.film(photo).is_some();
+        let sight = |t: usize| {
+            let image = if scanned { &NOWHERE } else { &self.images[groups[t] as usize] };
+            Sight { point: &stations.points[locals[t] as usize], image, sd: [1.0; 2] }
+        };
+        bent.refracted.is_none()
+            && each_camera!(camera, camera => {
+                (!scanned || is_forward(camera))
+                    && write_in_lanes(orientation, camera, groups.len(), &sight, plain)
+            })
+    }
+
+    /// Writes the equations of an image from those of pose, point and camera alone.
+    fn pass(
+        &self,
+        (stations, bent): (&Stations, &Bent),
+        (group, local): (usize, usize),
+        columns: &Columns,
+        plain: &GroupRows<'_>,
+        rows: &mut GroupRows<'_>,
+        read: &mut Read,
+    ) {
+        let photo = self.images[group].photo;
+        let (Some(film), Some(at)) = (self.passages.film(photo), bent.film(photo)) else {
+            columns.spread(plain, &UNIT, rows);
+            rows.constant.copy_from_slice(plain.constant);
+            self.step_figure(local, columns, rows);
+            return self.step_knots((stations, bent), group, local, columns, rows);
+        };
+        let cell = self.passages.cell(group);
+        at.read([-plain.constant[0], -plain.constant[1]], cell, read);
+        columns.spread(plain, &read.reading.by_q, rows);
+        (0..2).for_each(|k| rows.constant[k] = self.images[group].xy[k] - read.reading.xy[k]);
+        self.step_figure(local, columns, rows);
+        let commons = film.commons(cell);
+        film.partials(read, |slot, by| {
+            let common = commons[slot].0;
+            let Some(place) = self.blocks.of_common[common] else { return };
+            for (k, &(_, component, _)) in self.commons[common].kind.unknowns().iter().enumerate() {
+                columns.add(rows, place, k, [by[(0, component)], by[(1, component)]]);
+            }
+        });
     }
 
     /// Finds in which cells of patterns images are, at the values that are given.
@@ -183,7 +322,8 @@ impl Bundle {
         (stations, bent): (&Stations, &Bent),
         group: usize,
         local: usize,
-        columns: &mut Columns<'_, '_>,
+        columns: &Columns,
+        rows: &mut GroupRows<'_>,
     ) {
         let photo = self.images[group].photo;
         let (lens, camera) = (self.passages.lens(photo), splined(&stations.photos[photo].camera));
@@ -192,20 +332,20 @@ impl Bundle {
         let [fx, fy, ..] = camera.parameters();
         for (knot, weight) in patch.knots(camera.columns()) {
             if let Some(place) = self.blocks.of_common[self.passages.lenses()[lens].commons[knot]] {
-                columns.add(place, 0, [fx * weight, 0.0]);
-                columns.add(place, 1, [0.0, fy * weight]);
+                columns.add(rows, place, 0, [fx * weight, 0.0]);
+                columns.add(rows, place, 1, [0.0, fy * weight]);
             }
         }
     }
 
     /// The partials by the numbers of a figure: by the point, times how that is shifted.
-    fn step_figure(&self, local: usize, columns: &mut Columns<'_, '_>) {
+    fn step_figure(&self, local: usize, columns: &Columns, rows: &mut GroupRows<'_>) {
         let Some((figure, k)) = self.passages.figure(local) else { return };
         let Some(place) = self.blocks.of_common[figure.common] else { return };
-        let by_point: [f64; 2 * 3] = std::array::from_fn(|i| columns.rows.local[i]);
+        let by_point: [f64; 2 * 3] = std::array::from_fn(|i| rows.local[i]);
         for (number, shift) in figure.shifts[k].column_iter().enumerate() {
             let by = |row: usize| (0..3).map(|i| by_point[3 * row + i] * shift[i]).sum();
-            columns.add(place, number, [by(0), by(1)]);
+            columns.add(rows, place, number, [by(0), by(1)]);
         }
     }
 
@@ -229,6 +369,11 @@ impl Bundle {
         };
         Some((std::array::from_fn(|i| given[i] + shift[i]), found))
     }
+}
+
+/// Whether a camera has a place in its frame for what it sees, nothing being measured.
+fn is_forward<C: CameraModel>(_: &C) -> bool {
+    C::LENS == LensDirection::Forward
 }
 
 /// A camera as one with a spline; None of all others.

@@ -49,19 +49,22 @@ impl Network {
         let mut used = vec![false; self.cameras.len()];
         surroundings.cameras().into_iter().for_each(|camera| used[camera] = true);
         let elsewhere = surroundings.commons();
+        let of_common = |&common: &usize| {
+            let is_used = model.commons[common].uses > 0 || elsewhere.contains(&common);
+            self.commons[common].sd.iter().map(move |&sd| if is_used { sd } else { 0.0 })
+        };
+        let of_commons = |own: &[usize]| own.iter().flat_map(of_common).collect::<Vec<f64>>();
         for (index, photo) in self.photos.iter().enumerate() {
             let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
             used[photo.camera] |= !unused(index);
             let held = unused(index) || model.is_carried(index);
             all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
+            all.extend(of_commons(model.blocks.commons_of(index)));
         }
         for &camera in &model.blocks.shared {
             all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
         }
-        for &common in model.blocks.commons.iter().flatten() {
-            let is_used = model.commons[common].uses > 0 || elsewhere.contains(&common);
-            all.extend(self.commons[common].sd.iter().map(|&sd| if is_used { sd } else { 0.0 }));
-        }
+        model.blocks.commons.iter().for_each(|own| all.extend(of_commons(own)));
         all
     }
 
@@ -73,9 +76,10 @@ impl Network {
             if model.has_own_camera(index) {
                 all.extend(self.camera(photo).camera.parameters());
             }
+            // Common unknowns count from what is given.
+            all.resize(all.len() + model.of_block(index).len() - model.of_photo(index).len(), 0.0);
         }
         all.extend(model.blocks.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
-        // They count from what is given.
         all.resize(model.of_stations().len(), 0.0);
         all
     }

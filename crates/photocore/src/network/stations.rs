@@ -2,10 +2,9 @@
 
 use super::Image;
 use super::commons::CommonState;
-use super::film::{FilmAt, Read};
+use super::film::FilmAt;
 use super::mounts::Composed;
 use crate::geometry::camera::each_camera;
-use crate::geometry::film::Reading;
 use crate::geometry::{
     self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Refraction, Vector3, Vertical,
 };
@@ -86,41 +85,32 @@ impl Bent {
         self.films.get(photo)?.as_ref()
     }
 
-    /// Writes an image in a cell of its film's pattern, with its pose where it is not that of the photo at its time; its reading where the
-    /// photo is scanned.
+    /// Writes an image, with its pose where it is not that of the photo at its time; where the photo is scanned, its place in the camera.
     pub fn write(
         &self,
         space: ObjectSpace,
         stations: &Stations,
         timed: Option<&Composed>,
-        (image, cell): (&Image, usize),
+        image: &Image,
         local: usize,
         rows: &mut GroupRows<'_>,
-    ) -> Option<Read> {
+    ) {
         let composed = timed.or_else(|| self.mounted.as_ref()?.of(image.photo));
         let camera = &stations.photos[image.photo].camera;
         let timed = timed.map(|own| &own.orientation);
         self.seen(space, stations, timed, image.photo, local, |orientation, point| {
-            let mut read = None;
-            let write = |rows: &mut GroupRows<'_>| match self.film(image.photo) {
-                None => each_camera!(camera, camera => write(orientation, camera, point, image, rows)),
-                Some(film) => {
-                    let film = (film, cell);
-                    let found = each_camera!(camera, camera => {
-                        write_scanned(orientation, camera, point, (image, film), rows)
-                    });
-                    read = Some(found);
-                }
+            let scanned = self.film(image.photo).is_some();
+            let write = |rows: &mut GroupRows<'_>| {
+                each_camera!(camera, camera => match scanned {
+                    false => write(orientation, camera, point, image, rows),
+                    true => write_place(orientation, camera, point, rows),
+                });
             };
             match composed {
-                None => {
-                    let mut write = write;
-                    write(rows)
-                }
+                None => write(rows),
                 Some(composed) => composed.write(rows, write),
             }
-            read
-        })
+        });
     }
 
     /// Hands over what a photo sees of a point, and from where; `timed` is its pose where that is not the one at its time.
@@ -160,28 +150,17 @@ pub fn write<C: CameraModel>(
     put(orientation, &u, (residual, &computed), point, rows);
 }
 
-/// The same of a photo that is scanned: the computed is the reading of where the camera has the image. The partials by its film are not
-/// among them.
+/// The same of a place in the camera, nothing being observed of it.
 #[inline(never)]
-pub fn write_scanned<C: CameraModel>(
+pub fn write_place<C: CameraModel>(
     orientation: &Orientation,
     camera: &C,
     point: &geometry::Point,
-    (image, (film, cell)): (&Image, (&FilmAt, usize)),
     rows: &mut GroupRows<'_>,
-) -> Read {
+) {
     let u = orientation.sight(point);
-    let mut computed = camera.linearize(&u);
-    let read = film.read(computed.xy, cell);
-    let Reading { xy, by_q, .. } = &read.reading;
-    let [x, y] = computed.by_u;
-    computed.by_u = by_q.map(|by| by[0] * x + by[1] * y);
-    let [own_x, own_y] = &mut computed.by_parameters;
-    for (x, y) in own_x.as_mut().iter_mut().zip(own_y.as_mut()) {
-        [*x, *y] = by_q.map(|by| by[0] * *x + by[1] * *y);
-    }
-    put(orientation, &u, ([0, 1].map(|k| image.xy[k] - xy[k]), &computed), point, rows);
-    read
+    let computed = camera.linearize(&u);
+    put(orientation, &u, (computed.xy.map(|value| -value), &computed), point, rows);
 }
 
 #[inline(always)]

@@ -157,11 +157,11 @@ fn of_blocks(assembled: &Assembled, camera_of_photo: &dyn Fn(usize) -> usize) ->
     let model = &assembled.problem.model;
     let with_camera = (0..model.cameras.len()).filter(|&photo| model.has_own_camera(photo));
     let own = with_camera.filter_map(|photo| {
-        let block = model.of_block(photo);
+        let block = model.of_photo(photo);
         let subject = Subject::Camera(camera_of_photo(photo));
         weighted(assembled, subject, Home::Block(photo), block.start + 6..block.end)
     });
-    let shared = (model.cameras.len()..model.stations()).flat_map(|block| {
+    let shared = (0..model.stations()).flat_map(|block| {
         let all = model.owners(block).into_iter();
         all.filter_map(move |(owner, unknowns)| {
             let subject = match owner {

@@ -52,6 +52,7 @@ impl<K: Kernel, const ANY: bool> WithSimd for Sized<'_, K, ANY> {
         match (self.layout.rows(), self.layout.local_dim(), self.retained_dim) {
             (2, 3, Some(6)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 6>(simd),
             (2, 3, Some(9)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 9>(simd),
+            (2, 3, Some(12)) if const { S::F64_LANES > 1 } => self.kernel.run::<S, 2, 3, 12>(simd),
             _ if const { ANY } => self.kernel.run::<S, 0, 0, 0>(simd),
             (_, 3, _) => self.kernel.run::<S, 0, 3, 0>(simd),
             (_, 2, _) => self.kernel.run::<S, 0, 2, 0>(simd),

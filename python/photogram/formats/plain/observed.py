@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
@@ -59,6 +59,7 @@ _ROTATIONS = deviation_columns(ROTATIONS)
 _ANGLES = ANGLES["omega_phi_kappa"]
 _Columns = dict[str, dict[str, Any]]
 _Kind = TypeVar("_Kind", bound=Observation)
+_Group = TypeVar("_Group", Antenna, Inertial)
 
 
 def read_observations(
@@ -99,13 +100,11 @@ def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Obse
     positions, covariances = transform.positions("gnss", positions, covariances_of(sd, table), table)
     groups, times = antennas(tables), table.numbers("time")
     found: list[Observation] = []
-    for row, (own, group) in enumerate(zip(of, grouped(tables, table, groups, "gnss_groups"), strict=True)):
-        if own is None:
-            continue
-        group = group or Antenna()
-        given = clocked(table, row, own, group.clock)
-        if own["photo"] is not None:
-            time = times[row] if not math.isnan(times[row]) else subjects.times[subjects.photos[own["photo"]]]
+    for row, group, given in _timed(table, of, grouped(tables, table, groups, "gnss_groups"), Antenna()):
+        if given["photo"] is not None:
+            time = times[row]
+            if math.isnan(time):
+                time = subjects.times[subjects.photos[given["photo"]]]
             if group.drift is not None and math.isnan(time):
                 raise table.error(row, "the group has a drift, and the photo no time")
             given["time"] = 0.0 if math.isnan(time) else float(time)
@@ -123,13 +122,23 @@ def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
     values, covariances = _motions(tables, table, "velocities", VELOCITY)
     groups = grouped(tables, table, antennas(tables), "gnss_groups")
     found: list[Observation] = []
+    for row, group, given in _timed(table, of, groups, Antenna()):
+        given |= {"velocity": values[row], "covariance": covariances[row], "lever_arm": group.lever}
+        found.append(made(table, row, partial(Velocity, **given)))
+    return found
+
+
+def _timed(
+    table: ColumnTable,
+    of: Sequence[dict[str, Any] | None],
+    groups: Sequence[_Group | None],
+    alone: _Group,
+) -> Iterator[tuple[int, _Group, dict[str, Any]]]:
+    """Give the rows that are used, with their groups, and by name what they observe, when, by which clock."""
     for row, (own, group) in enumerate(zip(of, groups, strict=True)):
         if own is not None:
-            group = group or Antenna()
-            given = clocked(table, row, own, group.clock)
-            given |= {"velocity": values[row], "covariance": covariances[row], "lever_arm": group.lever}
-            found.append(made(table, row, partial(Velocity, **given)))
-    return found
+            group = group or alone
+            yield row, group, clocked(table, row, own, group.clock)
 
 
 def _motions(tables: Tables, table: ColumnTable, name: str, columns: Sequence[str]) -> tuple[Floats, Floats]:
@@ -152,13 +161,10 @@ def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
     values, covariances = values @ tables.flip, tables.flip @ covariances @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
     found: list[Observation] = []
-    for row, (own, group) in enumerate(zip(of, groups, strict=True)):
-        if own is not None:
-            group = group or Inertial()
-            given = clocked(table, row, own, group.clock)
-            given |= {"rate": values[row], "covariance": covariances[row]}
-            given |= {"boresight": group.boresight, "bias": group.bias}
-            found.append(made(table, row, partial(Rate, **given)))
+    for row, group, given in _timed(table, of, groups, Inertial()):
+        given |= {"rate": values[row], "covariance": covariances[row]}
+        given |= {"boresight": group.boresight, "bias": group.bias}
+        found.append(made(table, row, partial(Rate, **given)))
     return found
 
 
@@ -180,13 +186,9 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
     covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
     found: list[Observation] = []
-    for row, (own, group) in enumerate(zip(of, groups, strict=True)):
-        if own is not None:
-            group = group or Inertial()
-            given = clocked(table, row, own, group.clock)
-            given |= {"attitude": matrices[row], "covariance": covariances[row]}
-            given |= {"boresight": group.boresight}
-            found.append(made(table, row, partial(Attitude, **given)))
+    for row, group, given in _timed(table, of, groups, Inertial()):
+        given |= {"attitude": matrices[row], "covariance": covariances[row], "boresight": group.boresight}
+        found.append(made(table, row, partial(Attitude, **given)))
     return found
 
 

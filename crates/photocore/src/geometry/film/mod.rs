@@ -20,14 +20,13 @@ pub use scanner::{Scanned, Scanner};
 /// The film of a photo: where it lay, and how its size changed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Film {
-    /// Whether it was seen from the other side.
-    pub mirrored: bool,
-    /// t1, t2 in mm, theta in radians.
-    pub placement: [f64; 3],
+    /// R(theta) J.
+    lie: Matrix2,
+    /// t.
+    shift: [f64; 2],
     /// m, b1, b2.
-    pub size: [f64; 3],
-    /// What is not affine.
-    pub bend: Bend,
+    size: [f64; 3],
+    bend: Bend,
 }
 
 /// What is not affine in the film of a photo.
@@ -83,13 +82,18 @@ struct Aged {
 }
 
 impl Film {
+    /// One that lay at t1, t2 (mm), theta (radians), whose size has changed by m, b1, b2; `mirrored`: seen from the other side.
+    pub fn new(mirrored: bool, [t1, t2, theta]: [f64; 3], size: [f64; 3], bend: Bend) -> Self {
+        let ((sin, cos), side) = (theta.sin_cos(), if mirrored { -1.0 } else { 1.0 });
+        Self { lie: [[side * cos, -sin], [side * sin, cos]], shift: [t1, t2], size, bend }
+    }
+
     /// The reading of a place in the camera's frame; None where the scanner has none.
     pub fn read(&self, q: [f64; 2], deformation: &Deformation, scanner: &Scanner) -> Option<Reading> {
         let Aged { e, by_q, by_size, by_bend, by_shift } = self.aged(q, deformation);
-        let ([t1, t2, _], lain) = (self.placement, self.lie());
-        let [x, y] = times(&lain, e);
-        let Scanned { xy, by_place, by_parameters } = scanner.read([x + t1, y + t2])?;
-        let by_e = product(&by_place, &lain);
+        let [x, y] = times(&self.lie, e);
+        let Scanned { xy, by_place, by_parameters } = scanner.read([x + self.shift[0], y + self.shift[1]])?;
+        let by_e = product(&by_place, &self.lie);
         let turned = times(&by_place, [-y, x]);
         let film = |row: usize| {
             let size = [0, 1, 2].map(|k| times(&by_e, [by_size[0][k], by_size[1][k]])[row]);
@@ -113,18 +117,11 @@ impl Film {
         scanner: &Scanner,
     ) -> Option<[f64; 2]> {
         let p = scanner.place(reading);
-        let [t1, t2, _] = self.placement;
-        let e = times(&inverted(self.lie()), [p[0] - t1, p[1] - t2]);
+        let e = times(&inverted(self.lie), [p[0] - self.shift[0], p[1] - self.shift[1]]);
         way_back(e, e, |q| {
             let Aged { e, by_q, .. } = self.aged(q, &deformation(q));
             (e, by_q)
         })
-    }
-
-    /// R(theta) J.
-    fn lie(&self) -> Matrix2 {
-        let ((sin, cos), side) = (self.placement[2].sin_cos(), if self.mirrored { -1.0 } else { 1.0 });
-        [[side * cos, -sin], [side * sin, cos]]
     }
 
     /// e.

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use super::{Bend, Deformation, Film, Grid, Pattern, Reading, Scanner};
+use super::{Bend, Deformation, Film, Grid, Pattern, Reading, Scanned, Scanner};
 use crate::geometry::correction::Correction;
 
 /// A chain of everything, as numbers: q, film, bend, weights of the pattern, parameters of the scanner.
@@ -10,7 +10,8 @@ use crate::geometry::correction::Correction;
 struct Scene {
     pattern: Pattern,
     projective: bool,
-    scanner: Scanner,
+    correction: Correction,
+    down: bool,
     mirrored: bool,
     q: [f64; 2],
     film: [f64; 6],
@@ -20,7 +21,11 @@ struct Scene {
 
 impl Scene {
     fn reading(&self) -> Reading {
-        self.photo().read(self.q, &self.deformation(self.q), &self.scanner).unwrap()
+        self.photo().read(self.q, &self.deformation(self.q), &self.scanner()).unwrap()
+    }
+
+    fn scanner(&self) -> Scanner {
+        Scanner::new((self.correction, true), 0.02, [6000.0, 5900.0], self.down)
     }
 
     fn deformation(&self, q: [f64; 2]) -> Deformation {
@@ -32,7 +37,7 @@ impl Scene {
     fn photo(&self) -> Film {
         let [t1, t2, theta, m, b1, b2] = self.film;
         let bend = if self.projective { Bend::Projective } else { Bend::Bilinear };
-        Film { mirrored: self.mirrored, placement: [t1, t2, theta], size: [m, b1, b2], bend: bend(self.bend) }
+        Film::new(self.mirrored, [t1, t2, theta], [m, b1, b2], bend(self.bend))
     }
 
     /// All numbers with the steps that they take in units of mm, and the partials by each.
@@ -71,9 +76,9 @@ impl Scene {
             8..10 => own.bend[number - 8] += by,
             number if number < weights => own.weights[number - 10] += by,
             number => {
-                let mut parameters = own.scanner.correction.parameters();
+                let mut parameters = own.correction.parameters();
                 parameters[number - weights] += by;
-                own.scanner.correction = own.scanner.correction.with_parameters(&parameters);
+                own.correction = own.correction.with_parameters(&parameters);
             }
         }
         own
@@ -92,10 +97,10 @@ fn scenes() -> Vec<Scene> {
     let scene = |(k, pattern): (usize, Pattern)| {
         let weights = (0..pattern.count()).map(|k| 0.02 * (1.7 * k as f64).cos()).collect();
         let down = k != 1;
-        let scanner = Scanner { correction, pitch: 0.02, origin: [6000.0, 5900.0], down };
         let film = [-0.7, 0.4, [0.01, 1.57, -3.0][k], -3e-4, 2e-4, -1e-4];
         let (mirrored, projective) = (k == 2, k > 0);
-        Scene { pattern, projective, scanner, mirrored, q: [83.0, -47.0], film, bend: [3e-6, -2e-6], weights }
+        let (q, bend) = ([83.0, -47.0], [3e-6, -2e-6]);
+        Scene { pattern, projective, correction, down, mirrored, q, film, bend, weights }
     };
     patterns.into_iter().enumerate().map(scene).collect()
 }
@@ -122,15 +127,30 @@ fn partials_agree_with_differences() {
 #[test]
 fn a_place_comes_back_from_its_reading() {
     for scene in scenes() {
-        let back = scene.photo().place(scene.reading().xy, |q| scene.deformation(q), &scene.scanner).unwrap();
+        let back =
+            scene.photo().place(scene.reading().xy, |q| scene.deformation(q), &scene.scanner()).unwrap();
         (0..2).for_each(|k| assert!((back[k] - scene.q[k]).abs() < 1e-11));
     }
 }
 
 #[test]
+fn a_scanner_without_polynomials_reads_as_one_whose_polynomials_are_nothing() {
+    let correction = Correction { scales: [1.0003, 0.9996], lean: 4e-4, ..Correction::NONE };
+    let read = |curved| Scanner::new((correction, curved), 0.02, [6000.0, 5900.0], true).read([81.0, -43.0]);
+    let (plain, curved) = (read(false).unwrap(), read(true).unwrap());
+    let all = |own: &Scanned| {
+        let by_linear = own.by_parameters.map(|row| [row[0], row[1], row[2]]);
+        [&own.xy[..], own.by_place.as_flattened(), by_linear.as_flattened()].concat()
+    };
+    for (one, other) in all(&plain).into_iter().zip(all(&curved)) {
+        assert!((one - other).abs() <= 1e-13 * other.abs(), "{one} {other}");
+    }
+}
+
+#[test]
 fn rows_count_down_and_mirrored_films_are_seen_from_the_other_side() {
-    let scanner = Scanner { correction: Correction::NONE, pitch: 0.02, origin: [6000.0; 2], down: true };
-    let film = |mirrored| Film { mirrored, placement: [0.0; 3], size: [0.0; 3], bend: Bend::Flat };
+    let scanner = Scanner::new((Correction::NONE, false), 0.02, [6000.0; 2], true);
+    let film = |mirrored| Film::new(mirrored, [0.0; 3], [0.0; 3], Bend::Flat);
     let read = |mirrored| film(mirrored).read([10.0, 20.0], &Deformation::default(), &scanner).unwrap().xy;
     assert_eq!(read(false), [6500.0, 5000.0]);
     assert_eq!(read(true), [5500.0, 5000.0]);

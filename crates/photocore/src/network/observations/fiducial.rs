@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::{Fault, Named, ObservationModel, Precision, Rows, Sites, Touches};
 use crate::network::commons::CommonKind;
-use crate::network::film::FilmOf;
+use crate::network::film::{FilmOf, Read};
 
 /// The reading of a fiducial mark: what the film and the scanner make of its place in the camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,7 +58,8 @@ impl ObservationModel for Fiducial {
         let numbered = |own: usize| commons.iter().position(|&(common, _)| common == own);
         let mark = sites.common(commons.len()).vector();
         let film = self.film.at(&|own| Some(sites.common(numbered(own)?).vector()));
-        let read = film.read([mark.x, mark.y], cell);
+        let mut read = Read::default();
+        film.read([mark.x, mark.y], cell, &mut read);
         let residual = [0, 1].map(|k| self.reading[k] - read.reading.xy[k]);
         rows.residual(0, &residual);
         self.film.partials(&read, |slot, by| rows.by_offset(0, slot, by));

@@ -17,8 +17,13 @@ pub trait PassageModel {
     /// The common unknowns that it has, with their types.
     fn unknowns(&self) -> Vec<(usize, CommonKind)>;
 
-    /// Those of them that are one block, group by group: whatever touches one of a group touches all.
-    fn together(&self) -> Vec<Vec<usize>> {
+    /// The photo whose images pass it, all of them, where there is one.
+    fn photo(&self) -> Option<usize> {
+        None
+    }
+
+    /// Those of its common unknowns that whatever passes it steps with.
+    fn everywhere(&self) -> Vec<usize> {
         vec![]
     }
 

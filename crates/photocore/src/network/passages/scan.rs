@@ -30,12 +30,14 @@ impl PassageModel for Scan {
         film.into_iter().chain(self.film.weights.iter().map(|&own| (own, CommonKind::Pattern))).collect()
     }
 
-    fn together(&self) -> Vec<Vec<usize>> {
-        let FilmOf { placement, size, bend, scanner, curves, .. } = &self.film;
-        let own = [*placement, *size].into_iter().chain(*bend);
-        let scanner = [*scanner].into_iter().chain(curves.iter().copied());
-        let weights = if self.film.has_cells() { vec![] } else { self.film.weights.clone() };
-        vec![own.collect(), scanner.collect(), weights]
+    fn photo(&self) -> Option<usize> {
+        Some(self.photo)
+    }
+
+    /// All but weights of a pattern of several cells.
+    fn everywhere(&self) -> Vec<usize> {
+        let all = self.unknowns().into_iter().map(|(own, _)| own);
+        all.filter(|own| !(self.film.has_cells() && self.film.weights.contains(own))).collect()
     }
 
     /// Knots of a lens step with images of the camera alone.

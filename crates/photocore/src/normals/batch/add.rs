@@ -17,6 +17,12 @@ impl Batch {
         }
     }
 
+    /// What has products with others by the elimination: all of these, or none.
+    #[inline(always)]
+    fn coupled_to<'a, T>(&self, all: &'a [T]) -> &'a [T] {
+        if self.coupled { all } else { &[] }
+    }
+
     /// Adds what concerns main blocks alone.
     #[inline(always)]
     fn add_slots<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
@@ -30,7 +36,7 @@ impl Batch {
             columns.add_difference(simd, own, v, self.locals.len());
             columns.add_equations(simd, own, constants);
             columns.subtract_right(simd, v, &self.reduced);
-            for other in &self.slots[index + 1..] {
+            for other in self.coupled_to(&self.slots[index + 1..]) {
                 columns.add_product(simd, -1.0, self.slot_coupling::<D>(other, l), v);
             }
         }
@@ -51,7 +57,8 @@ impl Batch {
                         let shared = self.run_rows(segment, run, slot.groups.clone(), rows);
                         columns.add_products(simd, [(1.0, shared, own), taken]);
                     }
-                    None => columns.add_products(simd, [taken]),
+                    None if self.coupled => columns.add_products(simd, [taken]),
+                    None => {}
                 }
             }
         }
@@ -123,10 +130,10 @@ impl Batch {
                 columns.add_products(simd, [taken]);
             }
             columns.subtract_right(simd, v, &self.reduced);
-            for other in &self.segments[index + 1..] {
+            for other in self.coupled_to(&self.segments[index + 1..]) {
                 columns.add_product(simd, -1.0, self.segment_coupling(other, l), v);
             }
-            for slot in self.slots.iter().filter(|slot| slot.row > segment.row) {
+            for slot in self.coupled_to(&self.slots).iter().filter(|slot| slot.row > segment.row) {
                 columns.add_product(simd, -1.0, self.slot_coupling::<0>(slot, l), v);
             }
         }

@@ -100,6 +100,8 @@ impl Batch {
     /// Computes the coupling V of all local blocks to everything else.
     #[inline(always)]
     fn couple<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
+        let own = self.places.len() * self.locals.len() * rows * L;
+        self.coupled = self.local_rows[..own].iter().any(|&value| value != 0.0);
         self.couple_slots::<S, L, D>(simd, rows);
         self.couple_runs::<S, L>(simd, rows);
         if !self.segments.iter().all(|segment| segment.plain) {

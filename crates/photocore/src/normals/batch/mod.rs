@@ -131,6 +131,8 @@ pub(super) struct Batch {
     pub decrease: f64,
     /// Local blocks that their equations do not determine.
     pub deficient: Vec<usize>,
+    /// Whether V is anything but zero: local blocks that are held leave nothing to others.
+    coupled: bool,
     places: Vec<Place>,
     /// The supernode that the local blocks are assembled in.
     node: usize,

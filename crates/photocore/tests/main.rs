@@ -1,0 +1,51 @@
+//! The tests of the crate, as one program: what they use is linked once, not once for each file.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+
+mod adjustment;
+mod attitudes;
+mod block;
+mod camera_models;
+mod cameras;
+mod close_range;
+mod collection;
+mod comparator;
+mod cut;
+mod examples;
+mod features;
+mod first_values;
+mod forward;
+mod free_networks;
+mod free_unknowns;
+mod geometry;
+mod golden;
+mod golden_network;
+mod golden_unknowns;
+mod normals;
+mod observations;
+mod parts;
+mod refraction;
+mod relative_orientation;
+mod resection;
+mod shared_cameras;
+mod similarity;
+mod splined_camera;
+mod stellar;
+mod stellar_dense;
+mod ties;
+mod trajectories;
+
+/// This file, and programs of their own: a table for the page, threads of the whole process.
+const OTHERS: [&str; 3] = ["main", "nist", "own_threads"];
+
+#[test]
+fn every_file_is_part_of_the_program() {
+    let named = include_str!("main.rs");
+    for each in fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/tests")).unwrap() {
+        let path = each.unwrap().path();
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        assert!(OTHERS.contains(&name) || named.contains(&format!("\nmod {name};")), "{name}");
+    }
+}
