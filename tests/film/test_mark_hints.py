@@ -1,6 +1,7 @@
 """Which marks are to be looked at first: of the certificate, of a photo, or one reading."""
 
 import json
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,13 @@ import pytest
 from photogram import InputError, Result, adjust
 from photogram.diagnosis.adjusted import diagnosed
 from photogram.diagnosis.film_marks import mark_hints
+from photogram.diagnosis.film_scans import seam_hints
 from photogram.film import compare_steps
 from photogram.formats import read
 from shared_data import SHARED
 from test_film import project
+
+ARCHIVE = files("photogram") / "examples" / "archive"
 
 pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 
@@ -74,3 +78,26 @@ def test_all_marks_of_a_photo_are_of_another_camera(tmp_path: Path) -> None:
     change = {("p2", mark): {2: by[0], 3: by[1]} for mark, by in out.items()}
     (hint,) = map(str, mark_hints(adjusted(tmp_path, "fiducial_images.csv", change)))
     assert hint.startswith("nearly all fiducials of p2 fail their tests")
+
+
+@pytest.mark.parametrize(("axis", "where"), [(0, "left and right"), (1, "upper and lower")])
+def test_halves_of_a_scan_that_are_shifted_are_named(tmp_path: Path, axis: int, where: str) -> None:
+    """Images and marks of one half of a photo lie 3 pixels lower, across the base."""
+    for each in ARCHIVE.iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes())
+    for table in ("images.csv", "fiducial_images.csv"):
+        lines = [line.split(",") for line in (tmp_path / table).read_text().splitlines()]
+        for line in lines:
+            if line[0] == "83-2" and float(line[2 + axis]) > 6000.0:
+                line[3] = repr(float(line[3]) + 3.0)
+        (tmp_path / table).write_text("\n".join(map(",".join, lines)) + "\n")
+    result = diagnosed(adjust(read(tmp_path).block))
+    [hint] = map(str, seam_hints(result))
+    assert hint.startswith(f"the {where} halves of the scan of 83-2 are shifted")
+    assert hint in [str(each) for each in result.messages]
+    assert not any("measured on the wrong place" in str(each) for each in result.messages)
+
+
+def test_whole_scans_have_no_seam(tmp_path: Path) -> None:
+    assert seam_hints(adjusted(tmp_path, "fiducials.csv", {("rc10", "ur"): {2: 0.1}})) == []
+    assert seam_hints(adjusted(tmp_path, "fiducial_images.csv", {("p3", "mr"): {3: 6.0}})) == []

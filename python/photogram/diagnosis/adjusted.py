@@ -78,9 +78,12 @@ def remarks(result: Result) -> list[Message]:
         return []
     from photogram.diagnosis.clocks import known_offsets
     from photogram.diagnosis.film_marks import mark_hints
+    from photogram.diagnosis.film_scans import seam_hints
     from photogram.diagnosis.shutters import backward_readouts
 
-    return [*backward_readouts(result), *known_offsets(result), *mark_hints(result)]
+    # A film in two pieces makes marks fail, too.
+    films = seam_hints(result) or mark_hints(result)
+    return [*backward_readouts(result), *known_offsets(result), *films]
 
 
 def _of_block(block: Block) -> list[Message]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from photogram.errors import InputError
-from photogram.formats.format import Format, Wishes
+from photogram.formats.format import Format, Wishes, later
 from photogram.formats.project import Project
 
 __all__ = ["FORMATS_OF_CAMERAS"]
@@ -19,12 +19,6 @@ def _written(name: str, project: Project) -> Mapping[str, bytes]:
     from photogram.targets.output.formats import CAMERA_FORMATS
 
     return CAMERA_FORMATS[name](rig_of_project(project))
-
-
-def _lost(project: Project) -> list[str]:
-    from photogram.formats.targets.cameras import lost_beside_cameras
-
-    return lost_beside_cameras(project)
 
 
 def _unread(path: Path, wishes: Wishes) -> Project:
@@ -41,7 +35,7 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
             recognises=lambda _: False,
             read=_unread,
             write=partial(_written, name),
-            cannot_hold=_lost,
+            cannot_hold=later("photogram.formats.targets.cameras", "lost_beside_cameras"),
             pixels=True,
             geographic=True,
         )
