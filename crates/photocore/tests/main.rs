@@ -31,6 +31,7 @@ mod relative_orientation;
 mod resection;
 mod shared_cameras;
 mod similarity;
+mod slow_steps;
 mod splined_camera;
 mod stellar;
 mod stellar_dense;

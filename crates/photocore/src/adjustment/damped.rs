@@ -130,6 +130,7 @@ impl<'a> Run<'a, '_> {
     /// Whether full steps have led to where groups touch other blocks than the layout has.
     fn is_outgrown(&self, state: &State<'a>) -> bool {
         state.linearized.damping() == 0.0
+            && self.problem.model.steps_swing()
             && self.threads.install(|| self.problem.model.has_outgrown(state.values()))
     }
 
@@ -219,7 +220,9 @@ impl<'a> Run<'a, '_> {
         if control.stop.at_decrease(decrease, sum) {
             return self.stay(next, Status::Converged).map(ControlFlow::Break);
         }
-        self.secants.remember(given.to_vec(), unknowns);
+        if self.problem.model.steps_swing() {
+            self.secants.remember(given.to_vec(), unknowns);
+        }
         Ok(ControlFlow::Continue(next))
     }
 

@@ -194,7 +194,7 @@ impl Network {
 
 /// Where an adjustment has moved images beyond the knots that they were to step with, it goes on with others.
 fn reopened(assembled: &Assembled, ended: &Adjustment) -> Option<Begin> {
-    assembled.problem.model.is_beyond_windows(&ended.unknowns).then_some(Begin::FromHere)
+    (assembled.problem.model.beyond_windows(&ended.unknowns) > 0).then_some(Begin::FromHere)
 }
 
 /// Iterates, after so many iterations that were done before.

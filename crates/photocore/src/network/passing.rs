@@ -19,7 +19,7 @@ use crate::normals::{Cofactors, GroupRows};
 use crate::parallel;
 
 /// How far an image may move, in distances of knots, before it depends on others than those that it may step with.
-const MARGIN: f64 = 0.25;
+const MARGIN: f64 = 0.5;
 /// Leads rows to themselves.
 const UNIT: Matrix2 = [[1.0, 0.0], [0.0, 1.0]];
 /// An image amid the frame: what is observed minus computed of it is the place that is computed, taken off.
@@ -132,16 +132,17 @@ impl Bundle {
         !self.mounts.are_timed(photo) && (self.passages.is_empty() || !apart())
     }
 
-    /// Whether there are images of which the knots are others than those that they may step with.
-    pub(super) fn is_beyond_windows(&self, unknowns: &[f64]) -> bool {
+    /// How many images there are of which the knots are others than those that they may step with.
+    pub(super) fn beyond_windows(&self, unknowns: &[f64]) -> usize {
         if self.passages.lenses().is_empty() {
-            return false;
+            return 0;
         }
         let patches = self.of_seen(unknowns, |own, u| own.patch(u));
-        patches.iter().enumerate().any(|(image, patch)| {
+        let is_beyond = |&(image, patch): &(usize, &Option<_>)| {
             let window = self.passages.window(image);
-            patch.is_some_and(|patch| window.is_none_or(|window| !window.has(&patch)))
-        })
+            patch.as_ref().is_some_and(|patch| window.is_none_or(|window| !window.has(patch)))
+        };
+        patches.iter().enumerate().filter(is_beyond).count()
     }
 
     /// Takes something of each image with a lens of knots, by its camera and by what that sees of the point.
