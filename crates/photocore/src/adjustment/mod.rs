@@ -61,6 +61,7 @@
 
 mod acceleration;
 mod chord;
+mod corrected;
 mod damped;
 mod datum;
 mod distributions;
