@@ -204,6 +204,18 @@ fn buffers() -> usize {
     })
 }
 
+/// Has the allocator give back to the system what was freed, where it can be told to: it keeps what is not huge for the next ones, and those may
+/// be of other sizes.
+pub fn give_back() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        unsafe extern "C" {
+            safe fn malloc_trim(pad: usize) -> i32;
+        }
+        malloc_trim(0);
+    }
+}
+
 /// What Python hears when there is no room for them.
 pub fn no_buffers() -> PyErr {
     exhausted(&format!(

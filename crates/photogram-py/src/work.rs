@@ -21,6 +21,8 @@ const THREADS_EACH: usize = 4;
 /// Observed points up to which work stays on the calling thread, where the number of threads is not asked for: it takes some
 /// milliseconds, and to start threads and to hand work over takes as long.
 const SMALL: usize = 5000;
+/// Local blocks from which on what solutions have needed of them is given back before the inversion, not left to the allocator.
+const MANY: usize = 200_000;
 
 /// Who does work.
 pub struct Workers {
@@ -58,10 +60,14 @@ pub fn watched<T: Send, E: Send>(
 ) -> PyResult<Result<T, E>> {
     let failures = memory::arm()?;
     let mut raised = None;
-    let mut last = Instant::now();
+    let (mut last, mut inverts) = (Instant::now(), false);
     let mut watch = |event: Event| {
         if failures.more() {
             return ControlFlow::Break(());
+        }
+        let inverted = matches!(event, Event::Progress { phase: Phase::Invert, total: MANY.., .. });
+        if inverted && !std::mem::replace(&mut inverts, inverted) {
+            memory::give_back();
         }
         let due = matches!(event, Event::Iteration(_)) || last.elapsed() > PATIENCE;
         if !due {
