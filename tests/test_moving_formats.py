@@ -57,7 +57,9 @@ def test_giant_takes_pictures_alone(tmp_path):
         to_files(project_of(rolling(), tmp_path), "giant")
     with pytest.raises(InputError, match="a prediction needs positions for all points"):
         predict(scanned())
-    with pytest.raises(InputError, match="observations are of the trajectory strip 1, which is not taken there"):
+    with pytest.raises(
+        InputError, match="observations are of the trajectory strip 1, which is not taken there"
+    ):
         of_images_alone(scanned().replace(timed=()), "predict")
 
 
