@@ -95,7 +95,7 @@ mod trust_region;
 mod walk;
 
 pub use damped::step_rules;
-pub use datum::{Adjusted, Datum, DatumError};
+pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
@@ -110,7 +110,7 @@ pub use noncentral::{
 };
 pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
-pub use part::{PartError, PartOptions};
+pub use part::{DatumOfPart, PartError, PartOptions};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub use resistance::Classes;
 pub(crate) use result::gib;

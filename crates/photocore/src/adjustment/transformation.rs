@@ -5,6 +5,7 @@ use std::ops::Range;
 use faer::Mat;
 use smallvec::{SmallVec, smallvec};
 
+use super::part::DatumOfPart;
 use crate::normals::{Cofactors, Function, Layout};
 use crate::parallel;
 
@@ -36,6 +37,21 @@ struct Block<'a> {
 }
 
 impl Transformation {
+    /// Of a part, from what the whole has (see [`DatumOfPart`]).
+    pub fn of_part(datum: &DatumOfPart<'_>, unknowns: usize) -> Self {
+        let d = datum.t.len() / unknowns.max(1);
+        let by_rows = |columns: &[f64]| {
+            (0..unknowns).flat_map(|unknown| (0..d).map(move |k| columns[k * unknowns + unknown])).collect()
+        };
+        Self {
+            t: by_rows(datum.t),
+            w: by_rows(datum.w),
+            common: Mat::from_fn(d, d, |i, j| datum.common[i * d + j]),
+            condition: datum.condition,
+            staying: datum.staying.to_vec(),
+        }
+    }
+
     /// Whether an unknown does not move in the new datum.
     pub fn stays(&self, unknown: usize) -> bool {
         self.staying.binary_search(&unknown).is_ok()
