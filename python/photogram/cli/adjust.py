@@ -390,12 +390,11 @@ def adjusted_block(
     with job.status("adjusting") as status:
         how: dict[str, Any] = {
             "unit_variance": project.options.unit_variance,
-            "ordering": ordering.value,
             "threads": threads,
             "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
         }
         with errors_explained(block):
-            call = adjusting(project, _call(chosen, choices.loss_of(project), division))
+            call = adjusting(project, _call(chosen, choices.loss_of(project), ordering, division))
             if isinstance(block, FirstValues):
                 result = adjust_started(block, by=call, **how)
             else:
@@ -411,13 +410,17 @@ def adjusted_block(
     return with_features(told, project.features)
 
 
-def _call(name: str | None, loss: Loss | None, division: Division | None) -> Callable[..., Result]:
-    """Return the call that adjusts: in one process, or in parts."""
+def _call(
+    name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
+) -> Callable[..., Result]:
+    """Return the call that adjusts: in one process, or in parts, whose photos have an order of their own."""
     from photogram import adjust, adjust_in_parts
 
     datum = _datum(name)
     if division is None:
-        return partial(adjust, datum=datum, loss=loss, covariance="verdict")
+        return partial(adjust, datum=datum, loss=loss, ordering=ordering.value, covariance="verdict")
+    if ordering is not OrderingName.AUTO:
+        raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--ordering")
     return partial(adjust_in_parts, division=division, datum=datum, loss=loss)
 
 

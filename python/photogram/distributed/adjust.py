@@ -14,7 +14,6 @@ import numpy as np
 
 from photogram.adjustment.adjustment import (
     AsPublished,
-    Ordering,
     Progress,
     UnitVariance,
     adjust,
@@ -62,7 +61,6 @@ def adjust_in_parts(
     tolerance: float | AsPublished = 1e-5,
     covariance: bool = True,
     loss: Loss | None = None,
-    ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Result:
@@ -80,9 +78,6 @@ def adjust_in_parts(
         the memory as a whole is adjusted as a whole, where neither parts nor a cluster are given.
     datum, unit_variance, max_iterations, tolerance, covariance, loss, progress
         As of :func:`photogram.adjust`.
-    ordering
-        As of :func:`photogram.adjust`, where the block fits as a whole: photos of parts have an order of
-        their own.
     threads
         As of :func:`photogram.adjust`; on a cluster those of a worker, one when None.
 
@@ -114,7 +109,6 @@ def adjust_in_parts(
             tolerance=tolerance,
             covariance=covariance,
             loss=loss,
-            ordering=ordering,
             threads=threads,
             progress=progress,
         )

@@ -110,7 +110,7 @@ pub use noncentral::{
 };
 pub use observation_rows::ObservationRows;
 pub use options::{Event, Iteration, Options, Phase, Status};
-pub use part::{DatumOfPart, PartError, PartOptions};
+pub use part::{PartError, PartOptions};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub use resistance::Classes;
 pub(crate) use result::gib;
@@ -121,3 +121,4 @@ pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use term::Term;
 pub use terms::Terms;
 pub use traces::{EquationGroups, GroupSquares, Probing};
+pub use transformation::DatumOfPart;

@@ -14,7 +14,7 @@ use super::options::Phase;
 use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment, unless_stopped};
 use super::run::{Watch, between};
-use super::transformation::Transformation;
+use super::transformation::{DatumOfPart, Transformation};
 use crate::Threads;
 use crate::normals::{
     Contribution, Equations, FactorOptions, InvertOptions, ReducedRights, SolveOptions, packed,
@@ -42,24 +42,6 @@ pub struct PartOptions {
     pub loss: Option<Loss>,
     /// Whether its second-order term is taken in, as close to the end it may be; cofactors are had without.
     pub curved: bool,
-}
-
-/// What takes the cofactors of a part to a datum of the whole (see [`super::datum`]): columns over the unknowns of the part, outer ones
-/// too, one after the other.
-#[derive(Debug, Clone, Copy)]
-pub struct DatumOfPart<'a> {
-    /// T, as of [`super::DatumColumns`].
-    pub t: &'a [f64],
-    /// W = Q B.
-    pub w: &'a [f64],
-    /// B^T W of the whole, row by row.
-    pub common: &'a [f64],
-    /// The last step, which was taken before the whole was moved to the datum.
-    pub last: &'a [f64],
-    /// Of B^T G of the whole.
-    pub condition: f64,
-    /// Unknowns that do not move in the new datum, ascending.
-    pub staying: &'a [usize],
 }
 
 impl Linearized {

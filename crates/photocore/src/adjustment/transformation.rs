@@ -5,7 +5,6 @@ use std::ops::Range;
 use faer::Mat;
 use smallvec::{SmallVec, smallvec};
 
-use super::part::DatumOfPart;
 use crate::normals::{Cofactors, Function, Layout};
 use crate::parallel;
 
@@ -27,6 +26,24 @@ pub(super) struct Transformation {
     pub condition: f64,
     /// The carriers, ascending, where there are no more than conditions: they do not move in the new datum.
     pub staying: Vec<usize>,
+}
+
+/// What takes the cofactors of a part to a datum of the whole (see [`super::datum`]): columns over the unknowns of the part, outer ones
+/// too, one after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct DatumOfPart<'a> {
+    /// T, as of [`super::DatumColumns`].
+    pub t: &'a [f64],
+    /// W = Q B.
+    pub w: &'a [f64],
+    /// B^T W of the whole, row by row.
+    pub common: &'a [f64],
+    /// The last step, which was taken before the whole was moved to the datum.
+    pub last: &'a [f64],
+    /// Of B^T G of the whole.
+    pub condition: f64,
+    /// Unknowns that do not move in the new datum, ascending.
+    pub staying: &'a [usize],
 }
 
 /// Cofactors of one block, and of which unknowns they are.
