@@ -221,7 +221,7 @@ fn reduced(
         let (own, names) = (system.layout(), unknowns_of(all, piece));
         let columns = rights.chunks_exact(count);
         let mut here: Vec<f64> = columns.flat_map(|right| names.iter().map(|&name| right[name])).collect();
-        for right in here.chunks_exact_mut(names.len()) {
+        for right in here.chunks_exact_mut(names.len().max(1)) {
             own.unknowns_of(own.outer()).for_each(|unknown| right[unknown] = 0.0);
         }
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
@@ -261,7 +261,7 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
         let x = done(system.solve_reduced_rights(threads, &factor, of, reduced, &outer, &mut go));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             let of_column = |column: &[f64]| own.unknowns_of(blocks).map(|at| column[at]).collect::<Vec<_>>();
-            handed[child] = x.chunks_exact(names.len()).flat_map(of_column).collect();
+            handed[child] = x.chunks_exact(names.len().max(1)).flat_map(of_column).collect();
         }
         for (at, x) in x.iter().enumerate() {
             let exact = expected[at / names.len() * count + names[at % names.len()]];

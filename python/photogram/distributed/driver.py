@@ -198,8 +198,9 @@ class Driver:
             raise AdjustmentError("the initial values give no finite image coordinates")
         if not course.iterations:
             course.initial = course.best = up.sum_of_squares
-            # A datum that is not carried is refused before anything is adjusted.
-            self._moved(course.state)
+            if self._mover is not None:
+                # A datum that is not carried is refused before anything is adjusted.
+                self._in_datum(self._mover, course.state)
         return self._full_steps(up) if self.stop.as_published else self._damped_steps(up)
 
     def _full_steps(self, up: _Up) -> Outcome:
@@ -344,8 +345,10 @@ class Driver:
         if self._mover is not None:
             if up is not None:
                 self._forget(up)
-            formed = after = self._moved(after)
-            up = None
+            formed = f"{after}-in-datum"
+            for node, arrays in enumerate(self._in_datum(self._mover, after)):
+                write_state(self.job, node, formed, arrays)
+            after, up = formed, None
         if up is None:
             up = self._up(Point(formed))
         sums = self._evaluated(after)[:4]
@@ -371,15 +374,9 @@ class Driver:
             course.formations,
         )
 
-    def _moved(self, state: str) -> str:
-        """Move all nodes to the datum, where there is one to go to; return the name of their state there."""
-        if self._mover is None:
-            return state
-        found = self._mover(self._sums([self._do(located, n, state) for n in self._nodes], "solve"))
-        moved = f"{state}-in-datum"
-        for node, arrays in enumerate(found):
-            write_state(self.job, node, moved, arrays)
-        return moved
+    def _in_datum(self, mover: Mover, state: str) -> list[dict[str, np.ndarray]]:
+        """Return a state of all nodes as it is moved to the datum, with what takes cofactors there."""
+        return mover(self._sums([self._do(located, n, state) for n in self._nodes], "solve"))
 
     def _evaluated(self, state: str) -> tuple[float, float, float, float, float]:
         """Return weighted sums of squares of all nodes, by kinds, and what is minimised."""
