@@ -28,12 +28,14 @@ def inlined(drawing: Drawing) -> Picture | None:
 
     # Ticks are made when a figure is saved; identifiers are the same in every run.
     with styled({"svg.hashsalt": drawing.name}):
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+
         figure = drawing.draw()
         if figure is None:
             return None
         width, height = figure.get_size_inches()
         content = io.StringIO()
-        figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None})
+        FigureCanvasSVG(figure).print_svg(content, metadata={"Date": None, "Creator": None})
         markup = _embedded(content.getvalue(), drawing, width)
         if len(markup) > LARGEST:
             dots = io.BytesIO()
