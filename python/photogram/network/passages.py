@@ -20,7 +20,6 @@ PassageRow = tuple[str, list[int], list[int], Floats]
 """Kind; indices of unknowns; of points, photos or cameras; numbers, as the core takes a passage."""
 
 
-@dataclass(frozen=True, eq=False)
 class Bend(Numbers):
     """The two numbers w of a figure, lengths: of a board, how far its middle is bent along x and along y."""
 

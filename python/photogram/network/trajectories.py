@@ -51,14 +51,12 @@ class Coefficient(Unknown):
     sd: ArrayLike = np.inf
 
 
-@dataclass(frozen=True, eq=False)
 class PositionCoefficient(Coefficient):
     """A coefficient of the positions of a trajectory, in its axes and the linear unit."""
 
     KIND = "position coefficient"
 
 
-@dataclass(frozen=True, eq=False)
 class RotationCoefficient(Coefficient):
     """A coefficient of the rotation vectors of a trajectory, about the axes of the photo, in radians."""
 
@@ -83,7 +81,6 @@ class GyroBias(Unknown):
     sd: ArrayLike = np.inf
 
 
-@dataclass(frozen=True, eq=False)
 class _Scalar(Unknown):
     def _position(self) -> Floats:
         return np.array([number(f"value of {self.title}", getattr(self, "value")), 0.0, 0.0])  # noqa: B009

@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
-from photogram.network.observations import Control
-from photogram.results.axes import point_axes
+from photogram.network.observations.control import Control
 from photogram.results.network import AdjustedNetwork
-from photogram.show.quantity import Axis
-from photogram.statistics.agreement import agreement
-from photogram.statistics.findings import Agreement
+
+if TYPE_CHECKING:
+    from photogram.show.quantity import Axis
+    from photogram.statistics.findings import Agreement
 
 __all__ = ["CheckPoints", "check_points"]
 
@@ -112,6 +113,9 @@ def check_points(
 def _agreement(
     network: AdjustedNetwork, block: Block, found: CheckPoints, second: float, whole: bool
 ) -> Agreement:
+    from photogram.results.axes import point_axes  # few blocks have check points
+    from photogram.statistics.agreement import agreement
+
     survey = np.zeros((len(found.rows), 3, 3))
     survey[:, range(3), range(3)] = found.given_sd**2
     asked = partial(agreement, scale=network.covariance_scale, second=second)

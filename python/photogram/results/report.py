@@ -20,7 +20,7 @@ from photogram.results.calibration_report import calibration_sections
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
 from photogram.results.films_told import film_lines
-from photogram.results.iteration import iteration_lines
+from photogram.results.iterations_told import iteration_lines
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, iterations, part, photos, points, stations

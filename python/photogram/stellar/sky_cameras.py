@@ -203,7 +203,6 @@ class SkyCamera:
         return of(values, covariance, lens, document.get("common_scale") is True)
 
 
-@dataclass(frozen=True, eq=False)
 class BrownCamera(SkyCamera):
     """A pinhole camera with Brown's distortion: `SkyCamera` of the lens `brown`.
 
