@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -17,6 +16,7 @@ from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
 from photogram.adjustment.undetermined import one_place, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, whole_number
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message, listed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -19,6 +18,7 @@ from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, defaul
 from photogram.cli.progress import shown
 from photogram.cli.projects import Deviations, OriginName, with_options
 from photogram.cli.uncertainty import AS_USUAL, Uncertainty
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration

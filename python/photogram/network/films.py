@@ -8,7 +8,6 @@ p = R(theta) J e + t; the reading is what the scanner has where p is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.passages import Passage

@@ -11,7 +11,6 @@ weighted or known. Times are seconds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown, whole_number
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.network.unknowns import Unknown
 

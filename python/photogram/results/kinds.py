@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.arrays import freeze_fields
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.block import Block
 from photogram.statistics.reliability import TESTABLE
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from photogram.adjustment.known import Cartesian
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.photos import Photos

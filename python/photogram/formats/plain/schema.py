@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
 
 from photogram import _photocore
+from photogram.declared import dataclass, field
 
 __all__ = [
     "ALL_ANGLES",
