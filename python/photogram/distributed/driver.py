@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
-from photogram.declared import asdict, dataclass, field
 from photogram.distributed.cut import Tree
 from photogram.distributed.executors import Executor, Handle
 from photogram.distributed.files import read_json, write_json

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress, UnitVariance, check_iteration, most_iterations
 from photogram.adjustment.robust import Loss, loss_row
-from photogram.declared import dataclass
 from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts
 from photogram.distributed.division import Division
