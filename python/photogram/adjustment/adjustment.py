@@ -32,6 +32,7 @@ from photogram.network.datum import (
 from photogram.network.motion import refuse_datum
 from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
+from photogram.results.check_points import tested_together
 from photogram.results.datum import datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork
@@ -235,7 +236,9 @@ def _adjusted(
     network = block_network(block, options)
     try:
         told = None if progress is None else teller(progress)
-        solution = network.adjust(datum=inner, threads=processors, progress=told, keep=keep)
+        solution = network.adjust(
+            datum=inner, threads=processors, progress=told, keep=tested_together(block) if keep else None
+        )
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
