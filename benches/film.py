@@ -115,7 +115,7 @@ def compared(size: str, runs: int) -> list[str]:
         ]
         rows.append(f"| {strips * photos:,} | {kind} | {own['iterations']:.0f} | {' | '.join(cells)} |")
     return [
-        f"| photos | {' | '.join(['', 'iterations', *(p for p in first if p != 'iterations')])} |",
+        f"| photos | {' | '.join(['as', 'iterations', *(p for p in first if p != 'iterations')])} |",
         f"|---:|---|{'---:|' * len(first)}",
         *rows,
     ]

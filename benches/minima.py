@@ -30,6 +30,7 @@ from photogram.collection import Collection
 sys.path.insert(0, str(Path(__file__).parent / "peers"))
 
 from machine import processor
+from rings import rings
 
 PHOTO, POINT, GAUGE = 9, 3, 7
 """Unknowns of a photo, of a point, and directions in which no image moves."""
@@ -202,21 +203,19 @@ def main() -> None:
     parser.add_argument("--check", action="store_true", help="judge the values of the files, adjust nothing")
     asked = parser.parse_args()
     head = [*COUNTED, *FOUND, *(() if asked.check else ADJUSTED)]
-    rings = [] if asked.check else [(f"ring of {count}", ring(count)) for count in asked.photos]
+    simulated = [] if asked.check else [(f"ring of {count}", rings(count)) for count in asked.photos]
     print(f"On {processor()}; photogram {__version__}, numpy {np.__version__}.\n")
     print("| " + " | ".join(head) + " |\n| :--- |" + " ---: |" * (len(head) - 1))
     bad = []
-    for name, problem in [*((f"`{each.stem}`", collection.read(each)) for each in asked.problems), *rings]:
+    for name, problem in [
+        *((f"`{each.stem}`", collection.read(each)) for each in asked.problems),
+        *simulated,
+    ]:
         cells, proven = cells_of(name, problem) if asked.check else row(name, problem, asked.save)
         print("| " + " | ".join(cells) + " |", flush=True)
         bad += [] if proven else [name]
     if bad:
         raise SystemExit(f"not proven to be minima: {', '.join(bad)}")
-
-
-def ring(photos: int) -> Collection:
-    """Return photos around a cube full of points, each of which is seen from everywhere."""
-    return collection.simulate(photos=photos, points=2000, seen=min(0.7, 40 / photos), seed=1).collection
 
 
 if __name__ == "__main__":

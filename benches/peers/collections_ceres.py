@@ -20,6 +20,7 @@ import numpy as np
 import pyceres
 import pycolmap
 from machine import processor
+from rings import rings
 
 from photogram import _photocore, collection
 from photogram.collection import Collection
@@ -29,11 +30,6 @@ HALF_TURN = np.diag([1.0, -1.0, -1.0])
 SOLVERS = ("DENSE_SCHUR", "SPARSE_SCHUR")
 SAME = 1e-4
 """Share of the cost up to which two solutions are the same; ours may be lower by more, which is said."""
-
-
-def rings(photos: int) -> Collection:
-    """Return photos around a cube full of points, each of which is seen from everywhere."""
-    return collection.simulate(photos=photos, points=2000, seen=min(0.7, 40 / photos), seed=1).collection
 
 
 def streets(photos: int) -> Collection:

@@ -906,6 +906,9 @@ class BlockNetwork:
             As :meth:`adjust`, before its first iteration.
         """
 
+def give_back() -> None:
+    """Have the allocator give back to the system what was freed; nothing but with the C library of GNU."""
+
 def step_rules() -> dict[str, float]:
     """Return the constants of the rules of steps of one process, by name; see `adjustment/damped.rs`."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Iterator
@@ -65,13 +64,11 @@ def resident_memory(root: Path = Path("/")) -> int | None:
 
 def give_back() -> None:
     """Have what was freed given back to the system, where the library that keeps it can be told to."""
+    from photogram import _photocore
+
     if "pyarrow" in sys.modules:
         sys.modules["pyarrow"].default_memory_pool().release_unused()
-    try:
-        trim = ctypes.CDLL(None).malloc_trim
-    except (AttributeError, OSError, TypeError):
-        return
-    trim(0)
+    _photocore.give_back()
 
 
 def require(needed: float, what: str) -> None:

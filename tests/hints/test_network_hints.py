@@ -302,7 +302,7 @@ def test_good_adjustments_are_not_looked_at(monkeypatch):
     def looked(_block):
         raise AssertionError
 
-    monkeypatch.setattr("photogram.diagnosis.adjusted.hints", looked)
+    monkeypatch.setattr("photogram.diagnosis.conventions.hints", looked)
     assert explained(aerial(9)).verdict.usable
     bad = aerial(9)
     with pytest.raises(AssertionError):

@@ -34,6 +34,7 @@ fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
     // Threads are those of the caller's pool: the solvers of the library would start a pool of the whole process beside it.
     faer::set_global_parallelism(faer::Par::Seq);
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_function(wrap_pyfunction!(memory::give_back, module)?)?;
     distributions::register(module)?;
     attitude::register(module)?;
     features::register(module)?;

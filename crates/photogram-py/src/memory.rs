@@ -206,6 +206,7 @@ fn buffers() -> usize {
 
 /// Has the allocator give back to the system what was freed, where it can be told to: it keeps what is not huge for the next ones, and those may
 /// be of other sizes.
+#[pyfunction]
 pub fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {

@@ -44,6 +44,8 @@ UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
 
 
+AS_PUBLISHED = 4
+"""Iterations of the 1987 program, where nobody says how many."""
 NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
 
@@ -176,7 +178,7 @@ def adjust(
     as_published = isinstance(tolerance, AsPublished)
     limit = tolerance.percent if isinstance(tolerance, AsPublished) else tolerance
     if max_iterations is None:
-        max_iterations = 4 if as_published else 200 if row else 50
+        max_iterations = AS_PUBLISHED if as_published else most_iterations(row)
     check_iteration(ordering, max_iterations, limit)
     processors = core_threads(threads)
     if unit_variance == "redundancy" and not covariance:
@@ -311,6 +313,11 @@ def teller(
         progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
 
     return tell
+
+
+def most_iterations(loss: tuple[str, float] | None) -> int:
+    """Return how many iterations there are at the most where nobody says it: reweighting takes more."""
+    return 50 if loss is None else 200
 
 
 def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:

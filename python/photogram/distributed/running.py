@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import Progress, UnitVariance, check_iteration
+from photogram.adjustment.adjustment import Progress, UnitVariance, check_iteration, most_iterations
 from photogram.adjustment.robust import Loss, loss_row
 from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts
@@ -119,7 +119,7 @@ def core_options(
         )
     weighted = loss_row(loss)
     if max_iterations is None:
-        max_iterations = 200 if weighted else 50
+        max_iterations = most_iterations(weighted)
     check_iteration("auto", max_iterations, tolerance)
     if not math.isfinite(tolerance):  # which documents of a run have no way to write
         raise InputError("in parts the tolerance must be finite")

@@ -434,9 +434,7 @@ class Block(Valued, Brief):
         self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
         self._set("observations", with_smoothness(self.observations, self.trajectories))
         self._set("observations", with_knots(self.observations, self.cameras))
-        self._set("_unknowns", self._different_unknowns())
-        groups = observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
-        self._set("_observation_groups", groups)
+        _ = self.observation_groups  # refuses what observations name and the block has not
         self._check_figures()
         of_photos = self.photo_cameras if self.cameras else None
         check_scans(self.passages, self.photo_ids, self.cameras, of_photos, self.image_photos)
@@ -519,16 +517,6 @@ class Block(Valued, Brief):
     @cached_property
     def unknowns(self) -> list[Unknown]:
         """What observations, and photos on frames or trajectories, have in common, in order."""
-        own: list[Unknown] = vars(self)["_unknowns"]
-        return own
-
-    @property
-    def observation_groups(self) -> list[tuple[list[int], Group]]:
-        """The observations kind by kind: their rows, and what the core takes."""
-        own: list[tuple[list[int], Group]] = vars(self)["_observation_groups"]
-        return own
-
-    def _different_unknowns(self) -> list[Unknown]:
         of_observations = (each for own in self.observations for each in own.unknowns if each is not None)
         sensors = [mount.sensor for mount in self.mounts]
         sensors += [each.sensor for each in self.timed if each.sensor is not None]
@@ -537,6 +525,11 @@ class Block(Valued, Brief):
         records = of_records(self.observations)
         passed = [own for each in self.all_passages for own in each.unknowns]
         return different_unknowns([*sensors, *of_times, *coefficients, *records, *passed, *of_observations])
+
+    @cached_property
+    def observation_groups(self) -> list[tuple[list[int], Group]]:
+        """The observations kind by kind: their rows, and what the core takes."""
+        return observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
 
     @property
     def image_unit(self) -> str:

@@ -13,9 +13,10 @@ const LEAST: f64 = 0.05;
 const LARGEST: f64 = 0.5;
 /// and how many are tried.
 const PARTS: usize = 3;
+
 impl<'a> Run<'a, '_> {
-    /// The step in the place of a full one where steps fall slowly, or where that does not lead lower than `best`, and what it is by then as
-    /// an iteration; None where it stays, and where there is none.
+    /// The step in the place of a full one where steps fall slowly, or where that leads higher, and what it is by then as an iteration; None
+    /// where the step stays, and of damped ones.
     pub(super) fn corrected(
         &mut self,
         state: &State<'a>,

@@ -1,7 +1,7 @@
 //! The observation equations of a problem at given values of the unknowns, in unit weight.
 
 use super::group_step::GroupStep;
-use super::loss::{Loss, Reweighting};
+use super::loss::Reweighting;
 use super::problem::{AnyProblem, Evaluated};
 use super::walk::Buffers;
 use crate::Threads;
@@ -43,12 +43,11 @@ impl<'a> ObservationEquations<'a> {
     /// At the given values, some unknowns held there; weights are those that the loss has left.
     pub fn new(
         problem: &'a AnyProblem<'a>,
-        loss: Option<Loss>,
+        reweighting: Option<Reweighting>,
         values: &[f64],
         held: &[usize],
         threads: &Threads,
     ) -> Self {
-        let reweighting = loss.map(|loss| Reweighting { loss, curved: false });
         threads.install(|| Self::evaluated(problem, problem.model.at(values), held, reweighting))
     }
 

@@ -3,6 +3,7 @@
 use super::datum::{Adjusted, Datum, DatumError, moved};
 use super::equations::ObservationEquations;
 use super::linearized::{Inverted, Linearized};
+use super::loss::Reweighting;
 use super::options::Options;
 use super::problem::AnyProblem;
 use super::result::Adjustment;
@@ -24,7 +25,8 @@ impl Linearized {
     ) -> Result<Self, DatumError> {
         let (unknowns, basis) = moved(problem, adjusted, datum, reference, threads)?;
         let Adjusted { held, loss, .. } = adjusted;
-        let equations = ObservationEquations::new(problem, loss, &unknowns, held, threads);
+        let reweighting = loss.map(Reweighting::plain);
+        let equations = ObservationEquations::new(problem, reweighting, &unknowns, held, threads);
         let options = FactorOptions::default();
         let formed = Self::of(&equations, unknowns, held.to_vec(), &options, threads, between)?;
         let mut linearized = formed.determined()?;

@@ -72,8 +72,7 @@ impl Leverages {
 
     /// Weighted sum of squares of what takes part.
     pub fn sum_of_squares(&self, problem: &AnyProblem<'_>) -> f64 {
-        let priors = problem.terms(&self.values).sum_of_squares(0..self.values.len());
-        problem.sum_of_squares(&self.residuals) + priors
+        problem.objective(&self.values, &self.residuals, None)
     }
 
     /// Observations that take part, those of unknowns themselves among them, minus unknowns.

@@ -83,7 +83,8 @@ impl Linearized {
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
-        let equations = ObservationEquations::new(problem, loss, &values, &held, threads);
+        let reweighting = loss.map(Reweighting::plain);
+        let equations = ObservationEquations::new(problem, reweighting, &values, &held, threads);
         Self::of(&equations, values, held, &FactorOptions::UNCACHED, threads, between)
     }
 
@@ -329,8 +330,7 @@ impl Linearized {
         problem: &'a AnyProblem<'a>,
         threads: &Threads,
     ) -> ObservationEquations<'a> {
-        let at = || problem.model.at(&self.values);
-        threads.install(|| ObservationEquations::evaluated(problem, at(), &self.held, self.reweighting))
+        ObservationEquations::new(problem, self.reweighting, &self.values, &self.held, threads)
     }
 
     /// Gives its memory back for the next ones; its values.

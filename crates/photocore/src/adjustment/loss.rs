@@ -61,6 +61,11 @@ pub(super) struct Reweighting {
 }
 
 impl Reweighting {
+    /// Without the second-order term.
+    pub fn plain(loss: Loss) -> Self {
+        Self { loss, curved: false }
+    }
+
     /// Reweights the equations of a group, given with unit weight.
     ///
     /// With v the residuals, s = |v|^2, w the slope and c the curvature of the loss, the rows A and l become

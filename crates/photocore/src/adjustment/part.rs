@@ -66,8 +66,7 @@ impl Linearized {
         }
         let PartOptions { held, damping, loss, curved } = options;
         let reweighting = loss.map(|loss| Reweighting { loss, curved });
-        let at = threads.install(|| problem.model.at(&values));
-        let equations = ObservationEquations::evaluated(problem, at, &held, reweighting)
+        let equations = ObservationEquations::new(problem, reweighting, &values, &held, threads)
             .with_contributions(contributions);
         let options = FactorOptions { damping, ..FactorOptions::default() };
         let mut between = between(watch, Phase::Form, layout.locals());

@@ -136,13 +136,15 @@ class MarkReadings:
     def _by_images(self, photo: ScannedPhoto, ways: Sequence[Lying]) -> int | None:
         """Return which way a film lies by images: of points that are known, or of tie points."""
         images, true = photo.true_places(self.seen.readings(photo.name)), photo.true
-        others = {each.name: laid for each in self.photos if each is not photo and (laid := self._laid(each))}
-        found = (way_by_images(ways, true, images, each) for each in self.seen.expected(photo.name, others))
+        found = (
+            way_by_images(ways, true, images, each) for each in self.seen.expected(photo.name, self._laid)
+        )
         return next((each for each in found if each is not None), None)
 
-    def _laid(self, photo: ScannedPhoto) -> Laid | None:
+    def _laid(self, name: str) -> Laid | None:
         """Return how the film of a photo lies where its marks, or what is given, say it alone."""
-        if len(photo.marks) < 2 or not all(photo.marks):
+        photo = next((each for each in self.photos if each.name == name), None)
+        if photo is None or len(photo.marks) < 2 or not all(photo.marks):
             return None
         q, true = self.places_of(photo), photo.true
         side = self.given_side(photo)

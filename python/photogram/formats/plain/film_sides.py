@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -100,7 +100,7 @@ class Seen:
         found: Floats = self.images.xy[self._rows(photo)]
         return found
 
-    def expected(self, photo: str, laid: Mapping[str, Laid]) -> Iterator[Expected]:
+    def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:
         """Yield where images of a photo should be: by its pose, and by that of tie points on another photo.
 
         Parameters
@@ -108,22 +108,23 @@ class Seen:
         photo
             Its name.
         laid
-            Photos of which it is known how their films lie.
+            Tells of another photo how its film lies, where that is known: asked of few.
         """
         own = self.images.points[self._rows(photo)]
         centre, axes, c = self._pose(photo)
         places = _projected((self.points[own] - centre) @ axes, c)
         known = np.flatnonzero(np.isfinite(places))
         yield Expected(known, places[known])
-        common = {name: np.intersect1d(own, self.images.points[self._rows(name)]) for name in laid}
-        other = max(common, key=lambda name: len(common[name]), default=None)
-        if other is None or len(common[other]) < TIES:
+        found = ((other, lies) for other in self._neighbours(photo, own) if (lies := laid(other)) is not None)
+        other, lies = next(found, (None, None))
+        if other is None or lies is None:
             return
+        theirs = self.images.points[self._rows(other)]
         rows, there = (
-            np.array([np.flatnonzero(each == point)[0] for point in common[other]])
-            for each in (own, self.images.points[self._rows(other)])
+            np.array([np.flatnonzero(each == point)[0] for point in np.intersect1d(own, theirs)])
+            for each in (own, theirs)
         )
-        q = laid[other].places()[there]
+        q = lies.places()[there]
         _, turned, distance = self._pose(other)
         rays = np.column_stack([q.real, q.imag, np.full(len(q), distance)])
         places = _projected(rays @ turned.T @ axes, c)
@@ -131,6 +132,17 @@ class Seen:
             yield Expected(rows, places, "shift")
         else:
             yield Expected(rows, q, "rotation")
+
+    def _neighbours(self, photo: str, points: np.ndarray) -> list[str]:
+        """Return the other photos with enough of some points, that with the most first."""
+        images = np.unique(
+            np.column_stack([self.images.photos, self.images.points])[np.isin(self.images.points, points)],
+            axis=0,
+        )
+        counts = np.bincount(images[:, 0], minlength=len(self.photos.names))
+        order = np.argsort(-counts, kind="stable")
+        names = [self.photos.names[row] for row in order.tolist() if counts[row] >= TIES]
+        return [name for name in names if name != photo]
 
     def _rows(self, photo: str) -> np.ndarray:
         return np.flatnonzero(self.images.photos == self.photos.names.index(photo))
