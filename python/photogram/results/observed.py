@@ -9,17 +9,19 @@ from itertools import chain
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.messages import counted, listed
 from photogram.results.kinds import tested_kind
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import images, part, terms_of
+from photogram.results.network_tables import control, images, part, terms_of
 from photogram.show.lines import field, stacked, table_lines
-from photogram.show.quantity import Quantity, labelled, long
+from photogram.show.quantity import Quantity, chosen, labelled, long
 from photogram.statistics.findings import Tested, by_t, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = [
     "NOTABLE",
+    "control_lines",
     "image_lines",
     "observed_lines",
     "suspect_lines",
@@ -93,6 +95,15 @@ def observed_lines(table: Sequence[Quantity], kind: str) -> list[str]:
     """List observed photos or points, four lines for each: what was observed, and how it fits."""
     forms = {"sd": ".5f", "difference": ".5f", "redundancy": ".3f", "standardized": ".2f"}
     return stacked(table[0], kind, [(labelled(table, label), form) for label, form in forms.items()])
+
+
+def control_lines(result: AdjustedNetwork) -> list[str]:
+    """List control as observations; points that are held altogether, which nothing tests, in one line."""
+    table = control(result)
+    held = (result.control.sd == 0).all(axis=1)
+    weighted, names = np.flatnonzero(~held), [str(each) for each in np.asarray(table[0].values)[held]]
+    told = [f"{counted(len(names), 'point')} held where given, which nothing tests: {listed(names)}"]
+    return [*(observed_lines(chosen(table, weighted), "point") if len(weighted) else ()), *told[: len(names)]]
 
 
 def suspect_lines(result: AdjustedNetwork, tests: Floats, statistic: str) -> list[str]:

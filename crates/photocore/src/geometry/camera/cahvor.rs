@@ -4,7 +4,7 @@ use super::inverse::{RadialFactor, RadialLimit};
 use super::model::{CameraModel, Image, Unit};
 use crate::geometry::{Matrix3, Vector3};
 
-/// Rays bend about the unit vector o, which the angles alpha and beta (radians) turn off the axis of the picture:
+/// Rays bend about the unit vector o, which the angles a and b (radians) turn off the axis of the picture, to the right and down:
 ///
 /// ```text
 /// o = (cos b sin a, sin b, cos b cos a),    w = v . o,    t = |v|^2 / w^2 - 1,    mu = r0 + r1 t + r2 t^2
@@ -14,7 +14,7 @@ use crate::geometry::{Matrix3, Vector3};
 /// with v = (u1, -u2, -u3). What is along o stays, what is across becomes 1 + mu times as long; t is the square of its tangent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cahvor {
-    /// fx, fy, cx, cy, alpha, beta, r0, r1, r2.
+    /// fx, fy, cx, cy, a, b, r0, r1, r2.
     pub parameters: [f64; 9],
 }
 
@@ -81,15 +81,15 @@ impl CameraModel for Cahvor {
         ("fy", Unit::Image),
         ("cx", Unit::Image),
         ("cy", Unit::Image),
-        ("alpha", Unit::One),
-        ("beta", Unit::One),
+        ("axis_x", Unit::One),
+        ("axis_y", Unit::One),
         ("r0", Unit::One),
         ("r1", Unit::One),
         ("r2", Unit::One),
     ];
     const DOWN: bool = true;
-    const FORMULA: &'static str = "v = (P1, -P2, -P3), o = (cos(beta) sin(alpha), sin(beta), cos(beta) cos(alpha)), w = v . o, t = |v|^2 / w^2 - 1, \
-         mu = r0 + r1 t + r2 t^2, V = (1 + mu) v - mu w o, image = (fx V1/V3 + cx, fy V2/V3 + cy)";
+    const FORMULA: &'static str = "v = (P1, -P2, -P3), o = (cos(axis_y) sin(axis_x), sin(axis_y), cos(axis_y) cos(axis_x)), w = v . o, \
+         t = |v|^2 / w^2 - 1, mu = r0 + r1 t + r2 t^2, V = (1 + mu) v - mu w o, image = (fx V1/V3 + cx, fy V2/V3 + cy)";
 
     fn with_parameters(parameters: [f64; 9]) -> Self {
         Self { parameters }
@@ -108,7 +108,7 @@ impl CameraModel for Cahvor {
     }
 
     fn linearize(&self, u: &Vector3) -> Image<[f64; 9]> {
-        let [axis, by_alpha, by_beta] = self.axis();
+        let [axis, by_a, by_b] = self.axis();
         let Bent { ray, bent, along, square, factor, slope } = self.bent(u, &axis);
         let across = ray - axis * along;
         // dt = (2 v . dv) / w^2 - 2 (t + 1) dw / w, with dw = o . dv + v . do.
@@ -121,7 +121,7 @@ impl CameraModel for Cahvor {
             across * (slope * by_along * moved) - (axis * moved + turn * along) * factor
         };
         let columns =
-            [by_axis(&by_alpha), by_axis(&by_beta), across, across * square, across * (square * square)];
+            [by_axis(&by_a), by_axis(&by_b), across, across * square, across * (square * square)];
         let (xy, by_bent) = self.seen(&bent);
         let [fx, fy, cx, cy, ..] = self.parameters;
         let plain = [(xy[0] - cx) / fx, (xy[1] - cy) / fy];
@@ -151,9 +151,14 @@ impl CameraModel for Cahvor {
         (ray.z > 0.0).then(|| turned(&ray.normalize()))
     }
 
-    fn radius(&self, u: &Vector3, _: [f64; 2]) -> f64 {
+    /// In front of the image, and of the plane across o: t says nothing of the sign of w.
+    fn faces(&self, u: &Vector3) -> bool {
         let found = self.bent(u, &self.axis()[0]);
-        if found.along > 0.0 { found.square.max(0.0).sqrt() } else { f64::INFINITY }
+        u.z <= 0.0 && found.along > 0.0 && found.bent.z > 0.0
+    }
+
+    fn radius(&self, u: &Vector3, _: [f64; 2]) -> f64 {
+        self.bent(u, &self.axis()[0]).square.max(0.0).sqrt()
     }
 
     fn fold(&self) -> f64 {
@@ -176,5 +181,16 @@ mod tests {
         let [x, y] = camera.image(&turned(&(axis * 3.0)));
         assert!((x - (1000.0 * axis.x / axis.z + 500.0)).abs() < 1e-10);
         assert!((y - (1100.0 * axis.y / axis.z + 400.0)).abs() < 1e-10);
+    }
+
+    #[test]
+    fn what_is_behind_the_plane_across_that_axis_is_not_faced() {
+        let camera = Cahvor::with_parameters([1000.0, 1000.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0]);
+        let side = |degrees: f64| {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            turned(&Vector3::new(sine, 0.0, cosine))
+        };
+        assert!([-84.0, 0.0, 89.0].map(side).iter().all(|u| camera.faces(u)));
+        assert!([-84.5, 91.0].map(side).iter().all(|u| !camera.faces(u)));
     }
 }
