@@ -247,10 +247,14 @@ def _bare(names: dict[str, int]) -> dict[str, float]:
     return {name: 1.0 for name in needed if name in names}
 
 
-def random_network(seed: int, number: int) -> RandomNetwork:
-    """Return a random network: its cameras and its datum go through all there are as `number` grows."""
+def random_network(seed: int, number: int, first: str | None = None) -> RandomNetwork:
+    """Return a random network: its cameras and its datum go through all there are as `number` grows.
+
+    `first` is its first camera in the place of the one whose turn it is: with it a network stays the same when
+    there are more cameras.
+    """
     random = np.random.default_rng([seed, number])
-    first = MODELS[number % len(MODELS)]
+    first = first or MODELS[number % len(MODELS)]
     same_unit = [model for model in MODELS if ("c" in _names(model)) == ("c" in _names(first))]
     models = (first, str(random.choice(same_unit))) if random.random() < 0.5 else (first,)
     datum = DATUMS[(number // 2) % len(DATUMS)]
