@@ -250,7 +250,7 @@ def _bare(names: dict[str, int]) -> dict[str, float]:
 def random_network(seed: int, number: int, first: str | None = None) -> RandomNetwork:
     """Return a random network: its cameras and its datum go through all there are as `number` grows.
 
-    `first` is its first camera in the place of the one whose turn it is: with it a network stays the same when
+    `first` is its first camera in the place of the one whose turn it is: so a network stays what it was when
     there are more cameras.
     """
     random = np.random.default_rng([seed, number])
