@@ -77,13 +77,14 @@ def remarks(result: Result) -> list[Message]:
     if not (result.converged and (result.unknowns or result.block.observations)):
         return []
     from photogram.diagnosis.clocks import known_offsets
+    from photogram.diagnosis.film_lenses import lens_hints
     from photogram.diagnosis.film_marks import mark_hints
     from photogram.diagnosis.film_scans import seam_hints
     from photogram.diagnosis.shutters import backward_readouts
 
     # A film in two pieces makes marks fail, too.
     films = seam_hints(result) or mark_hints(result)
-    return [*backward_readouts(result), *known_offsets(result), *films]
+    return [*backward_readouts(result), *known_offsets(result), *films, *lens_hints(result)]
 
 
 def _of_block(block: Block) -> list[Message]:
