@@ -210,7 +210,8 @@ def test_printed_coefficients_are_compared_with_the_table(written):
     text = EXAMPLE.replace("sd_c =", "radial_coefficients = [{}]\nsd_c =")
     assert not any("printed" in each for each in written(text.format(right)).told())
     wrong = ", ".join(repr(-float(each)) for each in curve.coefficients)
-    assert any("with the other sign they are the table's" in each for each in written(text.format(wrong)).told())
+    told = written(text.format(wrong)).told()
+    assert any("they are those of the table with the other sign" in each for each in told)
 
 
 def test_tables_of_several_cameras_with_covariances(tmp_path):

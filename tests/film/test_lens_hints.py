@@ -35,7 +35,8 @@ TURNED = "distortion = [-4, -9, -11, -7, -1, 7]", "distortion = [4, 9, 11, 7, 1,
 def test_distortion_with_the_other_sign_is_named(tmp_path: Path) -> None:
     result = diagnosed(adjust(read(archive(tmp_path, turned=TURNED)).block))
     [hint] = map(str, lens_hints(result))
-    assert hint.startswith("images show -0.") and "rc10-2345 is given: probably it has the wrong sign" in hint
+    assert hint.startswith("images show -0.")
+    assert "rc10-2345 is given: probably it has the wrong sign" in hint
     assert hint in [str(each) for each in result.messages]
 
 

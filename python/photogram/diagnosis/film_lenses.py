@@ -121,9 +121,9 @@ def _of_sign(camera: AdjustedCamera, times: float, sd: float) -> str:
     if abs(times + 1.0) > max(NEAR, WITHIN * sd):
         return ""
     return (
-        f"images show {times:.2f} (sd {sd:.2g}) times the radial distortion that camera {camera.name} is given:"
-        " probably it has the wrong sign; a table counts it outwards, measured minus ideal: say sign = -1 in"
-        " [certificate.radial], or give the terms of the table cameras with the other sign"
+        f"images show {times:.2f} (sd {sd:.2g}) times the radial distortion that camera {camera.name} is"
+        " given: probably it has the wrong sign; a table counts it outwards, measured minus ideal: say"
+        " sign = -1 in [certificate.radial], or give the terms of the table cameras with the other sign"
     )
 
 
@@ -146,6 +146,6 @@ def _of_point(camera: AdjustedCamera, given: Floats, fall: _Fall) -> str:
     indicated = "the indicated one, where lines between marks cross, and not " if size < 1e-3 else ""
     return (
         f"{where}: is that {indicated}the calibrated one, of symmetry, about which radii of the distortion"
-        " count? Give autocollimation or symmetry of the certificate (xp, yp of the table cameras); a shift of"
-        " observed positions, as of an antenna, looks alike"
+        " count? Give autocollimation or symmetry of the certificate (xp, yp of the table cameras); a shift"
+        " of observed positions, as of an antenna, looks alike"
     )

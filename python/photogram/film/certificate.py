@@ -369,7 +369,8 @@ class Certificate(Shown, Brief):
 
     def _printed_less(self, sign: float) -> float:
         """Return by how much printed coefficients differ at most from the table with a sign, mm."""
-        assert self.radial is not None and self.c is not None
+        assert self.radial is not None
+        assert self.c is not None
         radius = self.c * np.tan(self.radial.angle)
         powers = radius[:, np.newaxis] ** (2 * np.arange(len(self.radial_coefficients)) + 1)
         return float(np.abs(powers @ self.radial_coefficients - sign * self.radial.distortion).max())
@@ -379,10 +380,10 @@ class Certificate(Shown, Brief):
         said = [*self.remarks]
         apart = self.printed_coefficients()
         if apart is not None and apart > PRINTED:
-            opposite = self._printed_less(-1.0)
-            why = "; with the other sign they are the table's: is its sign right?" if opposite < PRINTED else ""
+            turned = self._printed_less(-1.0) <= PRINTED
             said.append(
-                f"the printed coefficients differ from the table of distortion by up to {1e3 * apart:.1f} um{why}"
+                f"the printed coefficients differ from the table of distortion by up to {1e3 * apart:.1f} um"
+                f"{'; they are those of the table with the other sign: is its sign -1?' if turned else ''}"
             )
         if self.radial_coefficients and self.radial is None:
             said.append("printed coefficients without a table of distortion are not used")
