@@ -22,8 +22,10 @@ from photogram.distributed.parts import incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, core_options, opened
+from photogram.errors import InputError
 from photogram.network.block import Block, checked, refuse_passages, refuse_trajectories
 from photogram.network.core import CoreOptions
+from photogram.network.films import Reseau, Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
@@ -141,8 +143,25 @@ def _ready(block: Block) -> Block:
     """Return a block whose common unknowns have values to start from; refuse what cannot be adjusted."""
     check_cameras(checked(block))
     refuse_trajectories(block, "blocks in parts")
-    refuse_passages(block, "blocks in parts")
+    refuse_passages(block, "blocks in parts", but=Scan)
+    _check_films(block)
     return started(block)
+
+
+def _check_films(block: Block) -> None:
+    """Refuse films whose unknowns do not stand in the blocks of their photos."""
+    scans = [each for each in block.passages if isinstance(each, Scan)]
+    if scans and block.mounts:
+        raise InputError(
+            "blocks in parts: photos that are scanned films beside such on frames, as halves of joined scans"
+            " are, are not taken there"
+        )
+    for each in scans:
+        if isinstance(each.film.pattern, Reseau):
+            raise InputError(
+                f"blocks in parts: the film of the photo {each.photo} has a reseau of its own (pattern"
+                " local), which is not taken there"
+            )
 
 
 def _fits(block: Block, room: int | None) -> bool:
@@ -190,6 +209,8 @@ def fingerprint(block: Block, options: CoreOptions) -> str:
         digest.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
     for each in (*block.cameras, *block.observations, *block.unknowns):
         digest.update(repr(each).encode())
+    for passage in block.passages:
+        digest.update(repr((passage, passage.numbers().tolist())).encode())
     return digest.hexdigest()
 
 

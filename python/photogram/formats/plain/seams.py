@@ -1,7 +1,7 @@
 """Scans that were joined of two parts: each part is a film of its own, and both have one pose.
 
 `seam_column` or `seam_row` of a photo is the line between them. What is read beyond it, images and marks, is
-of a second photo, `NAME half 2`, which is mounted on the first where that is; nothing else has to know of seams.
+of a second photo, `NAME half 2`, which is mounted on the first where that is; nothing else knows of seams.
 """
 
 from __future__ import annotations
