@@ -323,9 +323,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
     )
 
 
-def names_above(
-    part: Part, below: Names, shared: Indices, films: Mapping[int, str], *, root: bool
-) -> Names:
+def names_above(part: Part, below: Names, shared: Indices, films: Mapping[int, str], *, root: bool) -> Names:
     """Return what a part hands up: photos of nodes above, cameras and unknowns that belong to the root.
 
     Parameters
