@@ -14,11 +14,11 @@ from photogram.adjustment.adjustment import Ordering, Progress, UnitVariance, ad
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.started import started
 from photogram.arguments.annotations import check_arguments
-from photogram.distributed.counts import Counts, counted_work
+from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
 from photogram.distributed.merging import merged
-from photogram.distributed.parts import incidence_of, vertices_of
+from photogram.distributed.parts import films_of, incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, core_options, opened
@@ -149,15 +149,9 @@ def _ready(block: Block) -> Block:
 
 
 def _check_films(block: Block) -> None:
-    """Refuse films whose unknowns do not stand in the blocks of their photos."""
-    scans = [each for each in block.passages if isinstance(each, Scan)]
-    if scans and block.mounts:
-        raise InputError(
-            "blocks in parts: photos that are scanned films beside such on frames, as halves of joined scans"
-            " are, are not taken there"
-        )
-    for each in scans:
-        if isinstance(each.film.pattern, Reseau):
+    """Refuse films whose photos have many unknowns that do not stand in the blocks of these."""
+    for each in block.passages:
+        if isinstance(each, Scan) and isinstance(each.film.pattern, Reseau):
             raise InputError(
                 f"blocks in parts: the film of the photo {each.photo} has a reseau of its own (pattern"
                 " local), which is not taken there"
@@ -195,7 +189,10 @@ def _run(block: Block, options: CoreOptions, division: Division, threads: int | 
 def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
-    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts)[1]
+    films = films_of(block)
+    of_films = sum(len(each.deviations) for each in block.unknowns if id(each) in films and not each.is_held)
+    unknowns = UNKNOWNS + of_films / len(block.photo_ids)
+    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]
 
 
 def fingerprint(block: Block, options: CoreOptions) -> str:

@@ -170,10 +170,11 @@ def vertices_of(block: Block) -> Indices:
 def films_of(block: Block) -> dict[int, str]:
     """Return the photos in whose blocks of unknowns those of films stand, by the identity of the unknowns.
 
-    Those that films of several photos have are common unknowns as any other.
+    Those that films of several photos have are common unknowns as any other, and so are all beside photos on
+    frames: halves of joined scans.
     """
     found: dict[int, set[str]] = {}
-    for each in block.passages:
+    for each in () if block.mounts else block.passages:
         if isinstance(each, Scan):
             for own in (each.film.placement, each.film.size, each.film.bend):
                 found.setdefault(id(own), set()).add(each.photo)
