@@ -116,7 +116,8 @@ impl Network {
     /// those that are touched elsewhere.
     fn passed_together(&self, elsewhere: &BTreeSet<usize>) -> BTreeMap<Vec<usize>, Vec<usize>> {
         let mut having = vec![vec![]; self.commons.len()];
-        let mut everywhere: Vec<bool> = (0..self.commons.len()).map(|own| !elsewhere.contains(&own)).collect();
+        let mut everywhere: Vec<bool> =
+            (0..self.commons.len()).map(|own| !elsewhere.contains(&own)).collect();
         for (passage, own) in self.passages.iter().enumerate() {
             let all = own.everywhere();
             for (common, _) in own.unknowns() {
