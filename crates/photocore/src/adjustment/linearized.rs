@@ -208,7 +208,7 @@ impl Linearized {
     }
 
     /// Whether an unknown is neither fixed nor held.
-    fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
+    pub(super) fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
         problem.sd[unknown] != 0.0 && !self.held.contains(&unknown)
     }
 

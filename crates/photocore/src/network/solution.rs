@@ -16,7 +16,7 @@ use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
 
 /// A redundancy of less is rounding.
-const LEAST_REDUNDANCY: f64 = 1e-9;
+pub const LEAST_REDUNDANCY: f64 = 1e-9;
 
 /// Weighted sums of squares, weights as the loss has changed them.
 #[derive(Debug, Clone, Copy)]
