@@ -29,8 +29,8 @@ from photogram.network.geometry import rotation_angles
 _DIRECTORY = Path(__file__).parent / "apex"
 _PROGRAM = _DIRECTORY / "target" / "release" / "apex-side"
 
-SETTINGS = ("gn-chunked", "gn-schur", "gn-cholesky", "lm-chunked", "lm-schur", "lm-implicit")
-FASTEST = "gn-chunked"
+SETTINGS = ("gn-cholesky", "gn-schur", "gn-chunked", "gn-implicit", "lm-cholesky", "lm-schur")
+FASTEST = "gn-cholesky"
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,9 @@ fn main() -> Result<(), Failure> {
     write(output, solved, start.elapsed().as_secs_f64(), &unknowns)
 }
 
-/// Gauss-Newton or Levenberg-Marquardt (`gn-`, `lm-`), with the reduced equations formed from the normal equations
-/// or from the chunks of the points and factored, iterated without being formed, or with no elimination of its own.
+/// Gauss-Newton (`gn-`) or Levenberg-Marquardt (`lm-`): the normal equations as a whole (`cholesky`), or reduced to
+/// the photographs from themselves (`schur`), from the equations of each point (`chunked`), or never formed and solved
+/// by iterations (`implicit`), which go on to their tolerance: apex-solver's own end is too far from the minimum.
 fn optimizer(setting: &str) -> Result<Box<dyn Optimizer>, Failure> {
     let (method, solver) = setting.split_once('-').ok_or("wanted: METHOD-SOLVER")?;
     let (solver, variant) = match solver {
@@ -50,12 +51,16 @@ fn optimizer(setting: &str) -> Result<Box<dyn Optimizer>, Failure> {
     };
     Ok(match method {
         "gn" => Box::new(GaussNewton::with_config(
-            GaussNewtonConfig::new().with_linear_solver_type(solver).with_schur_variant(variant),
+            GaussNewtonConfig::new()
+                .with_linear_solver_type(solver)
+                .with_schur_variant(variant)
+                .with_schur_cg_q_tolerance(0.0),
         )),
         "lm" => Box::new(LevenbergMarquardt::with_config(
             LevenbergMarquardtConfig::for_bundle_adjustment()
                 .with_linear_solver_type(solver)
-                .with_schur_variant(variant),
+                .with_schur_variant(variant)
+                .with_schur_cg_q_tolerance(0.0),
         )),
         other => return Err(format!("unknown method {other}").into()),
     })
