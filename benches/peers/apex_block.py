@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from solution import HALF_TURN, Floats, Solution, to_object_space
+from solution import HALF_TURN, Floats, Solution, check, in_standard_deviations, to_object_space
 
 from photogram import Attitudes, Block
 from photogram.network.geometry import rotation_angles
@@ -64,11 +64,8 @@ def numbers(block: Block, points: Floats) -> Floats:
     weight 0. Raises ValueError for what the translation does not cover: geographic space, weighted or fixed
     photographs, fixed control.
     """
-    free = np.isinf(block.photo_position_sd).all() and np.isinf(block.photo_attitude_sd).all()
-    if block.geographic or not free or (block.point_sd == 0).any():
-        raise ValueError("a block in rectangular space with free photographs and weighted control is wanted")
+    check(block)
     attitudes = Attitudes.of("matrix_to_vision", to_object_space(block).transpose(0, 2, 1))
-    focal = block.principal_distances[block.image_photos, np.newaxis] * [-1.0, 1.0] / block.image_sd
     which = np.stack([block.image_photos, block.image_points], axis=1)
     held = np.isfinite(block.point_sd)
     control = np.flatnonzero(held.any(axis=1))
@@ -78,7 +75,7 @@ def numbers(block: Block, points: Floats) -> Floats:
         np.array([len(block.photo_ids), len(block.point_ids), len(which)]),
         np.hstack([attitudes.translations(block.photo_positions), attitudes.values("quaternion_to_vision")]),
         points,
-        np.hstack([which, focal, block.image_xy / block.image_sd]),
+        np.hstack([which, in_standard_deviations(block)]),
         np.hstack([control[:, np.newaxis], known, 1.0 / block.point_sd[control]]),
     ]
     return np.concatenate([part.ravel() for part in parts]).astype("<f8")

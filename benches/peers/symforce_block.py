@@ -18,7 +18,7 @@ import numpy as np
 import sym
 import symforce
 from scipy.sparse import csc_matrix
-from solution import HALF_TURN, Floats, Solution, to_object_space
+from solution import HALF_TURN, Floats, Solution, check, in_standard_deviations, to_object_space
 
 # What symforce tells of itself would stand in the page.
 symforce.set_log_level("WARNING")
@@ -49,9 +49,7 @@ def problem(block: Block, points: Floats) -> Problem:
     equation. Raises ValueError for what the translation does not cover: geographic space, weighted or fixed
     photographs, fixed control.
     """
-    free = np.isinf(block.photo_position_sd).all() and np.isinf(block.photo_attitude_sd).all()
-    if block.geographic or not free or (block.point_sd == 0).any():
-        raise ValueError("a block in rectangular space with free photographs and weighted control is wanted")
+    check(block)
     values = cc_sym.Values()
     keys = [cc_sym.Key("x", photo) for photo in range(len(block.photo_ids))]
     keys += [cc_sym.Key("l", point) for point in range(len(block.point_ids))]
@@ -67,8 +65,7 @@ def problem(block: Block, points: Floats) -> Problem:
 
 def _linearization(block: Block) -> Callable[[cc_sym.Values, object], tuple[Floats, csc_matrix]]:
     """Return the residuals of a block and their derivatives as a function of the unknowns."""
-    focal = block.principal_distances[block.image_photos, np.newaxis] * [-1.0, 1.0] / block.image_sd
-    constants = np.hstack([focal, block.image_xy / block.image_sd]).T
+    constants = in_standard_deviations(block).T
     controls, components = np.nonzero(np.isfinite(block.point_sd))
     known, roots = (each[controls, components] for each in (block.point_positions, 1.0 / block.point_sd))
     of_images = _of_images()
