@@ -723,15 +723,15 @@ def refuse_trajectories(block: Block, what: str, why: str = "which is not taken 
         raise InputError(f"{what}: {flown}, {why}")
 
 
-def refuse_passages(block: Block, what: str) -> None:
-    """Refuse a block whose images pass something beside pose, point and camera.
+def refuse_passages(block: Block, what: str, *, but: type[Passage] | tuple[()] = ()) -> None:
+    """Refuse a block whose images pass something beside pose, point and camera, `but` what is of a kind.
 
     Raises
     ------
     InputError
         `what` does not take what is named.
     """
-    if passed := block.all_passages:
+    if passed := [each for each in block.all_passages if not isinstance(each, but)]:
         raise InputError(f"{what}: images of the block pass a {passed[0].KIND}, which is not taken there")
 
 

@@ -7,6 +7,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.declared import dataclass, replace
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from photogram.show.quantity import Axis
     from photogram.statistics.findings import Agreement
 
-__all__ = ["CheckPoints", "check_points"]
+__all__ = ["CheckPoints", "check_points", "point_kinds", "tested_together"]
 
 MOST = 1000
 """Check points that are tested together: of more every second, third ..."""
@@ -128,12 +129,32 @@ def _agreement(
     )
     if not whole:
         return alone
-    some = slice(None, None, -(-len(found.rows) // MOST))
-    try:
-        joint = network.covariance(("point", found.names[some])) / network.covariance_scale
-    except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
-        return alone
+    some = together(len(found.rows))
+    joint = network.state.joint(found.rows[some].tolist())
+    if joint is None:
+        try:
+            joint = network.covariance(("point", found.names[some])) / network.covariance_scale
+        except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
+            return alone
     return replace(alone, together=asked(found.differences[some], joint, survey[some]).together)
+
+
+def together(count: int) -> slice:
+    """Return which of so many check points are tested together: every so many of too many."""
+    return slice(None, None, -(-count // MOST) or None)
+
+
+def tested_together(block: Block) -> list[int]:
+    """Return the points of a block whose cofactors with each other that test needs, where all take part."""
+    rows = np.flatnonzero(point_kinds(block) == "check")
+    return rows[together(len(rows))].tolist()
+
+
+def point_kinds(block: Block) -> NDArray[np.str_]:
+    """Return (n,) `control` with a component held, `check` with some known but none held, else `pass`."""
+    held = np.isfinite(block.point_sd).any(axis=1)
+    known = np.isfinite(block.point_positions).any(axis=1)
+    return np.where(held, "control", np.where(known, "check", "pass"))
 
 
 def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:

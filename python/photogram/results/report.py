@@ -26,6 +26,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, iterations, part, photos, points, stations
 from photogram.results.observed import (
     NOTABLE,
+    control_lines,
     image_lines,
     observed_lines,
     suspect_lines,
@@ -94,7 +95,7 @@ def details(result: Result) -> list[Section]:
         ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
             "Control as observations: adjusted minus given, redundancy, standardized difference",
-            observed_lines(control(result), "point"),
+            control_lines(result),
         ),
         (
             "Components of control that are not held: adjusted minus given",

@@ -19,7 +19,7 @@ from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import refuse_datum, timed_photos
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
-from photogram.results.check_points import CheckPoints, check_points
+from photogram.results.check_points import CheckPoints, check_points, point_kinds
 from photogram.results.covariance import Failure
 from photogram.results.datum import (
     ResultDatum,
@@ -363,9 +363,7 @@ class Result(OnFilm, AdjustedNetwork):
     @property
     def point_kinds(self) -> NDArray[np.str_]:
         """(n,) `control` with a component held, `check` with components known but none held, else `pass`."""
-        held = np.isfinite(self.block.point_sd).any(axis=1)
-        known = np.isfinite(self.block.point_positions).any(axis=1)
-        return np.where(held, "control", np.where(known, "check", "pass"))
+        return point_kinds(self.block)
 
     @property
     def point_differences(self) -> Floats:

@@ -100,6 +100,12 @@ class Seen:
         found: Floats = self.images.xy[self._rows(photo)]
         return found
 
+    def deviations(self, photo: str) -> Floats:
+        """Return (m,) the larger standard deviations of these; 1 where nothing is said of them."""
+        rows, sd = self._rows(photo), self.images.sd
+        found: Floats = np.ones(len(rows)) if sd is None else sd[rows].max(axis=1)
+        return found
+
     def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:
         """Yield where images of a photo should be: by its pose, and by that of tie points on another photo.
 
