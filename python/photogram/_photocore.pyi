@@ -808,13 +808,14 @@ class BlockNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         start: BlockState | None = None,
-        keep: bool = False,
+        keep: Sequence[int] | None = None,
     ) -> BlockSolution:
         """Adjust it; a free one may be taken to the datum of inner constraints.
 
         Or, without such a datum, adjust it from where an adjustment of it has ended, perhaps with other
         weights: in the order of that, and without the points that had run into a station there.
-        Without either, `keep` has the state keep what tests need (see :meth:`trial`).
+        Without either, `keep` has the state keep what tests need (see :meth:`trial`), and the cofactors of
+        these points with each other (:meth:`BlockState.joint`).
         """
 
     def in_datum(
@@ -1362,6 +1363,11 @@ class BlockState:
     def __getnewargs__(
         self,
     ) -> tuple[list[float], list[int], list[int], list[int], str, _DatumRow | None, bool]: ...
+    def joint(self, points: Sequence[int]) -> NDArray[np.float64] | None:
+        """Return the (3k, 3k) cofactors of points with each other, where the adjustment has kept just these.
+
+        None of copies and of what was read.
+        """
 
 @final
 class BlockCovariances:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -17,6 +16,7 @@ from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
 from photogram.adjustment.undetermined import one_place, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, whole_number
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message, listed
@@ -33,6 +33,7 @@ from photogram.network.datum import (
 from photogram.network.motion import refuse_datum
 from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
+from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork
@@ -267,7 +268,9 @@ def _adjusted(
     network = block_network(block, options)
     try:
         told = None if progress is None else teller(progress)
-        solution = network.adjust(datum=inner, threads=processors, progress=told, keep=keep)
+        solution = network.adjust(
+            datum=inner, threads=processors, progress=told, keep=tested_together(block) if keep else None
+        )
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None

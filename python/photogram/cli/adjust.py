@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -42,6 +41,7 @@ from photogram.cli.projects import (
     with_options,
 )
 from photogram.cli.stating import stated, statement_files
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result

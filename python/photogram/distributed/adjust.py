@@ -23,11 +23,11 @@ from photogram.adjustment.adjustment import (
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.started import started
 from photogram.arguments.annotations import check_arguments
-from photogram.distributed.counts import Counts, counted_work
+from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
 from photogram.distributed.merging import merged
-from photogram.distributed.parts import incidence_of, vertices_of
+from photogram.distributed.parts import films_of, incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, opened
@@ -42,6 +42,7 @@ from photogram.network.datum import (
     datum_row,
     minimum_row,
 )
+from photogram.network.films import Reseau, Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
@@ -158,11 +159,22 @@ def _ready(
     check_cameras(checked(block))
     check_datum(datum)
     refuse_trajectories(block, "blocks in parts")
-    refuse_passages(block, "blocks in parts")
+    refuse_passages(block, "blocks in parts", but=Scan)
+    _check_films(block)
     block = started(block)
     if isinstance(datum, MinimumConstraints):
         options = replace(options, minimum=minimum_row(block, datum))
     return block, options, datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
+
+
+def _check_films(block: Block) -> None:
+    """Refuse films whose photos have many unknowns that do not stand in the blocks of these."""
+    for each in block.passages:
+        if isinstance(each, Scan) and isinstance(each.film.pattern, Reseau):
+            raise InputError(
+                f"blocks in parts: the film of the photo {each.photo} has a reseau of its own (pattern"
+                " local), which is not taken there"
+            )
 
 
 def _fits(block: Block, room: int | None) -> bool:
@@ -200,7 +212,10 @@ def _run(
 def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
-    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts)[1]
+    films = films_of(block)
+    of_films = sum(len(each.deviations) for each in block.unknowns if id(each) in films and not each.is_held)
+    unknowns = UNKNOWNS + of_films / len(block.photo_ids)
+    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]
 
 
 def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None) -> str:
@@ -214,6 +229,8 @@ def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None)
         digest.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
     for each in (*block.cameras, *block.observations, *block.unknowns):
         digest.update(repr(each).encode())
+    for passage in block.passages:
+        digest.update(repr((passage, passage.numbers().tolist())).encode())
     return digest.hexdigest()
 
 

@@ -212,11 +212,13 @@ def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> li
 
 
 def _unknowns(block: Block, details: list[dict[str, Any]]) -> list[Any]:
-    """Return the adjusted common unknowns: those of the root, with the observations of all nodes."""
-    found = []
-    for row, given in enumerate(block.unknowns):
-        each = [own for node in details for place, own in node["unknowns"] if place == row]
-        # The last node that has it is the root.
+    """Return the adjusted common unknowns, with the observations of all nodes."""
+    found: list[Any] = []
+    known: list[list[Any]] = [[] for _ in block.unknowns]
+    for row, own in _all(details, "unknowns"):
+        known[row].append(own)
+    for given, each in zip(block.unknowns, known, strict=True):
+        # The last node that has it is the root or, of a film, that of its photo.
         change, cofactors, redundancy = _of_home(
             [(own[0], own[3], own[5]) for own in each], len(each) - 1, given.deviations, None
         )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from photogram.arguments.arrays import names, number, shown, text, truth_value
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.block import Block, position_columns
 

@@ -253,6 +253,23 @@ impl Linearized {
         Ok(matrix)
     }
 
+    /// The cofactors of every two of some unknowns; None where they would take more memory than there may be.
+    pub(super) fn joint(
+        &self,
+        problem: &AnyProblem<'_>,
+        unknowns: &[usize],
+        threads: &Threads,
+        between: Between<'_>,
+    ) -> Result<Option<Vec<f64>>, AdjustError> {
+        let rows: Vec<Function> =
+            unknowns.iter().map(|&unknown| std::iter::once((unknown, 1.0)).collect()).collect();
+        match self.cofactors(problem, &rows, None, None, threads, between) {
+            Ok(found) => Ok(Some(found)),
+            Err(CofactorError::Memory { .. }) => Ok(None),
+            Err(CofactorError::Adjust(error)) => Err(error),
+        }
+    }
+
     /// What a function takes of unknowns that are neither held nor fixed: the cofactors of others are zero in this datum.
     fn unmoved(&self, problem: &AnyProblem<'_>, function: &Function) -> Function {
         let stays = |unknown: usize| self.transformation.as_ref().is_some_and(|to| to.stays(unknown));

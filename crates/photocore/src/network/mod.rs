@@ -113,7 +113,9 @@ pub use passages::Passage;
 pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
 pub use selection::{Dropped, Reason};
-pub use solution::{DatumInForce, LEAST_REDUNDANCY, Redundancies, Solution, SumsOfSquares, Unseen, Weak};
+pub use solution::{
+    DatumInForce, Joint, LEAST_REDUNDANCY, Redundancies, Solution, SumsOfSquares, Unseen, Weak,
+};
 pub use state::{InnerConstraints, NetworkDatum, State};
 pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::{Subject, Suspects};

@@ -93,7 +93,7 @@ impl Network {
         self.check()?;
         self.check_blocks(&surroundings)?;
         let mut network = self.clone();
-        network.release(&surroundings.outer);
+        network.release(&surroundings);
         let in_photos = surroundings.held.clone();
         let none = self.left_out(vec![false; self.photos.len()], None)?;
         let selected = threads.install(|| network.select(&none, surroundings));
@@ -109,17 +109,21 @@ impl Network {
     }
 
     /// Takes the weights of outer blocks away: they count where these are eliminated. What is fixed stays so.
-    pub(super) fn release(&mut self, outer: &[BlockOf]) {
+    pub(super) fn release(&mut self, surroundings: &Surroundings) {
+        let outer = &surroundings.outer;
+        let (films, _) = self.commons_by_block(&surroundings.commons());
         let mut photos_of = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos_of[photo.camera] += 1);
         let named = |camera: usize| outer.contains(&BlockOf::Camera(camera));
         let mut cameras: Vec<usize> = (0..self.cameras.len()).filter(|&camera| named(camera)).collect();
         for block in outer {
             match *block {
-                BlockOf::Photo(photo) => {
-                    let photo = &mut self.photos[photo];
+                BlockOf::Photo(own) => {
+                    let photo = &mut self.photos[own];
                     free(&mut photo.sd);
                     cameras.extend(Some(photo.camera).filter(|&camera| photos_of[camera] == 1));
+                    let film = films.get(own).into_iter().flatten();
+                    film.for_each(|&common| free(&mut self.commons[common].sd));
                 }
                 BlockOf::Camera(_) => {}
                 BlockOf::Common(common) => free(&mut self.commons[common].sd),

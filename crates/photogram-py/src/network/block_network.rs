@@ -48,7 +48,7 @@ impl BlockNetwork {
 
 #[pymethods]
 impl BlockNetwork {
-    #[pyo3(signature = (*, datum, threads, progress, start = None, keep = false))]
+    #[pyo3(signature = (*, datum, threads, progress, start = None, keep = None))]
     fn adjust(
         &self,
         py: Python<'_>,
@@ -56,17 +56,17 @@ impl BlockNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
         start: Option<PyRef<'_, BlockState>>,
-        keep: bool,
+        keep: Option<Vec<usize>>,
     ) -> PyResult<BlockSolution> {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
         let start = start.map(|start| start.state.clone());
         let told = watched(py, workers, progress, |pool, watch| {
             let adjustment = self.network.adjustment(&self.options).on(pool).watched(watch);
-            let adjustment = match (&inner, &start) {
-                (Some(NetworkDatum::Inner(inner)), _) => adjustment.in_datum(inner),
-                (_, Some(start)) => adjustment.from_state(start),
-                _ if keep => adjustment.kept(),
+            let adjustment = match (&inner, &start, &keep) {
+                (Some(NetworkDatum::Inner(inner)), ..) => adjustment.in_datum(inner),
+                (_, Some(start), _) => adjustment.from_state(start),
+                (_, _, Some(points)) => adjustment.kept(points),
                 _ => adjustment,
             };
             adjustment.run().map(|solution| self.told(solution, pool))
