@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_blocks import agrees
+from test_blocks import agrees, freed
 
 import photogram
-from photogram import _photocore, adjust, adjust_in_parts
+from photogram import InnerConstraints, _photocore, adjust, adjust_in_parts
 from photogram.distributed import Division
 from photogram.distributed.parts import films_of
 from photogram.errors import InputError
@@ -125,11 +125,12 @@ def test_a_node_hands_up_no_film_that_is_not_its_photos(block):
     assert id(shared) not in films
 
 
-def test_free_films_in_parts(block):
-    """Without control the datum is that of the same photos."""
-    free = block.replace(point_sd=np.full_like(block.point_sd, np.inf))
-    one, other = adjust(free), adjust_in_parts(free, Division(parts=3))
-    assert other.datum == one.datum
+@pytest.mark.parametrize("datum", [None, InnerConstraints()])
+def test_free_films_in_parts(block, datum):
+    """Without control the datum is that of the same photos, or points."""
+    free = freed(block)
+    one, other = adjust(free, datum=datum), adjust_in_parts(free, Division(parts=3), datum=datum)
+    assert replace(other.datum, lost=0.0) == replace(one.datum, lost=0.0)
     agrees(other, one, 1e-5, tied=True)
 
 
@@ -173,4 +174,11 @@ def test_halves_of_joined_scans_in_parts(block):
     assert one.degrees_of_freedom == other.degrees_of_freedom
     assert other.sums_of_squares.total == pytest.approx(one.sums_of_squares.total, rel=1e-9)
     assert np.nanmax(np.abs(other.film - one.film) / one.film_sd) < 1e-6
+    assert np.nanmax(np.abs(other.film_sd - one.film_sd) / one.film_sd) < 1e-6
+
+
+def test_films_in_parts_are_scaled_by_their_redundancy_numbers(block):
+    options = {"unit_variance": "redundancy", "tolerance": 1e-8}
+    one, other = adjust(block, **options), adjust_in_parts(block, Division(parts=3), **options)
+    assert other.variance_of_unit_weight == pytest.approx(one.variance_of_unit_weight, rel=1e-9)
     assert np.nanmax(np.abs(other.film_sd - one.film_sd) / one.film_sd) < 1e-6

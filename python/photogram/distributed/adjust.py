@@ -7,7 +7,6 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +22,7 @@ from photogram.adjustment.adjustment import (
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.started import started
 from photogram.arguments.annotations import check_arguments
+from photogram.declared import replace
 from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone

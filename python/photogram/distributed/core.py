@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
@@ -11,6 +10,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Indices
+from photogram.declared import replace
 from photogram.distributed.datum import local_row
 from photogram.distributed.engine import Node
 from photogram.distributed.files import read_json, write_file, write_json
