@@ -18,7 +18,7 @@ import numpy as np
 import pyceres
 import pycolmap
 from covariances import Place, moved
-from solution import HALF_TURN, Floats, Solution, to_object_space
+from solution import HALF_TURN, Floats, Solution, check, to_object_space
 
 from photogram import Block
 from photogram.network.geometry import rotation_angles
@@ -46,9 +46,7 @@ def problem(block: Block, points: Floats, *, own_solver: bool = False) -> Proble
     Raises ValueError for what the translation does not cover: geographic space, weighted or fixed
     photographs, fixed control, several cameras or several standard deviations of image coordinates.
     """
-    free = np.isinf(block.photo_position_sd).all() and np.isinf(block.photo_attitude_sd).all()
-    if block.geographic or not free or (block.point_sd == 0).any():
-        raise ValueError("a block in rectangular space with free photographs and weighted control is wanted")
+    check(block)
     if len(np.unique(block.principal_distances)) > 1 or len(np.unique(block.image_sd)) > 1:
         raise ValueError("one camera and one standard deviation of image coordinates are wanted")
     reconstruction, images, tracks = _photographs(block)

@@ -1,4 +1,4 @@
-"""Simulated blocks adjusted by photogram and solved by gtsam and pycolmap; prints one page of Markdown.
+"""Simulated blocks adjusted by photogram and solved by its peers; prints one page of Markdown.
 
 python benches/peers/compare.py 20x50 50x100 --work /tmp/peers --write docs/performance.md
 """
@@ -15,21 +15,25 @@ import tempfile
 from pathlib import Path
 
 import page
+from needs import left_out
 from remarks import REASONS
 from runs import HERE, Plan, Runs, Size
 
 SIZES = ("20x50", "50x100", "200x250", "1x1000", "1x5000", "1x50000")
-SIDES = ("photogram", "photogram:1", "gtsam", "pycolmap")
+SIDES = ("photogram", "photogram:1", "gtsam", "pycolmap", "symforce", "apex-solver")
 BEGIN, END = "<!-- benchmark -->", "<!-- end of benchmark -->"
 
 
 def main() -> int:
     """Run the comparison; the exit status is 1 when solutions differ."""
     arguments = _arguments()
+    absent = left_out(arguments.sides)
+    for line in absent.values():
+        print(line, file=sys.stderr)
     plan = Plan(
         work=arguments.work,
         seed=arguments.seed,
-        sides=arguments.sides,
+        sides=[side for side in arguments.sides if side not in absent],
         peers_up_to=arguments.peers_up_to,
         repetitions=arguments.repetitions,
         limit=arguments.limit,
@@ -41,7 +45,7 @@ def main() -> int:
     small = subprocess.run([sys.executable, HERE / "machine.py", "small"], check=True, capture_output=True)
     results = [Runs(plan, size).measured() for size in arguments.sizes]
 
-    about = (HERE / "performance.md").read_text()
+    about = (HERE / "performance.md").read_text() + "".join(f"{line}\n" for line in absent.values())
     text = page.page(results, json.loads(small.stdout), _command(), about, REASONS)
     print(text)
     if arguments.write:
@@ -55,7 +59,7 @@ def main() -> int:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="photogram, gtsam and pycolmap on simulated blocks")
+    parser = argparse.ArgumentParser(description="photogram and its peers on simulated blocks")
     parser.add_argument(
         "sizes",
         nargs="*",

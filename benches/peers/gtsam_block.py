@@ -17,7 +17,7 @@ import gtsam
 import numpy as np
 from covariances import Place, moved
 from gtsam.symbol_shorthand import L, X
-from solution import HALF_TURN, Floats, Solution, to_object_space
+from solution import HALF_TURN, Floats, Solution, check, to_object_space
 
 from photogram import Block
 from photogram.network.geometry import rotation_angles
@@ -40,9 +40,7 @@ def factor_graph(block: Block, points: Floats) -> Problem:
     precision 0 and so no equation. Raises ValueError for what the translation does not cover: geographic
     space, weighted or fixed photographs, fixed control.
     """
-    free = np.isinf(block.photo_position_sd).all() and np.isinf(block.photo_attitude_sd).all()
-    if block.geographic or not free or (block.point_sd == 0).any():
-        raise ValueError("a block in rectangular space with free photographs and weighted control is wanted")
+    check(block)
     initial = gtsam.Values()
     for photo, pose in enumerate(poses(block)):
         initial.insert(X(photo), pose)

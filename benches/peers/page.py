@@ -174,6 +174,8 @@ def page(
 
 
 def _versions(results: Sequence[Measured]) -> str:
-    packages = sorted({package(side) for measured in results for side in measured.records})
-    names = ", ".join(f"{name} {version(name)}" for name in [*packages, "numpy"])
-    return f"Python {platform.python_version()}, {names}"
+    """Return the versions that ran."""
+    records = [item for measured in results for item in measured.records.items()]
+    ran = {package(side): record["version"] for side, record in records if "version" in record}
+    packages = [f"{name} {ran[name]}" for name in sorted(ran)]
+    return ", ".join([f"Python {platform.python_version()}", *packages, f"numpy {version('numpy')}"])

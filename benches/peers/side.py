@@ -1,7 +1,7 @@
 """One side of the comparison, alone in its process: python benches/peers/side.py SIDE STEM OUTPUT SECONDS.
 
-SIDE is photogram (photogram:1 on one thread), gtsam (gtsam:SETTING for another than its fastest) or pycolmap
-(pycolmap:own-solver with the linear solver that it chooses).
+SIDE is photogram (photogram:1 on one thread), gtsam or apex-solver (gtsam:SETTING for another than its
+fastest), pycolmap (pycolmap:own-solver with the linear solver that it chooses) or symforce.
 STEM.pickle holds the block with the initial points; what the side found is written to OUTPUT.json and
 OUTPUT.npz. A process of its own makes the peak of its memory its own. SECONDS limit gtsam's marginals;
 0 leaves the covariances of the peers out.
@@ -157,6 +157,39 @@ def run_pycolmap(
     return arrays | {"photo_cofactors": colmap_block.photo_cofactors(block, problem, covariance, of_photos)}
 
 
+def run_symforce(
+    block: photogram.Block, points: Floats, record: Record, _limit: float, _setting: str
+) -> dict[str, Floats]:
+    """Order and optimize: symforce's covariances are those of a dense inverse, for small problems."""
+    import symforce_block
+
+    problem = record.time("building", lambda: symforce_block.problem(block, points))
+    statistics = record.time("solution", lambda: symforce_block.solve(problem))
+    return _arrays(symforce_block.read_out(block, problem, statistics), record)
+
+
+def run_apex_solver(
+    block: photogram.Block, points: Floats, record: Record, _limit: float, setting: str
+) -> dict[str, Floats]:
+    """Let the program in Rust optimize, in a process of its own, which takes time and memory itself."""
+    import apex_block
+
+    problem = record.time("building", lambda: apex_block.numbers(block, points))
+    found = apex_block.solve(block, problem, setting or apex_block.FASTEST)
+    record.values["version"] = apex_block.version()
+    record.values["seconds"]["solution"], record.values["peak"]["solution"] = found.seconds, found.peak
+    return _arrays(found.solution, record)
+
+
+PEERS: dict[str, Callable[[photogram.Block, Floats, Record, float, str], dict[str, Floats]]] = {
+    "gtsam": run_gtsam,
+    "pycolmap": run_pycolmap,
+    "symforce": run_symforce,
+    "apex-solver": run_apex_solver,
+}
+"""What runs a peer, with the seconds of its covariances and a setting."""
+
+
 def _arrays(solution: Solution, record: Record) -> dict[str, Floats]:
     """Share a solution out: numbers to the record, arrays to the caller."""
     values = asdict(solution)
@@ -172,13 +205,12 @@ def main() -> None:
     with Path(stem).with_suffix(".pickle").open("rb") as file:
         block, points = pickle.load(file)
     record = Record()
-    sides: dict[str, Callable[[], dict[str, Floats]]] = {
-        "photogram": lambda: run_photogram(block, record, int(setting) if setting else None),
-        "gtsam": lambda: run_gtsam(block, points, record, float(limit), setting),
-        "pycolmap": lambda: run_pycolmap(block, points, record, float(limit), setting),
-    }
-    arrays = sides[package]()
-    record.values["version"] = version(package)
+    if package == "photogram":
+        arrays = run_photogram(block, record, int(setting) if setting else None)
+    else:
+        arrays = PEERS[package](block, points, record, float(limit), setting)
+    if "version" not in record.values:
+        record.values["version"] = version(package)
     np.savez(Path(output).with_suffix(".npz"), **arrays)
     Path(output).with_suffix(".json").write_text(json.dumps(record.values, default=float))
 

@@ -49,3 +49,19 @@ def to_object_space(block: Block) -> Floats:
         matrices = matrices.transpose(0, 2, 1)
     rotations: Floats = (HALF_TURN @ matrices).transpose(0, 2, 1)
     return rotations
+
+
+def check(block: Block) -> None:
+    """Raise ValueError for what no peer is given: geographic space, weighted photographs, fixed control."""
+    free = np.isinf(block.photo_position_sd).all() and np.isinf(block.photo_attitude_sd).all()
+    if block.geographic or not free or (block.point_sd == 0).any():
+        raise ValueError("a block in rectangular space with free photographs and weighted control is wanted")
+
+
+def in_standard_deviations(block: Block) -> Floats:
+    """Return the focal lengths fx = -c, fy = c and the coordinates of every image point, (n, 4).
+
+    In standard deviations of the coordinates, for peers whose weights are all 1.
+    """
+    focal = block.principal_distances[block.image_photos, np.newaxis] * [-1.0, 1.0]
+    return np.hstack([focal / block.image_sd, block.image_xy / block.image_sd])

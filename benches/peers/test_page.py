@@ -29,6 +29,7 @@ def photogram_record(seconds: float, **others: Any) -> dict[str, Any]:
         "phases": phases,
         "operations": {"reduction": 1e9, "factor": 2e9, "inverse": 4e9},
         "formations": 5,
+        "version": "1.2.3",
         "rays": [1e5, 4e5],
     }
     return record | others
@@ -100,6 +101,7 @@ def test_the_page_names_what_failed_and_why_a_target_is_missed() -> None:
     assert "| gtsam | solution: more than 600 s |" in text
     assert "| photogram | everything: exit status -9 |" in text
     assert f"* {name}: for a reason" in text
+    assert ", photogram 1.2.3, numpy " in text
     assert "nothing" not in text
 
 

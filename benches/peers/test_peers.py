@@ -1,36 +1,41 @@
 """The translations of a block for the peers: the same start, the same solution, the same covariances."""
 
-from collections.abc import Callable
+import importlib
 from typing import Any
 
+import apex_block
+import needs
 import numpy as np
 import pytest
+import side
+from agreement import Agreement
+from runs import package
+from start import intersections
 
-gtsam = pytest.importorskip("gtsam")
-pytest.importorskip("pycolmap")
-pytest.importorskip("pyceres")
+import photogram
+from photogram.network import geometry
 
-import colmap_block  # noqa: E402
-import gtsam_block  # noqa: E402
-import side  # noqa: E402
-from agreement import Agreement  # noqa: E402
-from start import intersections  # noqa: E402
-
-import photogram  # noqa: E402
-from photogram.network import geometry  # noqa: E402
-
-Arrays = dict[str, Any]
-Run = Callable[[photogram.Block, side.Floats, side.Record], Arrays]
-
-SIDES: dict[str, Run] = {
-    **{
-        setting: lambda block, points, record, setting=setting: side.run_gtsam(
-            block, points, record, 60.0, setting
-        )
-        for setting in gtsam_block.SETTINGS
-    },
-    "pycolmap": lambda block, points, record: side.run_pycolmap(block, points, record, 60.0, ""),
+GTSAM = ("gn-colamd", "gn-metis", "lm-colamd", "lm-schur")
+SIDES = (
+    *(f"gtsam:{setting}" for setting in GTSAM),
+    "pycolmap",
+    "symforce",
+    *(f"apex-solver:{setting}" for setting in apex_block.SETTINGS),
+)
+WITH_COFACTORS = {"gtsam": (True, True), "pycolmap": (True, False)}
+"""Whether a peer has cofactors of photographs and of points."""
+TRANSLATIONS = {
+    "gtsam": "gtsam_block.factor_graph",
+    "pycolmap": "colmap_block.problem",
+    "symforce": "symforce_block.problem",
+    "apex-solver": "apex_block.numbers",
 }
+
+
+def require(name: str) -> None:
+    """Skip a test of a side that cannot run here."""
+    if what := needs.lacking(name):
+        pytest.skip(f"{name} needs {what}")
 
 
 def small_block(**options: Any) -> photogram.Block:
@@ -44,6 +49,7 @@ def small_block(**options: Any) -> photogram.Block:
 @pytest.mark.parametrize("photo_to_ground", [False, True])
 def test_images(principal_distance: float, photo_to_ground: bool) -> None:
     """Initial photographs and points have the same images in gtsam's cameras, to 1e-9 mm."""
+    gtsam, gtsam_block = pytest.importorskip("gtsam"), importlib.import_module("gtsam_block")
     block = small_block(principal_distance=principal_distance, photo_to_ground=photo_to_ground)
     points = intersections(block)
     expected = geometry.project(
@@ -62,20 +68,25 @@ def test_images(principal_distance: float, photo_to_ground: bool) -> None:
 
 @pytest.mark.parametrize("principal_distance", [-152.74, 152.74])
 @pytest.mark.parametrize("photo_to_ground", [False, True])
-@pytest.mark.parametrize("name", list(SIDES))
+@pytest.mark.parametrize("name", SIDES)
 def test_solutions_agree(name: str, photo_to_ground: bool, principal_distance: float) -> None:
     """Every side starts from and ends at the same sum of squares, with the same unknowns and cofactors."""
+    require(name)
     block = small_block(photo_to_ground=photo_to_ground, principal_distance=principal_distance)
     ours, theirs = side.Record(), side.Record()
     arrays = side.run_photogram(block, ours, None)
-    others = SIDES[name](block, intersections(block), theirs)
+    _, _, setting = name.partition(":")
+    others = side.PEERS[package(name)](block, intersections(block), theirs, 60.0, setting)
     agreement = Agreement.of((ours.values, arrays), (theirs.values, others))
     assert agreement
-    assert agreement.photo_cofactors is not None
-    assert (agreement.point_cofactors is None) == (name == "pycolmap")
+    cofactors = agreement.photo_cofactors, agreement.point_cofactors
+    assert tuple(each is not None for each in cofactors) == WITH_COFACTORS.get(package(name), (False, False))
+    assert theirs.values["converged"]
+    assert theirs.values["seconds"]["solution"] > 0
+    assert theirs.values["peak"]["solution"] > 2**20
 
 
-@pytest.mark.parametrize("translate", [gtsam_block.factor_graph, colmap_block.problem])
+@pytest.mark.parametrize("name", list(TRANSLATIONS))
 @pytest.mark.parametrize(
     "options",
     [
@@ -85,13 +96,30 @@ def test_solutions_agree(name: str, photo_to_ground: bool, principal_distance: f
         {"spheroid": geometry.Spheroid.wgs84()},
     ],
 )
-def test_refuses_what_it_does_not_translate(
-    options: dict[str, Any], translate: Callable[[photogram.Block, side.Floats], object]
-) -> None:
+def test_refuses_what_it_does_not_translate(options: dict[str, Any], name: str) -> None:
     """Blocks that a peer would solve differently are refused."""
+    require(name)
+    module, _, function = TRANSLATIONS[name].partition(".")
     block = small_block(**options)
     with pytest.raises(ValueError, match="wanted"):
-        translate(block, np.zeros_like(block.point_positions))
+        getattr(importlib.import_module(module), function)(block, np.zeros_like(block.point_positions))
+
+
+def test_gtsam_is_tested_with_all_its_settings() -> None:
+    """Their names stand here, so that the other sides are tested without gtsam."""
+    pytest.importorskip("gtsam")
+    assert set(importlib.import_module("gtsam_block").SETTINGS) == set(GTSAM)
+
+
+def test_what_cannot_run_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With one line that says why."""
+    monkeypatch.setattr(needs, "MODULES", {"gtsam": ("json",), "symforce": ("json", "no_such_module")})
+    monkeypatch.setenv("PATH", "")
+    lines = needs.left_out(["photogram", "photogram:1", "gtsam:gn-metis", "symforce", "apex-solver"])
+    assert lines == {
+        "symforce": "* symforce is left out: no_such_module is not installed.",
+        "apex-solver": "* apex-solver is left out: a cargo that can build it is not installed.",
+    }
 
 
 def test_another_solution_does_not_agree() -> None:

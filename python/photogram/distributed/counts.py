@@ -7,11 +7,11 @@ numbers and contributions are then those of dense panels: multifrontal eliminati
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.distributed.cut import Incidence, Tree, cut, homes, tree_of
 
 __all__ = ["UNKNOWNS", "Counts", "counted_work", "outer_vertices"]

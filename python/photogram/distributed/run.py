@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +27,10 @@ from photogram.distributed.parts import (
     vertices_of,
     write_part,
 )
-from photogram.errors import InputError
+from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
+from photogram.network.datum import DatumRow
 from photogram.network.observations.position import with_epochs
 from photogram.network.unknowns import Unknown
 
@@ -72,6 +74,8 @@ class Manifest:
         Of the parts of the nodes.
     held
         What is held where nothing gives a datum: photos, each with the number of one of its six unknowns.
+    datum
+        The datum that the block is taken to when it is adjusted; None for what is held, or observed.
     """
 
     version: str
@@ -86,6 +90,7 @@ class Manifest:
     images: list[int]
     seals: list[str]
     held: list[tuple[int, int]]
+    datum: DatumRow | None = None
 
 
 def part_folder(run: Path, number: int) -> Path:
@@ -107,7 +112,14 @@ def places_of(block: Block) -> Floats:
     return positions
 
 
-def partition(block: Block, run: Path, parts: int, options: CoreOptions, source: str) -> Manifest:
+def partition(
+    block: Block,
+    run: Path,
+    parts: int,
+    options: CoreOptions,
+    source: str,
+    datum: DatumRow | None = None,
+) -> Manifest:
     """Cut a block that is in memory into parts on disk.
 
     Parameters
@@ -118,14 +130,17 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
         The folder, which is made.
     parts
         How many.
-    options, source
+    options, source, datum
         As in :class:`Manifest`.
 
     Raises
     ------
     AdjustmentError
-        The folder cannot be written to.
+        The folder cannot be written to; a datum is asked for, and the block is not free.
     """
+    held = held_for_datum(block, options)
+    if datum is not None and not held:
+        raise AdjustmentError("the block is not free: control, weights or observations give its datum")
     # A node has some of the observations of a drift only.
     block = block.replace(observations=with_epochs(block.observations))
     incidence, _, _ = incidence_of(block)
@@ -139,7 +154,8 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
         lambda node, below: part_of(block, homes, node, below),
         options,
         source,
-        held_for_datum(block, options),
+        held,
+        datum,
     )
 
 
@@ -167,6 +183,7 @@ def divided(
     options: CoreOptions,
     source: str,
     held: list[tuple[int, int]],
+    datum: DatumRow | None = None,
 ) -> Manifest:
     """Write the parts of a block, one after the other.
 
@@ -176,7 +193,7 @@ def divided(
         The block, or all of it but points and images.
     run, options, source
         As of :func:`partition`.
-    held
+    held, datum
         As in :class:`Manifest`.
     tree
         The tree.
@@ -220,6 +237,7 @@ def divided(
         images,
         seals,
         held,
+        datum,
     )
     write_manifest(run, manifest)
     return manifest
@@ -258,7 +276,7 @@ def write_manifest(run: Path, manifest: Manifest) -> None:
     write_json(run / MANIFEST, document)
 
 
-_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held")
+_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held", "datum")
 
 
 def read_manifest(run: Path) -> Manifest:
@@ -277,16 +295,22 @@ def read_manifest(run: Path) -> Manifest:
         )
     options = document["options"]
     for name in ("loss", "minimum"):
-        options[name] = None if options[name] is None else tuple(options[name])
+        options[name] = _as_tuple(options[name])
     plain = {name: document[name] for name in _PLAIN}
     plain["middle"] = tuple(plain["middle"])
     plain["held"] = [(photo, number) for photo, number in plain["held"]]
+    if plain["datum"] is not None:
+        plain["datum"] = tuple(plain["datum"])
     return Manifest(
         tree=tree_of(document["parts"]),
         outer=[Names(*rows) for rows in document["outer"]],
         options=CoreOptions(**options),
         **plain,
     )
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(map(_as_tuple, value)) if isinstance(value, list) else value
 
 
 def read_node(run: Path, manifest: Manifest, number: int) -> Part:

@@ -6,7 +6,6 @@ import copy
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import frozen, indices, length, shaped, shown, text, truth_value
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
 
 from photogram import _photocore
+from photogram.declared import dataclass, field
 
 __all__ = [
     "ALL_ANGLES",
@@ -466,9 +466,10 @@ TABLES: Mapping[str, Schema] = {
     "rigs": Schema(
         ("rig",),
         ("rig", "camera", "sensor"),
-        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS),
+        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS, *_CLOCK),
         "`rig`, `camera` or `sensor`; `x`, `y`, `z`, angles, `sd_x` .., `sd_rotation_x` ..; the first row of"
-        " a rig is its reference, a row with no numbers an unknown sensor",
+        " a rig is its reference, a row with no numbers an unknown sensor; of sensors whose photos are on"
+        " trajectories and say none of their own `time_offset` (0; s), `sd_time_offset` (s; 0: known)",
     ),
     "frames": Schema(
         ("frame", "rig", "photo"),
