@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from test_blocks import agrees
+from test_datum_in_parts import in_both
 
 import photogram
 from photogram import _photocore, adjust, adjust_in_parts
@@ -131,6 +132,12 @@ def test_free_films_in_parts(block):
     one, other = adjust(free), adjust_in_parts(free, Division(parts=3))
     assert other.datum == one.datum
     agrees(other, one, 1e-5, tied=True)
+
+
+def test_inner_constraints_of_films_in_parts(block):
+    free = block.replace(point_sd=np.full_like(block.point_sd, np.inf))
+    found, one = in_both(free, 3, 1e-6, datum=photogram.InnerConstraints())
+    assert np.nanmax(np.abs(found.film - one.film) / one.film_sd) < 1e-6
 
 
 def test_what_parts_do_not_take_is_refused(block):
