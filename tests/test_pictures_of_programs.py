@@ -29,13 +29,13 @@ COMMANDS = [
 @pytest.mark.parametrize("command", COMMANDS)
 def test_pictures_have_the_style_of_the_house(run, monkeypatch, command, tmp_path):
     made = []
-    save = Figure.savefig
+    draw = Figure.draw
 
-    def watched(figure, *arguments, **options):
+    def watched(figure, renderer):
         made.append(figure)
-        return save(figure, *arguments, **options)
+        return draw(figure, renderer)
 
-    monkeypatch.setattr(Figure, "savefig", watched)
+    monkeypatch.setattr(Figure, "draw", watched)
     plotted = ["--plot-format", "svg"] if "--plots" in command else []
     result = run(*command.split(), *plotted, "--quiet")
     assert result.exit_code == 0, result.output

@@ -14,10 +14,19 @@ from photogram.network.geometry import project
 from photogram.network.simulation import simulate
 from photogram.show.judgement import judged
 from photogram.show.sections import composed, verdict_sections
-from photogram.statistics import Findings, Removed, global_test, group_tests, verdict
-from photogram.statistics.findings import Agreement, GroupFactor, Systematic, by_t, by_w, of_groups
+from photogram.statistics import global_test, group_tests
+from photogram.statistics.findings import (
+    Agreement,
+    Findings,
+    GroupFactor,
+    Removed,
+    Systematic,
+    by_t,
+    by_w,
+    of_groups,
+)
 from photogram.statistics.outliers import Observations
-from photogram.statistics.verdict import worst
+from photogram.statistics.verdict import verdict, worst
 
 F = 81
 

@@ -56,11 +56,26 @@ def test_the_same_words_and_numbers():
     assert again.report() == copied.report()
 
 
+def test_check_points_have_the_cofactors_that_were_kept():
+    block = photogram.simulate(strips=3, photos_per_strip=6, points_per_photo=60, seed=4).block
+    result = adjust(block, tolerance=1e-9, covariance="verdict")
+    rows = np.flatnonzero(result.point_kinds == "check").tolist()
+    joint = result.state.joint(rows)
+    own = result.covariance(("point", [block.point_ids[row] for row in rows])) / result.covariance_scale
+    np.testing.assert_allclose(joint, own, rtol=0, atol=1e-7 * own.max())
+    assert result.state.joint(rows[1:]) is None
+    copied = own_formation(result)
+    assert copied.state.joint(rows) is None
+    kept, formed = (each.check_points.agreement.together for each in (result, copied))
+    assert kept.value == pytest.approx(formed.value, rel=1e-6)
+
+
 @pytest.mark.parametrize("options", [{"loss": "huber"}, {"max_iterations": 2}, {"tolerance": 100.0}])
 def test_what_is_not_kept(options):
     """Of a loss, of iterations that have not ended, and where the last step was long: all is as without."""
     block = photogram.simulate(strips=2, photos_per_strip=4, points_per_photo=40, seed=7).block
     result = adjust(block, covariance="verdict", **options)
+    assert result.state.joint(np.flatnonzero(result.point_kinds == "check").tolist()) is None
     assert_alike(result.reliability(), own_formation(result).reliability(), 1e-14)
 
 

@@ -808,13 +808,14 @@ class BlockNetwork:
         threads: int,
         progress: Callable[[str, int, int, IterationRow | None], None] | None,
         start: BlockState | None = None,
-        keep: bool = False,
+        keep: Sequence[int] | None = None,
     ) -> BlockSolution:
         """Adjust it; a free one may be taken to the datum of inner constraints.
 
         Or, without such a datum, adjust it from where an adjustment of it has ended, perhaps with other
         weights: in the order of that, and without the points that had run into a station there.
-        Without either, `keep` has the state keep what tests need (see :meth:`trial`).
+        Without either, `keep` has the state keep what tests need (see :meth:`trial`), and the cofactors of
+        these points with each other (:meth:`BlockState.joint`).
         """
 
     def in_datum(
@@ -858,6 +859,54 @@ class BlockNetwork:
         ------
         BlockError
             As :meth:`adjust`, before its first iteration.
+        """
+
+    def parts_in_datum(
+        self,
+        datum: _DatumRow,
+        held: list[tuple[int, int]],
+        *,
+        middle: tuple[float, float, float] | None,
+        names: _Indices,
+        values: _Floats,
+        threads: int,
+    ) -> tuple[_Floats, _Floats, _Floats, float, bool]:
+        """Move a block that was adjusted in parts to the datum of inner constraints (docs/distributed.md).
+
+        Parameters
+        ----------
+        datum
+            Inner constraints.
+        held
+            What :meth:`held_for_datum` gives.
+        middle
+            As all nodes were given it.
+        names
+            (3 N,) all unknowns of the block, those of several nodes perhaps several times: the rows of
+            :attr:`Node.unknown_names`, but with indices into this block.
+        values
+            (N,) where they have been adjusted to.
+        threads
+            As in :meth:`adjust`.
+
+        Returns
+        -------
+        values
+            (N,) in the datum.
+        b, t
+            (d N,) the columns B, zero but for what carries the datum, and T = G (B^T G)^-1, one after the
+            other.
+        condition
+            Of B^T G, its columns scaled.
+        exact
+            Whether there are no more carriers than columns, so that these do not move.
+
+        Raises
+        ------
+        BlockError
+            As of :meth:`adjust` with a datum.
+        BlockInputError
+            Names that are not those of all unknowns.
         """
 
     def node(
@@ -935,6 +984,13 @@ class Node:
     @property
     def children(self) -> list[_Indices]:
         """For each child (S_c,) where the unknowns that it is over stand in a state, in its own order."""
+
+    @property
+    def unknown_names(self) -> _Indices:
+        """(N, 3) what each unknown of a state belongs to, its index, and the number of the unknown there.
+
+        0: a photo, 1: a camera that photos share, 2: a common unknown, 3: a point.
+        """
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -1055,12 +1111,44 @@ class FormedNode:
     ) -> _Floats:
         """Return the step (N,) of all unknowns, given that of the outer ones (S,)."""
 
+    def reduce(
+        self,
+        rights: _Floats,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
+    ) -> tuple[_Floats, _Floats]:
+        """Reduce right-hand sides: y = L^-1 r of what is eliminated here.
+
+        Parameters
+        ----------
+        rights
+            (d, N) of all unknowns: own ones of what is at home here, with what the children have left.
+
+        Returns
+        -------
+        left
+            (d S,) what is left for the outer unknowns.
+        products
+            (d d,) y^T y, which adds up over all nodes to r^T Q r.
+        """
+
+    def complete(
+        self,
+        outer: _Floats,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
+    ) -> _Floats:
+        """Return solutions (d N,) where right-hand sides were reduced, given the outer ones (d, S); once."""
+
     def invert(
         self,
         outer: _Floats,
         state: _Floats,
         *,
         threads: int,
+        datum: tuple[_Floats, _Floats, _Floats, _Floats, float, list[int]] | None = None,
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> tuple[BlockSolution, list[_Floats]]:
         """Return what is adjusted, with its cofactors, and what the children need for theirs.
@@ -1073,6 +1161,10 @@ class FormedNode:
             (S (S + 1) / 2,) cofactors of the outer unknowns, a lower triangle packed like the contribution.
         state
             (N,) the state that is reached: after the step, where that was the last one, else the same.
+        datum
+            What takes cofactors to a datum of the whole, but for those of the children: T and W = Q B (d, N),
+            B^T W of the whole (d, d), the last step (N,) before it was moved there, the condition of B^T G,
+            and the unknowns that do not move in the datum, ascending.
 
         Returns
         -------
@@ -1271,6 +1363,11 @@ class BlockState:
     def __getnewargs__(
         self,
     ) -> tuple[list[float], list[int], list[int], list[int], str, _DatumRow | None, bool]: ...
+    def joint(self, points: Sequence[int]) -> NDArray[np.float64] | None:
+        """Return the (3k, 3k) cofactors of points with each other, where the adjustment has kept just these.
+
+        None of copies and of what was read.
+        """
 
 @final
 class BlockCovariances:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
+
+from photogram.declared import dataclass
 
 __all__ = ["Message", "Undetermined"]
 
@@ -51,6 +51,8 @@ def printable(text: str) -> str:
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return the end of a sentence that refuses a name: the known one that was meant, or all of them."""
+    import difflib  # a wrong name is rare
+
     names = list(known)
     close = difflib.get_close_matches(word, names, 1, 0.5)
     return f"; did you mean {close[0]}?" if close else f", but {', '.join(names)}"

@@ -6,7 +6,7 @@ from test_parts import tied_block
 
 import photogram
 from example_scripts import load
-from photogram import adjust, adjust_in_parts, adjust_started
+from photogram import AsPublished, adjust, adjust_in_parts, adjust_started
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed import adjust as of_blocks
 from photogram.distributed.core import CoreEngine
@@ -150,11 +150,38 @@ def test_a_held_photo_is_held_in_the_results_of_its_nodes(block, tmp_path):
         assert held == names & set(of_node.block.photo_ids)
 
 
-@pytest.mark.parametrize("unit_variance", ["free", "unity"])
+@pytest.mark.parametrize("unit_variance", ["free", "unity", "redundancy"])
 def test_every_unit_variance_is_that_of_one_process(block, unit_variance):
     weighted = block.replace(photo_position_sd=np.full((len(block.photo_ids), 3), 5.0))
     found = adjust_in_parts(weighted, Division(parts=3), unit_variance=unit_variance)
     agrees(found, adjust(weighted, unit_variance=unit_variance))
+
+
+def test_nodes_are_scaled_by_what_all_redundancy_numbers_give(tmp_path):
+    """They are known when all nodes are inverted, and written."""
+    block, folder = tied_block(), tmp_path / "run"
+    whole = adjust(block, unit_variance="redundancy")
+    found = adjust_in_parts(block, Division(parts=2, folder=folder), unit_variance="redundancy")
+    agrees(found, whole, tied=True)
+    sd = dict(zip(block.photo_ids, whole.photo_sd, strict=True))
+    for node in range(3):
+        of_node = photogram.read_result(folder / "results" / f"{node:05d}")
+        assert of_node.variance_of_unit_weight == found.variance_of_unit_weight
+        expected = np.array([sd[name] for name in of_node.block.photo_ids])
+        np.testing.assert_allclose(of_node.photo_sd, expected, rtol=1e-8)
+    for one, other in zip(of_node.cameras, whole.cameras, strict=True):
+        np.testing.assert_allclose(one.sd, other.sd, rtol=1e-8)
+    with pytest.raises(InputError, match="needs redundancy numbers"):
+        adjust_in_parts(block, Division(parts=2), unit_variance="redundancy", covariance=False)
+
+
+@pytest.mark.parametrize(("percent", "limit"), [(5.0, 4), (1e-6, 8), (1e-9, 2)])
+def test_the_iteration_of_1987_is_that_of_one_process(percent, limit):
+    block, options = tied_block(), {"tolerance": AsPublished(percent), "max_iterations": limit}
+    whole, found = adjust(block, **options), adjust_in_parts(block, Division(parts=3), **options)
+    agrees(found, whole)
+    assert found.messages == whole.messages
+    assert (whole.status == "converged") == (limit > 2)
 
 
 def test_weighted_cameras_and_unknowns_count_in_the_free_unit_variance():
@@ -261,8 +288,6 @@ def test_what_parts_cannot_do_is_refused(block):
     found = adjust_in_parts(block, Division(parts=2))
     with pytest.raises(AdjustmentError, match="adjusted in parts"):
         found.covariances()
-    with pytest.raises(InputError, match="not based on redundancy"):
-        adjust_in_parts(block, Division(parts=2), unit_variance="redundancy")
     with pytest.raises(InputError, match="memory is a number of bytes"):
         Division(memory="much")
     with pytest.raises(InputError, match="parts must be 1 to"):

@@ -4,8 +4,9 @@ import re
 from inspect import signature
 
 import numpy as np
+import pandas as pd
 import pytest
-from test_blocks import agrees
+from test_blocks import agrees, freed
 from test_parts import tied_block
 from test_streamed import project_of
 from typer.testing import CliRunner
@@ -43,9 +44,21 @@ def test_the_example_in_parts_has_the_report_of_one_process(tmp_path):
     assert len(re.findall(pattern, one)) > 4
 
 
-def test_no_datum_is_chosen_in_parts(tmp_path):
-    said = called("--example", "--parts", 2, "--datum", "inner", "--out", tmp_path / "out", code=1)
-    assert "in parts there is no datum to choose" in said
+def test_a_datum_is_that_of_one_process(tmp_path):
+    block = freed(photogram.simulate(strips=2, photos_per_strip=8, points_per_photo=40, seed=3).block)
+    project = project_of(block, tmp_path / "free")
+    said = called(project, "--parts", 2, "--out", tmp_path / "batches", code=1)
+    assert "nothing gives the block a datum" in " ".join(said.split())
+    # With its images in CSV it is read whole.
+    pd.read_parquet(project / "images.parquet").to_csv(project / "images.csv", index=False)
+    (project / "images.parquet").unlink()
+    called(project, "--parts", 2, "--datum", "inner", "--plan", "--run", tmp_path / "run")
+    called(project, "--parts", 2, "--datum", "inner", "--run", tmp_path / "run", "--out", tmp_path / "parts")
+    called(project, "--datum", "inner", "--out", tmp_path / "whole")
+    one, other = ((tmp_path / each / "report.txt").read_text() for each in ("parts", "whole"))
+    pattern = r".*inner constraints over .*|sigma0 .*|rms of .*"
+    assert re.findall(pattern, one) == re.findall(pattern, other)
+    assert "inner constraints over" in one
 
 
 def test_a_loss_is_that_of_one_process(tmp_path):
@@ -150,13 +163,13 @@ def test_a_project_on_disk_that_chooses_a_loss_is_adjusted_with_it(tmp_path):
     assert (weights < 1).any()
 
 
-@pytest.mark.parametrize("chosen", ["unity", "constrained"])
+@pytest.mark.parametrize("chosen", ["unity", "constrained", "redundancy"])
 def test_the_unit_variance_of_a_project_on_disk_is_chosen(tmp_path, project, chosen):
     called(project, "--parts", 2, "--unit-variance", chosen, "--keep-all", "--out", tmp_path / "out")
     found = read_result(min((tmp_path / "out" / "run" / "results").iterdir()))
     assert found.unit_variance == chosen
-    said = called(project, "--parts", 2, "--unit-variance", "redundancy", "--out", tmp_path / "b", code=1)
-    assert "in parts the unit variance is not based on redundancy numbers" in said
+    whole = adjust(read(project).block, unit_variance=chosen)
+    assert found.variance_of_unit_weight == pytest.approx(whole.variance_of_unit_weight, rel=1e-9)
 
 
 def test_two_workers_give_the_bits_of_parts_one_after_the_other():

@@ -203,7 +203,7 @@ class FormedToy:
         step[self.inner] = self.inverse @ (self.right - self.coupling.T @ outer)
         return step
 
-    def invert(self, outer, state, *, threads):
+    def invert(self, outer, state, *, threads, datum=None):
         """Return what is found, and cofactors for the children."""
         y = self.coupling @ self.inverse
         q_ss = unpacked(outer)

@@ -167,13 +167,40 @@ def test_a_tangential_profile_is_largest_along_its_axis(written):
 
 
 def test_four_semi_diagonals_give_their_own_standard_deviation(written):
-    rows = {"ll": [-5, -12, -9, -1], "ul": [-3, -9, -8, 2], "ur": [-3, -8, -7, 3], "lr": [-4, -11, -9, 0]}
+    rows = {"ll": [-4, -11, -9, -2], "ul": [-4, -10, -9, 1], "ur": [-4, -10, -7, 4], "lr": [-4, -11, -9, 0]}
     text = HEAD + "c = 152\n[certificate.radial]\nangle = [10, 20, 30, 40]\n"
     certificate = written(text + "".join(f"{name} = {values}\n" for name, values in rows.items()))
     left = [(a + c - b - d) / 2 for a, b, c, d in zip(*rows.values(), strict=True)]
     assert certificate.radial.sd == pytest.approx(1e-3 * math.sqrt(np.mean(np.square(left))) / 2)
     assert certificate.radial.distortion == pytest.approx(1e-3 * np.mean([*rows.values()], axis=0))
-    assert "opposite semi-diagonals show decentring of up to 2" in certificate.told()[0]
+    assert "opposite semi-diagonals show decentring of up to 3" in certificate.told()[0]
+
+
+def test_radii_about_the_indicated_point_are_told_from_decentring(written):
+    """The point of symmetry is 18 um away; what is left beside it grows with the square of the radius."""
+    angle, centre = np.array([10.0, 20.0, 30.0, 40.0]), np.array([12.0, -14.0])
+    common = np.array([-4.0, -10.0, -8.0, 1.0]) + 0.1 * np.array([1.0, -1.0, 1.0, -1.0])
+    towards = {"ll": (-1, -1), "ul": (-1, 1), "ur": (1, 1), "lr": (1, -1)}
+    lateral = 1.5 * np.tan(np.radians(angle)) ** 2
+    rows = {
+        name: common + (centre @ way + way[0] * lateral) / math.sqrt(2) + 0.05 * way[0] * way[1]
+        for name, way in towards.items()
+    }
+    text = HEAD + "c = 152\n[certificate.radial]\nangle = [10, 20, 30, 40]\n"
+    certificate = written(text + "".join(f"{name} = {own.tolist()}\n" for name, own in rows.items()))
+    away, decentring = certificate.told()[:2]
+    assert "is at (0.012, -0.014) mm" in away
+    assert "the indicated principal point, and not the calibrated one?" in away
+    assert decentring.startswith("opposite semi-diagonals show decentring of up to 0.7")
+    assert certificate.radial.distortion == pytest.approx(1e-3 * common)
+
+
+def test_a_table_that_counts_inwards_says_so(written):
+    turned = EXAMPLE.replace("distortion = [-4, -9, -11, -7, -1, 7]", "distortion = [4, 9, 11, 7, 1, -7]")
+    given = written(turned.replace("[certificate.radial]", "[certificate.radial]\nsign = -1"))
+    assert given.camera().parameters == written(EXAMPLE).camera().parameters
+    with pytest.raises(InputError, match="sign must say 1 or -1"):
+        written(turned.replace("[certificate.radial]", "[certificate.radial]\nsign = 0"))
 
 
 def test_printed_coefficients_are_compared_with_the_table(written):
@@ -183,7 +210,8 @@ def test_printed_coefficients_are_compared_with_the_table(written):
     text = EXAMPLE.replace("sd_c =", "radial_coefficients = [{}]\nsd_c =")
     assert not any("printed" in each for each in written(text.format(right)).told())
     wrong = ", ".join(repr(-float(each)) for each in curve.coefficients)
-    assert any("printed coefficients differ" in each for each in written(text.format(wrong)).told())
+    told = written(text.format(wrong)).told()
+    assert any("they are those of the table with the other sign" in each for each in told)
 
 
 def test_tables_of_several_cameras_with_covariances(tmp_path):

@@ -1,6 +1,7 @@
 """Certificates and calibrations of scanners in projects: camera, marks and scanner with their covariances."""
 
 import json
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -262,3 +263,15 @@ def test_what_a_calibration_says_is_not_said_beside_it(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match=r"column sx: the calibration of the scanner scan1 says this"):
         read(tmp_path)
+
+
+def test_images_beyond_the_table_are_told_where_its_curve_is_worth_less(tmp_path: Path) -> None:
+    """The example has images to 143 mm, and its curve is worth more there than one of them."""
+    for each in (files("photogram") / "examples" / "archive").iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes())
+    assert not any("beyond the table" in str(each) for each in read(tmp_path).messages)
+    path = tmp_path / "rc10-2345.toml"
+    short = path.read_text().replace("30, 35, 40]", "30]").replace("-7, -1, 7]", "-7]")
+    path.write_text(short)
+    [told] = [str(each) for each in read(tmp_path).messages if "beyond the table" in str(each)]
+    assert "which ends at 88 mm; at 143 mm it is extrapolated" in told

@@ -188,6 +188,16 @@ def _plate(u: Numbers, p: Values) -> Numbers:
     return np.column_stack([column, row])
 
 
+def _cahvor(u: Numbers, p: Values) -> Numbers:
+    v, (a, b) = np.stack(_vision(u)), (p["axis_x"], p["axis_y"])
+    o = np.array([[np.cos(b) * np.sin(a)], [np.sin(b)], [np.cos(b) * np.cos(a)]])
+    along = np.sum(v * o, axis=0)
+    t = np.sum(v * v, axis=0) / along**2 - 1
+    mu = p["r0"] + p["r1"] * t + p["r2"] * t * t
+    bent = (1 + mu) * v - mu * along * o
+    return _pixels(p, bent[0] / bent[2], bent[1] / bent[2])
+
+
 FORWARD: dict[str, Callable[[Numbers, Values], Numbers]] = {
     "perspective": _perspective,
     "bal": _bal,
@@ -202,6 +212,7 @@ FORWARD: dict[str, Callable[[Numbers, Values], Numbers]] = {
     "full_opencv": _lens(_central, "k1 k2 k3/k4 k5 k6"),
     "opencv_pinhole": _lens(_central, "k1 k2 k3/k4 k5 k6"),
     "opencv_tilted": _lens(_central, "k1 k2 k3/k4 k5 k6"),
+    "cahvor": _cahvor,
     "fov": _lens(_fov, ""),
     "simple_fisheye": _lens(_equidistant, ""),
     "fisheye": _lens(_equidistant, ""),

@@ -84,6 +84,8 @@ SPECIAL = {
     "x0": 1.0,
     "y0": -1.0,
     "phi_T": 0.7,
+    "axis_x": 0.05,
+    "axis_y": -0.04,
 }
 SURELY_FREE = frozenset({"c", "f", "fx", "xp", "yp", "cx", "cy"})
 
@@ -183,11 +185,18 @@ class _Scene:
         if model == "equirectangular" and name in ("w", "h"):
             return {"w": 9000.0, "h": 4500.0}[name], 0.0
         if name in SPECIAL:
-            known = {"omega": 0.02, "alpha": 0.02, "beta": 0.02, "phi_T": 0.05}.get(name, 0.0)
-            return SPECIAL[name], known
+            known = {
+                "omega": 0.02,
+                "alpha": 0.02,
+                "beta": 0.02,
+                "phi_T": 0.05,
+                "axis_x": 0.01,
+                "axis_y": 0.01,
+            }
+            return SPECIAL[name], known.get(name, 0.0)
         if name == "c0":
             return (f if draw > 0 else 0.0), 0.0
-        if name == "r0":
+        if name == "r0" and power == 1:
             return (0.6 * reach if draw > 0 else 0.0), 0.0
         if name == "c_y" and draw < -0.3:
             return 0.0, 0.0
@@ -197,7 +206,7 @@ class _Scene:
         if power == 1:
             small = model == "on_comparator" and name[0] in "xy" and name[1] in "ABCDEFGHJ"
             return (1e-4 if small else 0.01) * reach * draw, (1e-4 if small else 3e-3) * reach
-        size = {"k": 0.02, "K": 0.01, "A": 0.01}.get(name[0], 1e-3)
+        size = {"k": 0.02, "r": 0.02, "K": 0.01, "A": 0.01}.get(name[0], 1e-3)
         size *= 1.0 if power == 0 else reach**power
         return size * draw, 0.3 * size
 
@@ -238,10 +247,14 @@ def _bare(names: dict[str, int]) -> dict[str, float]:
     return {name: 1.0 for name in needed if name in names}
 
 
-def random_network(seed: int, number: int) -> RandomNetwork:
-    """Return a random network: its cameras and its datum go through all there are as `number` grows."""
+def random_network(seed: int, number: int, first: str | None = None) -> RandomNetwork:
+    """Return a random network: its cameras and its datum go through all there are as `number` grows.
+
+    `first` is its first camera in the place of the one whose turn it is: so a network stays what it was when
+    there are more cameras.
+    """
     random = np.random.default_rng([seed, number])
-    first = MODELS[number % len(MODELS)]
+    first = first or MODELS[number % len(MODELS)]
     same_unit = [model for model in MODELS if ("c" in _names(model)) == ("c" in _names(first))]
     models = (first, str(random.choice(same_unit))) if random.random() < 0.5 else (first,)
     datum = DATUMS[(number // 2) % len(DATUMS)]

@@ -26,7 +26,7 @@ def test_a_datum_is_reached_that_its_carriers_contradict():
 
     The carriers come nowhere near to their places, and each move takes them a few per cent of the way only.
     """
-    network = random_network(7, 40)
+    network = random_network(7, 40, "brown_forward")
     found = compare(network)
     assert found.ending == "agree", found
     result = adjust(network.block, datum=network.datum)

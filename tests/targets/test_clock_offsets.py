@@ -3,13 +3,16 @@
 import math
 
 import numpy as np
+import pandas
 import pytest
 from given_targets import rig_small
+from typer.testing import CliRunner
 
 from photogram import InputError, RankError, adjust, formats
+from photogram.cli import app
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.network.cameras import Camera
-from photogram.targets import Board, Calibrated, Calibration, Corners, cross_validate, simulate_corners
+from photogram.targets import Board, Calibrated, Calibration, Corners, cross_validate, read, simulate_corners
 from photogram.targets.motion import errors_of_speeds, moving
 from photogram.targets.vision import of_vectors
 
@@ -137,6 +140,77 @@ def test_a_project_goes_on_where_it_ended(tmp_path):
     second = again.adjust()
     assert second.offsets["b"].values[0] == pytest.approx(found.offsets["b"].values[0], abs=1e-8)
     assert np.abs(second.sensors - found.sensors).max() < 1e-6
+
+
+def test_an_offset_is_weighed_in_the_table_of_rigs(tmp_path):
+    for name, content in formats.to_files(adjusted_project(rig().adjust()), "plain").items():
+        (tmp_path / name).write_bytes(content)
+    photos, rigs = tmp_path / "photos.csv", tmp_path / "rigs.csv"
+    clock = ["clock", "time_offset", "sd_time_offset"]
+    pandas.read_csv(photos).drop(columns=clock).to_csv(photos, index=False)
+    table = pandas.read_csv(rigs)
+    table.assign(time_offset=[None, 0.0121], sd_time_offset=[None, 1e-5]).to_csv(rigs, index=False)
+    again = calibration_of(formats.read(tmp_path))
+    assert again.offsets.tolist() == [0.0, 0.0121]
+    assert again.sd_offsets.tolist() == [np.inf, 1e-5]
+    assert again.adjust().offsets["b"].sd[0] < 1e-5
+    frames = pandas.DataFrame({"frame": ["a01"], "rig": ["rig"], "photo": ["b01"], "sensor": ["b"]})
+    frames.to_csv(tmp_path / "frames.csv", index=False)
+    with pytest.raises(InputError, match="has a time_offset of b: its photos are on trajectories"):
+        formats.read(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Return corners and a board as users have them."""
+    found, corners = tmp_path_factory.mktemp("clocks"), rig().corners
+    table = {
+        "image": np.array(corners.pictures)[corners.picture],
+        "camera": np.array(["a", "b"])[corners.cameras[corners.picture]],
+        "view": corners.views[corners.picture],
+        "time": corners.times[corners.picture],
+        "point": corners.point,
+        "x": corners.xy[:, 0],
+        "y": corners.xy[:, 1],
+    }
+    pandas.DataFrame(table).to_csv(found / "corners.csv", index=False)
+    (found / "board.toml").write_text(
+        'kind = "chessboard"\ncolumns = 9\nrows = 6\nspacing = 0.03\nshape = "held"\n'
+        "picture_size = [640, 480]\n"
+    )
+    return found
+
+
+def test_what_is_known_of_an_offset_weighs_it(folder):
+    known = {"sd0": 0.1, "sync": "offset", "model": "opencv4"}
+    free = read(folder, **known).adjust().offsets["b"]
+    weighed = read(folder, **known, offsets={"b": (LATE, 1e-5)}).adjust().offsets["b"]
+    assert 2e-5 < free.sd[0] < 1e-4
+    assert weighed.sd[0] == pytest.approx((1e10 + free.sd[0] ** -2) ** -0.5, rel=0.02)
+    assert abs(weighed.values[0] - LATE) < 2e-5
+    with pytest.raises(InputError, match="the camera a has no offset: cameras with one are b"):
+        read(folder, **known, offsets={"a": (0.0, 0.0)})
+
+
+def test_it_is_an_option_of_the_command(folder, tmp_path):
+    def run(*words):
+        out = ("--out", tmp_path / "out", "--no-html", "--cross-validate", "none")
+        return CliRunner().invoke(app, ["calibrate", *map(str, (folder, *words, *out))])
+
+    done = run("--sync", "offset", "--offset", "b=0.0119,1e-6", "--sd", "images=0.1")
+    assert done.exit_code in (0, 4), done.output
+    report = (tmp_path / "out" / "report.txt").read_text()
+    (clock,) = [line.split() for line in report.splitlines() if line.startswith("clock of b")]
+    assert float(clock[-4]) == pytest.approx(0, abs=1e-6), clock
+    assert float(clock[-3]) == 1e-6
+    assert "54 points held where given, which nothing tests: 0, 1" in report
+    assert "54 points of the board, held, in 38 pictures each" in report
+    for words, said in (
+        (["--offset", "b=0"], "--sync offset makes them unknowns"),
+        (["--sync", "offset", "--offset", "b=x"], "is CAMERA=S or CAMERA=S,SD"),
+        (["--sync", "offset", "--offset", "b=1,-1"], "is CAMERA=S or CAMERA=S,SD"),
+    ):
+        assert said in " ".join(run(*words).output.split()), words
 
 
 def test_corners_are_drawn_where_the_board_is_at_their_time():

@@ -80,7 +80,7 @@ def test_what_makes_no_sense_is_refused(lens, arguments, code, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"lensmodel": "LENSMODEL_CAHVOR"}, "LENSMODEL_CAHVOR is none of the lenses that are taken"),
+        ({"lensmodel": "LENSMODEL_LATLON"}, "LENSMODEL_LATLON is none of the lenses that are taken"),
         ({"intrinsics": VALUES[:5]}, "LENSMODEL_OPENCV4 has 8 values, not 5"),
         ({"imagersize": None}, "is no camera model"),
     ],

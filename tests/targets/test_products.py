@@ -9,7 +9,7 @@ import pytest
 from given_targets import golden
 from golden_calibrations import adjusted_rig
 
-from photogram import Camera, InputError
+from photogram import Camera, InputError, variance_components
 from photogram.targets import read
 from photogram.targets.datums import datum_rows
 from photogram.targets.differences import difference
@@ -190,3 +190,14 @@ def test_the_file_of_mrcal_gives_its_map():
 )
 def test_contours_enclose_what_they_show(low, high, steps):
     assert steps_of_125(low, high) == pytest.approx(steps)
+
+
+def test_cameras_and_levels_have_variance_components(calibrated):
+    """Corners of the golden data are drawn with 0.3 px times 2^level."""
+    block = calibrated.calibration.block()
+    levels = [f"level {level:.0f}" for level in np.log2(block.image_sd[:, 0] / block.image_sd.min())]
+    for groups, count in (("camera", 2), ({"images": levels}, len(set(levels)))):
+        found = variance_components(block, groups).estimate
+        assert found.converged
+        assert len(found.factors) >= count
+        assert all(each.held or 0.7 < each.factor < 1.4 for each in found.components)

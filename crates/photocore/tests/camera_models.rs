@@ -177,6 +177,7 @@ fn a_lens_ends_where_its_radial_part_does() {
         ("opencv_fisheye", vec![1000.0, 1000.0, 0.0, 0.0, -0.2, 0.0, 0.0, 0.0]),
         ("fov", vec![1000.0, 1000.0, 0.0, 0.0, 0.9]),
         ("simple_division", vec![1000.0, 0.0, 0.0, 0.2]),
+        ("cahvor", vec![1000.0, 1000.0, 0.0, 0.0, 0.0, 0.0, 0.01, -0.3, 0.02]),
     ] {
         let camera = Camera::named(name, &parameters).unwrap();
         let edge = 1000.0 * camera.radial_limit().unwrap().distorted;
@@ -241,6 +242,7 @@ fn cameras_say_what_they_fold_and_where_they_look() {
         ("bal", vec![1000.0, -0.3, 0.0]),
         ("radial", vec![1000.0, 500.0, 500.0, -0.3, 0.0]),
         ("simple_radial", vec![1000.0, 500.0, 500.0, -0.3]),
+        ("cahvor", vec![1000.0, 1000.0, 500.0, 500.0, 0.0, 0.0, 0.0, -0.3, 0.0]),
         ("brown_forward", vec![-1.0, 0.0, 0.0, -0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     ] {
         let camera = Camera::named(name, &parameters).unwrap();

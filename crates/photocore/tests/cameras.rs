@@ -48,6 +48,16 @@ fn written_out(name: &str, v: &[C]) -> Option<[C; 2]> {
             let [x, y] = radial(v[6], v[7]);
             Some([v[4] + x, v[5] - y])
         }
+        "cahvor" => {
+            let ray = [v[0], -v[1], -v[2]];
+            let axis = [v[8].cos() * v[7].sin(), v[8].sin(), v[8].cos() * v[7].cos()];
+            let dot = |a: &[C; 3], b: &[C; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let along = dot(&ray, &axis);
+            let t = dot(&ray, &ray) / (along * along) - 1.0;
+            let mu = v[9] + v[10] * t + v[11] * t * t;
+            let bent: Vec<C> = (0..3).map(|k| (1.0 + mu) * ray[k] - mu * along * axis[k]).collect();
+            Some([v[3] * bent[0] / bent[2] + v[5], v[4] * bent[1] / bent[2] + v[6]])
+        }
         _ => None,
     }
 }

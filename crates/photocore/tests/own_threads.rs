@@ -78,7 +78,7 @@ fn block(strips: usize, points: usize) -> Network {
 
 fn adjust_block(network: &Network, threads: &Threads) {
     let options = Options::default();
-    let solution = network.adjustment(&options).kept().on(threads).watched(&mut go).run().unwrap();
+    let solution = network.adjustment(&options).kept(&[0, 1]).on(threads).watched(&mut go).run().unwrap();
     let covariances = network.covariances(&options, &solution.state, None, threads, &mut go).unwrap();
     covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, threads, &mut go).unwrap();
     network.adjustment(&options).from_state(&solution.state).on(threads).watched(&mut go).run().unwrap();

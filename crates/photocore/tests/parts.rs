@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use crate::cut::{Cut, TREES};
 use photocore::normals::{
     Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
-    Prior, SolveOptions, System, Tie, TieRows,
+    Prior, ReducedRights, SolveOptions, System, Tie, TieRows,
 };
 use photocore::{Stopped, Threads};
 use proptest::prelude::*;
@@ -197,6 +197,79 @@ fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((actual - expected).abs() <= tolerance, "{what}: {actual:e} instead of {expected:e}");
 }
 
+/// The unknowns of a node as the whole system numbers them.
+fn unknowns_of(all: &Piece<'_>, piece: &Piece<'_>) -> Vec<usize> {
+    let locals = piece.locals.iter().flat_map(|&local| all.layout.local_range(local));
+    locals.chain(piece.retained.iter().flat_map(|&block| all.layout.retained_range(block))).collect()
+}
+
+/// Right-hand sides at a time: more than go through the elimination of local blocks together.
+const COLUMNS: usize = 9;
+
+/// What nodes are given, are over and were factored to.
+type Nodes<'a> = Vec<(Piece<'a>, System, Factor)>;
+
+/// Right-hand sides reduced from the leaves up, and the sum of their products.
+fn reduced(
+    rights: &[f64],
+    (all, cut, nodes): (&Piece<'_>, &Cut, &Nodes<'_>),
+    threads: &Threads,
+) -> (Vec<ReducedRights>, Vec<f64>) {
+    let count = all.layout.unknowns();
+    let (mut found, mut products): (Vec<ReducedRights>, _) = (vec![], vec![0.0; COLUMNS * COLUMNS]);
+    for (p, (piece, system, factor)) in nodes.iter().enumerate() {
+        let (own, names) = (system.layout(), unknowns_of(all, piece));
+        let columns = rights.chunks_exact(count);
+        let mut here: Vec<f64> = columns.flat_map(|right| names.iter().map(|&name| right[name])).collect();
+        for right in here.chunks_exact_mut(names.len().max(1)) {
+            own.unknowns_of(own.outer()).for_each(|unknown| right[unknown] = 0.0);
+        }
+        for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
+            let places: Vec<usize> = own.unknowns_of(blocks).collect();
+            for (i, value) in found[child].left().iter().enumerate() {
+                here[i / places.len() * names.len() + places[i % places.len()]] += value;
+            }
+        }
+        let of = (piece as &dyn Equations, &piece.prior);
+        let reduced = done(system.reduce_rights(threads, factor, of, &here, &mut go));
+        products.iter_mut().zip(&reduced.products).for_each(|(sum, value)| *sum += value);
+        found.push(reduced);
+    }
+    (found, products)
+}
+
+/// Right-hand sides that go up and down again through a system that is cut against those of one piece.
+fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
+    let (system, count) = (System::new(all.layout.clone(), ordering).unwrap(), all.layout.unknowns());
+    let rights: Vec<f64> = (0..COLUMNS * count).map(|i| number(all.seed, i, 17)).collect();
+    let factor = done(system.factor(threads, all, &all.prior, &FactorOptions::default(), &mut go));
+    let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
+    let expected = done(system.solve(threads, &factor, all, &all.prior, &options, &mut go));
+    let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let nodes = upward(all, cut, ordering, threads);
+    let (mut found, products) = reduced(&rights, (all, cut, &nodes), threads);
+    for (at, product) in products.iter().enumerate() {
+        let (right, x) = (&rights[at / COLUMNS * count..], &expected[at % COLUMNS * count..]);
+        let exact = right.iter().zip(x).take(count).map(|(b, x)| b * x).sum();
+        assert_close(*product, exact, 1e-9 * largest * count as f64, "product");
+    }
+    let mut handed: Vec<Vec<f64>> = vec![vec![]; nodes.len()];
+    for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
+        let (own, names) = (system.layout(), unknowns_of(all, &piece));
+        let (of, outer) = ((&piece as &dyn Equations, &piece.prior), std::mem::take(&mut handed[p]));
+        let reduced = found.remove(p);
+        let x = done(system.solve_reduced_rights(threads, &factor, of, reduced, &outer, &mut go));
+        for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
+            let of_column = |column: &[f64]| own.unknowns_of(blocks).map(|at| column[at]).collect::<Vec<_>>();
+            handed[child] = x.chunks_exact(names.len().max(1)).flat_map(of_column).collect();
+        }
+        for (at, x) in x.iter().enumerate() {
+            let exact = expected[at / names.len() * count + names[at % names.len()]];
+            assert_close(*x, exact, 1e-9 * largest, "solution of a right-hand side");
+        }
+    }
+}
+
 /// Solution, sums and cofactors of a system that is cut against those of one piece.
 fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u64, ordering: Ordering) {
     let threads = threads(2);
@@ -208,6 +281,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
     let cofactors =
         done(system.invert(&threads, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
+    compare_rights(&all, &cut, ordering, &threads);
     let nodes = upward(&all, &cut, ordering, &threads);
     let sums = nodes.iter().map(|(.., factor)| factor.sum_of_squares).sum();
     assert_close(sums, sum, 1e-12 * sum, "sum of squares");
@@ -230,10 +304,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
             &mut go,
         ));
         let own = system.layout();
-        let unknowns = piece.locals.iter().flat_map(|&local| all.layout.local_range(local));
-        let unknowns =
-            unknowns.chain(piece.retained.iter().flat_map(|&block| all.layout.retained_range(block)));
-        for (x, unknown) in step.iter().zip(unknowns) {
+        for (x, unknown) in step.iter().zip(unknowns_of(&all, &piece)) {
             assert_close(*x, expected[unknown], 1e-9 * largest, "solution");
         }
         let found = done(system.invert(

@@ -7,7 +7,6 @@ commas; a missing control coordinate is a word `-`, or nothing between two comma
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number, whole_number

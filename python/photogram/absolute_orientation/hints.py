@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.statistics.likelihood import judged
 
 __all__ = ["Fit", "Hint", "Trial", "find", "trials", "undecided", "unit_of"]

@@ -7,7 +7,6 @@ are what the engine and `orient` do already.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +16,7 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError, RankError
 from photogram.network.block import Block, refuse_trajectories
 from photogram.network.chosen import kept_images, of_photos

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.messages import Message, listed
 from photogram.results.iteration import Iteration
 from photogram.show.brief import Brief

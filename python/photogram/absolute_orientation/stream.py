@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
-from photogram.results.iteration import iteration_table
+from photogram.results.iterations_told import iteration_table
 from photogram.show.page import Fact, significant
 from photogram.show.quantity import Axis, Quantity, chosen, frame, long
 from photogram.show.ways import columns_of

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -17,6 +16,7 @@ from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.started import started
 from photogram.adjustment.undetermined import one_place, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, whole_number
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message, listed
@@ -26,19 +26,30 @@ from photogram.network.datum import (
     DatumRow,
     InnerConstraints,
     MinimumConstraints,
+    check_datum,
     datum_row,
     minimum_row,
 )
 from photogram.network.motion import refuse_datum
 from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
-from photogram.results.datum import datum_messages, datum_of, refused
+from photogram.results.check_points import tested_together
+from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.show.ways import Way
 
-__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust", "adjusted_again", "teller"]
+__all__ = [
+    "AsPublished",
+    "Ordering",
+    "Progress",
+    "UnitVariance",
+    "adjust",
+    "adjusted_again",
+    "core_options",
+    "teller",
+]
 
 UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
 Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
@@ -171,8 +182,37 @@ def adjust(
     keep = isinstance(covariance, str) and covariance == "verdict"
     if not (keep or isinstance(covariance, bool | np.bool_)):
         raise InputError(f"covariance is True, False or 'verdict', not {shown(covariance)}")
-    if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
-        raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
+    check_datum(datum)
+    options = core_options(
+        unit_variance, loss, bool(covariance), tolerance, max_iterations, ordering=ordering
+    )
+    processors = core_threads(threads)
+    check_cameras(block)
+    if datum is not None:
+        refuse_datum(block, "datum")
+    block = started(block)
+    inner = datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
+    if isinstance(datum, MinimumConstraints):
+        options = replace(options, minimum=minimum_row(block, datum))
+    return _adjusted(block, options, processors, progress, inner, keep=keep)
+
+
+def core_options(
+    unit_variance: UnitVariance,
+    loss: Loss | None,
+    covariance: bool = True,
+    tolerance: float | AsPublished = 1e-5,
+    max_iterations: int | None = None,
+    *,
+    ordering: Ordering = "auto",
+) -> CoreOptions:
+    """Return how the core adjusts, no unknowns being chosen to be held: options of :func:`adjust`.
+
+    Raises
+    ------
+    InputError
+        An option that cannot be.
+    """
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     row = loss_row(loss)
     as_published = isinstance(tolerance, AsPublished)
@@ -180,27 +220,20 @@ def adjust(
     if max_iterations is None:
         max_iterations = AS_PUBLISHED if as_published else most_iterations(row)
     check_iteration(ordering, max_iterations, limit)
-    processors = core_threads(threads)
     if unit_variance == "redundancy" and not covariance:
         raise InputError("unit_variance='redundancy' needs redundancy numbers: covariance=True")
     if row and as_published:
         raise InputError("the 1987 program has no robust loss: AsPublished or loss")
-    check_cameras(block)
-    if datum is not None:
-        refuse_datum(block, "datum")
-    block = started(block)
-    inner = datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
-    options = CoreOptions(
+    return CoreOptions(
         criterion="percent" if as_published else "fraction",
         limit=limit,
         max_iterations=max_iterations,
-        covariance=bool(covariance),
+        covariance=covariance,
         loss=row,
         ordering=ordering,
         unit_variance=unit_variance,
-        minimum=minimum_row(block, datum) if isinstance(datum, MinimumConstraints) else None,
+        minimum=None,
     )
-    return _adjusted(block, options, processors, progress, inner, keep=keep)
 
 
 def adjusted_from(
@@ -235,7 +268,9 @@ def _adjusted(
     network = block_network(block, options)
     try:
         told = None if progress is None else teller(progress)
-        solution = network.adjust(datum=inner, threads=processors, progress=told, keep=keep)
+        solution = network.adjust(
+            datum=inner, threads=processors, progress=told, keep=tested_together(block) if keep else None
+        )
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
@@ -289,11 +324,19 @@ def _result(
     inner: DatumRow | None = None,
 ) -> Result:
     datum = datum_of(block, solution, inner)
+    messages = messages_of(block, solution, options, datum)
+    return Result.from_solution(block, solution, options, datum, messages, freedom)
+
+
+def messages_of(
+    block: Block, solution: _photocore.BlockSolution, options: CoreOptions, datum: ResultDatum
+) -> list[Message]:
+    """Return what a result remarks on, but for hints."""
     messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     messages += remark(options.loss, solution.image_weights)
     if options.criterion == "percent":
         messages += _rises([Iteration(*row) for row in solution.iterations])
-    return Result.from_solution(block, solution, options, datum, messages, freedom)
+    return messages
 
 
 def teller(

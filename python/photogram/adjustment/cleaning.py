@@ -8,7 +8,6 @@ rest still contradicts its weights are these estimated, and snooping begins anew
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from photogram.adjustment.components import Settings, of_grouping, scaled
 from photogram.adjustment.snooping import snoop
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.messages import counted
 from photogram.results.components import VarianceComponents, component_lines, statement
 from photogram.results.group_sums import Probing, observables

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from photogram.adjustment.adjustment import adjust, adjusted_again
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.observations.observation import Observation

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from photogram.adjustment.adjustment import UnitVariance, adjust
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.results.cameras import AdjustedCamera

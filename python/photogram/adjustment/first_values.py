@@ -6,7 +6,6 @@ in which order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -16,6 +15,7 @@ from photogram import _photocore
 from photogram.adjustment.known import Cartesian, Known
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message, counted, listed
 from photogram.network.attitudes import Attitudes

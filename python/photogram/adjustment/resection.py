@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
@@ -26,6 +25,7 @@ from photogram.arguments.arrays import (
     whole_number,
 )
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.network.geometry import Spheroid

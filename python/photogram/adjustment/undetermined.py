@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.adjustment.coefficients import named_unknowns, of_motion
+from photogram.declared import dataclass
 from photogram.errors import RankError
 from photogram.messages import listed
 from photogram.network.block import Block, flown_by

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -42,9 +41,10 @@ from photogram.cli.projects import (
     with_options,
 )
 from photogram.cli.stating import stated, statement_files
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
-    from photogram import Block, FirstValues, Result
+    from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result
     from photogram.adjustment.robust import Loss
     from photogram.cli.pictures import Pictures
     from photogram.distributed import Division
@@ -112,6 +112,10 @@ class Choices:
             show_default=False,
         ),
     ] = None
+
+    def datum_of(self, project: Project) -> str | None:
+        """Return the name of the datum: what is chosen, else that of the project."""
+        return self.datum.value if self.datum is not None else project.options.datum
 
     def loss_of(self, project: Project) -> Loss | None:
         """Return the robust loss: what is chosen, else that of the project; None for least squares."""
@@ -198,7 +202,7 @@ def adjust(
             check_place(project.block, documents.crs)
         block, started = started_block(project, keep_all=keep_all)
         if divided.plan:
-            _planned(project, block, division)
+            _planned(project, block, choices, division)
             return
         for remark in started.messages if started is not None and not quiet else ():
             print_remark(str(remark))
@@ -221,11 +225,16 @@ def adjust(
         _finish(job, project, result, removed, target, documents, pictures, sections, own, strict=strict)
 
 
-def _planned(project: Project, block: Block, division: Division | None) -> None:
+def _planned(project: Project, block: Block, choices: Choices, division: Division | None) -> None:
     """Print how a block would be adjusted in parts."""
     from photogram.distributed import Division, plan_in_parts
 
-    plan = plan_in_parts(block, division or Division(), unit_variance=project.options.unit_variance)
+    plan = plan_in_parts(
+        block,
+        division or Division(),
+        datum=_datum(choices.datum_of(project)),
+        unit_variance=project.options.unit_variance,
+    )
     output.print("\n".join(plan.lines()))
     plan.check()
 
@@ -377,16 +386,15 @@ def adjusted_block(
     from photogram.formats.additions import repeated_remarks
     from photogram.results.fitting import with_features
 
-    chosen = choices.datum.value if choices.datum is not None else project.options.datum
+    chosen = choices.datum_of(project)
     with job.status("adjusting") as status:
         how: dict[str, Any] = {
             "unit_variance": project.options.unit_variance,
-            "ordering": ordering.value,
             "threads": threads,
             "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
         }
         with errors_explained(block):
-            call = adjusting(project, _call(chosen, choices.loss_of(project), division))
+            call = adjusting(project, _call(chosen, choices.loss_of(project), ordering, division))
             if isinstance(block, FirstValues):
                 result = adjust_started(block, by=call, **how)
             else:
@@ -402,19 +410,27 @@ def adjusted_block(
     return with_features(told, project.features)
 
 
-def _call(datum: str | None, loss: Loss | None, division: Division | None) -> Callable[..., Result]:
-    """Return the call that adjusts: in one process, or in parts, where no datum is chosen."""
+def _call(
+    name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
+) -> Callable[..., Result]:
+    """Return the call that adjusts: in one process, or in parts, whose photos have an order of their own."""
+    from photogram import adjust, adjust_in_parts
+
+    datum = _datum(name)
     if division is None:
-        from photogram import InnerConstraints, MinimumConstraints, adjust
+        return partial(adjust, datum=datum, loss=loss, ordering=ordering.value, covariance="verdict")
+    if ordering is not OrderingName.AUTO:
+        raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--ordering")
+    return partial(adjust_in_parts, division=division, datum=datum, loss=loss)
 
-        held: dict[str | None, InnerConstraints | MinimumConstraints]
-        held = {"inner": InnerConstraints(), "minimum": MinimumConstraints()}
-        return partial(adjust, datum=held.get(datum), loss=loss, covariance="verdict")
-    from photogram import InputError, adjust_in_parts
 
-    if datum in ("inner", "minimum"):
-        raise InputError("in parts there is no datum to choose")
-    return partial(adjust_in_parts, division=division, loss=loss)
+def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
+    """Return the datum of a name; None where control or observations give it."""
+    from photogram import InnerConstraints, MinimumConstraints
+
+    if name == "inner":
+        return InnerConstraints()
+    return MinimumConstraints() if name == "minimum" else None
 
 
 def _files(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, defaul
 from photogram.cli.progress import shown
 from photogram.cli.projects import Deviations, OriginName, with_options
 from photogram.cli.uncertainty import AS_USUAL, Uncertainty
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibrated, Calibration
@@ -59,7 +60,7 @@ class PriorName(StrEnum):
     MRCAL = "mrcal"
 
 
-PLAIN_GOES = "--shape, --sd, --regularise alone"
+PLAIN_GOES = "--shape, --sd, --regularise, --offset alone"
 """Options that go with a plain project."""
 
 
@@ -116,6 +117,15 @@ class Seen:
             " whose offsets are unknown."
         ),
     ] = SyncName.KNOWN
+    offsets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--offset",
+            metavar="CAMERA=S[,SD]",
+            help="What is known of the offset of a camera's clock, s; SD 0: held. Again for each.",
+            show_default=False,
+        ),
+    ] = None
     pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
         OriginName.CENTER
     )
@@ -177,6 +187,7 @@ class Seen:
             within=self.within,
             size=None if self.size is None else pair(self.size, "--size"),
             sd0=self._sd0(),
+            offsets=_offsets(self.offsets or []),
             progress=progress,
             **given,
         )
@@ -187,14 +198,15 @@ class Seen:
         from photogram.formats.targets.calibrations import calibration_of
 
         found = calibration_of(formats.read(path))
-        if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise):
+        if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets):
             raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
         changes: dict[str, Any] = {"regularise": self.regularise and self.regularise.value}
         if self.shape is not None:
             changes["board"] = found.board.replace(shape=self.shape.value)
         if self.sd is not None:
             changes["sd0"] = self._sd0()
-        return found.replace(**changes)
+        found = found.replace(**changes)
+        return found.with_offsets(_offsets(self.offsets)) if self.offsets else found
 
     def _board(self) -> Board | Path | None:
         """Return the board of `--board` and `--spacing`, or the file that describes it."""
@@ -229,6 +241,21 @@ def _deviations(text: str) -> tuple[float, float]:
     except ValueError:
         raise typer.BadParameter(f"is two numbers, 1,0.1, not {text}", param_hint="--knot-sd") from None
     return radial, tangential
+
+
+def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
+    """Return offsets of clocks with their standard deviations by cameras, from words as `right=0,0.01`."""
+    found = {}
+    for each in given:
+        camera, _, numbers = each.rpartition("=")
+        try:
+            offset, sd = map(float, (numbers if "," in numbers else f"{numbers},inf").split(","))
+        except ValueError:
+            offset = sd = math.nan
+        if not (camera and math.isfinite(offset) and sd >= 0):
+            raise typer.BadParameter(f"is CAMERA=S or CAMERA=S,SD, not {each}", param_hint="--offset")
+        found[camera] = offset, sd
+    return found
 
 
 @with_job

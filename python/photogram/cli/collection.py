@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,6 +26,7 @@ from photogram.cli.options import (
 )
 from photogram.cli.progress import shown
 from photogram.cli.projects import with_options
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
@@ -12,6 +11,7 @@ import typer
 
 from photogram.cli.console import ON_TOP
 from photogram.cli.job import Job
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.adjustment.cleaning import Cleaned

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +12,7 @@ from photogram.cli.console import output
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Plots, Quiet, out_option, pair
 from photogram.cli.projects import with_options
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.network.cameras import Camera

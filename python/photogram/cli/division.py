@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from photogram.cli.job import Writes
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.distributed import Division

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +19,7 @@ from photogram.cli.projects import (
     with_options,
 )
 from photogram.cli.results import result_at
+from photogram.declared import dataclass, fields
 
 if TYPE_CHECKING:
     from photogram.results.features import Definition
@@ -67,7 +67,7 @@ def features(
     job: Job,
     path: ProjectPath = None,
     example: Example = False,
-    wanted: Wanted = Wanted(),  # frozen
+    wanted: Wanted = Wanted(),  # noqa: B008  # frozen
     k: Annotated[float, typer.Option("-k", metavar="K", min=0.01, help="Coverage factor: U = k sd.")] = 2.0,
     coverage: Annotated[
         float | None,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +15,7 @@ from photogram.cli.job import Job
 from photogram.cli.options import Ordering, OrderingName, Snooping
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram import Block, Progress, Result

@@ -13,7 +13,7 @@ PANELS = {
     " settings cubes jigsaw photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
     " against_spacing against_position_sd catalogue utc epoch faintest points point_sd decimals"
     " format zero_missing ground_unit model_unit restart start reject photos kind board spacing unit"
-    " shape knots knot_sd cameras size views within sync",
+    " shape knots knot_sd cameras size views within sync offsets",
     "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"
     " pdf to trace points_out part_two restart_out ident date",
     "Adjustment": "datum datum_points hold loss scale tolerance max_iterations covariance unit_variance"

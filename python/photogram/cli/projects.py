@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import wraps
 from inspect import signature
@@ -15,6 +14,7 @@ import typer
 from photogram.cli.job import Job, Reads
 from photogram.cli.photographs import MrkAntenna, PhotosCrs, PhotosFolder
 from photogram.cli.planetary import CubesFile, JigsawSettings
+from photogram.declared import dataclass
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:

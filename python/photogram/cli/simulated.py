@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import wraps
 from inspect import Parameter, signature
@@ -14,6 +13,7 @@ import typer
 
 from photogram.cli.refraction import AirModel, WaterModel
 from photogram.cli.simulated_motion import MotionOptions
+from photogram.declared import dataclass, fields
 
 __all__ = ["Control", "Ellipsoid", "NetworkOptions", "takes_network"]
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from photogram.declared import dataclass, fields
 
 if TYPE_CHECKING:
     from photogram.network.simulated_motion import LineScanner, RollingShutter

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,6 +22,7 @@ from photogram.cli.projects import (
 )
 from photogram.cli.results import project_beside, result_at
 from photogram.cli.stating import stated, statement_files
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.results.statement.statement import Statement
@@ -151,7 +151,7 @@ def statement(
         Writes.DIRECTORY,
         out_option("Directory for the page, PDF, JSON and tables. Default: PATH-statement."),
     ] = None,
-    wanted: Wanted = Wanted(),  # frozen
+    wanted: Wanted = Wanted(),  # noqa: B008  # frozen
     crs: Crs = None,
     added: Additions = NOTHING,
     threads: Threads = None,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from photogram.cli.job import Job, Reads
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from photogram.collection.collection import Collection
 from photogram.collection.core import collection_network
 from photogram.collection.failures import named
 from photogram.collection.suspects import collection_trial
+from photogram.declared import dataclass, replace
 from photogram.results.covariance import Failure
 from photogram.results.network import AdjustedNetwork
 from photogram.results.selection import Adjusted, Things

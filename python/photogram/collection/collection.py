@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,6 +12,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import indices, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.collection.adjusted import AdjustedCollection
-from photogram.results.iteration import iteration_lines
+from photogram.results.iterations_told import iteration_lines
 from photogram.results.network_tables import control, iterations, photos, stations
 from photogram.results.observed import image_lines, observed_lines
 from photogram.results.report import first_sections, reliability_lines, suspects_section

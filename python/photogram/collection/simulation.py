@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 __all__ = ["Simulation", "simulate", "simulate_turntable"]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.comparator.decomposition import Decomposition, decomposition_jacobian
 from photogram.comparator.residuals import Residuals
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
 
 if TYPE_CHECKING:

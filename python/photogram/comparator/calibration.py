@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +42,7 @@ from photogram.comparator.significance import (
     polynomial_tests,
 )
 from photogram.comparator.variance import VarianceAnalysis, analyse_variance
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError
 from photogram.memory import require
 from photogram.messages import Message

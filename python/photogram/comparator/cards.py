@@ -7,13 +7,13 @@ with comparator number 0 (a blank card) ends the job. Blanks in numbers count as
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
 from photogram.comparator.readings import Reading, Session, collect_cases
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io.records import Record, Source
 from photogram.messages import Message

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,7 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import COUNT, Polynomial, fit_polynomial
 from photogram.comparator.residuals import Residuals
 from photogram.comparator.rigid import RigidFit, fit_rigid
+from photogram.declared import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

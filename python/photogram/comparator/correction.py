@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ import orjson
 from photogram.arguments.arrays import is_covariance
 from photogram.comparator.identity import Identity
 from photogram.comparator.polynomial import Frame, Polynomial, design
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes

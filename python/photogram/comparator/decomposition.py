@@ -6,10 +6,11 @@ Exactly, not to first order (NOAA TR NOS 57, equations 33 to 38, 46, 47 and 54).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

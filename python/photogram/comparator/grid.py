@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.annotations import path
 from photogram.comparator.csvfile import read_table
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number, whole_number
 from photogram.show.brief import Brief

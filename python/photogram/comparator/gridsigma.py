@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
 from photogram.comparator.reduction import GridErrors, Reduction
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.comparator.averages import PlateAverages

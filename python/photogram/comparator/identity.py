@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.comparator.polynomial import Frame
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 if TYPE_CHECKING:

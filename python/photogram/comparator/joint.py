@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +19,7 @@ from photogram.comparator.correction import PARAMETERS, Correction
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial
 from photogram.comparator.residuals import Residuals
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
 from photogram.statistics.limits import GlobalTest, global_test
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.comparator.grouping import rows_by_point
 from photogram.comparator.readings import Case
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 
 if TYPE_CHECKING:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.neighbours import mutually_nearest
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +24,7 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.reduction import Reduction
 from photogram.comparator.rigid import fit_rigid
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError
 from photogram.statistics.limits import externally_studentized, studentized_limit
 

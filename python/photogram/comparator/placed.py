@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +10,7 @@ from photogram.comparator.grouping import group, group_as_listed
 from photogram.comparator.legs import reduce_legs
 from photogram.comparator.orientation import Orientation, detect_orientation, exchanged
 from photogram.comparator.pointing import PointReadings, pool, read_points
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 if TYPE_CHECKING:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.comparator.grouping import group
+from photogram.declared import dataclass, field
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

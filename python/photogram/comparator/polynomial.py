@@ -7,12 +7,12 @@ the scaled columns one of a few tens.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
 
 if TYPE_CHECKING:

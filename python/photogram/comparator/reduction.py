@@ -14,7 +14,6 @@ products of U, W and the errors of the grid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import Frame, design
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

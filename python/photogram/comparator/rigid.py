@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.residuals import Residuals
+from photogram.declared import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

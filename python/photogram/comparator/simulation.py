@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ from photogram.comparator.correction import Correction
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.readings import Case, Session
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io.places import Place
 

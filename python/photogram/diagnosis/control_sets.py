@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.editing import tests
 from photogram.diagnosis.findings import Explained

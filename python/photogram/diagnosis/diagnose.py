@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import shown
+from photogram.declared import dataclass, field, replace
 from photogram.diagnosis.adjusted import diagnosis_of
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.control import control

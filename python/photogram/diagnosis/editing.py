@@ -7,11 +7,11 @@ before the block is adjusted anew, and the others are judged again.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, field, replace
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
 from photogram.diagnosis.gross import Suspects

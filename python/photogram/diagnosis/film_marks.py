@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.diagnosis.robust import critical
 from photogram.messages import Message, counted, listed
 from photogram.network.films import Mark

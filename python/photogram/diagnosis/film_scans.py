@@ -36,12 +36,13 @@ def seam_hints(result: Result) -> list[Message]:
     value, step, axis, row, pitch = max(found, default=(0.0, 0.0, 0, 0, 1.0))
     if not value > critical(4 * len(result.films)):
         return []
-    halves, unit = ("left and right", "upper and lower")[axis], "mm" if pitch == 1.0 else "px"
+    halves, seam = (("left and right", "seam_column"), ("upper and lower", "seam_row"))[axis]
+    unit = "mm" if pitch == 1.0 else "px"
     return [
         Message(
             f"the {halves} halves of the scan of {block.photo_ids[row]} are shifted against each other,"
-            f" residuals show {step:.2g} {unit}: was the film scanned in two parts that were joined? The film"
-            " of a photo is one piece here: leave a half out, or scan the whole anew"
+            f" residuals show {step:.2g} {unit}: was the film scanned in two parts that were joined? Then"
+            f" {seam} of the table photos, the line where they meet, gives each its own film"
         )
     ]
 

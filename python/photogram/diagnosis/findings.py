@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from photogram import _photocore
 from photogram.arguments.types import Bools
+from photogram.declared import asdict, dataclass, field
 from photogram.io import json
 from photogram.show.brief import Brief, Rows
 from photogram.show.sections import composed, headline

@@ -5,12 +5,12 @@ Coarse stations leave large residuals with a pattern; what counts is a break in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.diagnosis.findings import Finding, Level, Section
 from photogram.diagnosis.robust import fit, mad_sd
 from photogram.network.block import Block

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.diagnosis.regression import Regression, given_points
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet

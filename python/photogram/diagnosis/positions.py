@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.findings import Explained
 from photogram.diagnosis.hypotheses import FOOT

@@ -6,11 +6,10 @@ m = rms(observed - predicted) / rms(observed - mean),     e = rms(residual of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 

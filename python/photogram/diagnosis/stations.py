@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.diagnosis.findings import Finding, Level, Section
 from photogram.diagnosis.robust import MAD_TO_SD, fit
 from photogram.network import geometry

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Indices
+from photogram.declared import dataclass, replace
 from photogram.diagnosis.hypotheses import Change
 from photogram.network.block import Block
 from photogram.network.chosen import kept_images

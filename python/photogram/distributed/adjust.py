@@ -3,27 +3,46 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from photogram.adjustment.adjustment import Ordering, Progress, UnitVariance, adjust, core_threads
+from photogram.adjustment.adjustment import (
+    AsPublished,
+    Progress,
+    UnitVariance,
+    adjust,
+    core_options,
+    core_threads,
+)
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.started import started
 from photogram.arguments.annotations import check_arguments
-from photogram.distributed.counts import Counts, counted_work
+from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
 from photogram.distributed.merging import merged
-from photogram.distributed.parts import incidence_of, vertices_of
+from photogram.distributed.parts import films_of, incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
-from photogram.distributed.running import Run, core_options, opened
+from photogram.distributed.running import Run, opened
+from photogram.errors import InputError
 from photogram.network.block import Block, checked, refuse_passages, refuse_trajectories
 from photogram.network.core import CoreOptions
+from photogram.network.datum import (
+    DatumRow,
+    InnerConstraints,
+    MinimumConstraints,
+    check_datum,
+    datum_row,
+    minimum_row,
+)
+from photogram.network.films import Reseau, Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
@@ -37,19 +56,19 @@ def adjust_in_parts(
     block: Block,
     division: Division,
     *,
+    datum: InnerConstraints | MinimumConstraints | None = None,
     unit_variance: UnitVariance = "constrained",
     max_iterations: int | None = None,
-    tolerance: float = 1e-5,
+    tolerance: float | AsPublished = 1e-5,
     covariance: bool = True,
     loss: Loss | None = None,
-    ordering: Ordering = "auto",
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Result:
     """Adjust a block in parts, on a cluster or one part after the other (docs/distributed.md).
 
     The result is that of :func:`photogram.adjust`, to rounding. What asks for the normal equations of the
-    whole block again is not had of it: covariances between photos or points, other datums.
+    whole block again is not had of it: covariances between photos or points, further datums.
 
     Parameters
     ----------
@@ -58,11 +77,8 @@ def adjust_in_parts(
     division
         Into how many parts, on which cluster, within which memory, in which folder. A block that fits into
         the memory as a whole is adjusted as a whole, where neither parts nor a cluster are given.
-    unit_variance, max_iterations, tolerance, covariance, loss, progress
-        As of :func:`photogram.adjust`; `redundancy` is no unit variance in parts.
-    ordering
-        As of :func:`photogram.adjust`, where the block fits as a whole: photos of parts have an order of
-        their own.
+    datum, unit_variance, max_iterations, tolerance, covariance, loss, progress
+        As of :func:`photogram.adjust`.
     threads
         As of :func:`photogram.adjust`; on a cluster those of a worker, one when None.
 
@@ -82,37 +98,32 @@ def adjust_in_parts(
     ModuleNotFoundError
         A cluster is asked for, and dask.distributed is not installed (extra `distributed`).
     """
-    options = core_options(
-        unit_variance,
-        tolerance=tolerance,
-        max_iterations=max_iterations,
-        covariance=covariance,
-        loss=loss,
-    )
+    options = core_options(unit_variance, loss, covariance, tolerance, max_iterations)
     core_threads(threads)  # refused here, not by a worker
-    block = _ready(block)
+    block, options, row = _ready(block, options, datum)
     if division.parts is None and division.cluster is None and _fits(block, division.memory_bytes):
         return adjust(
             block,
+            datum=datum,
             unit_variance=unit_variance,
             max_iterations=max_iterations,
             tolerance=tolerance,
             covariance=covariance,
             loss=loss,
-            ordering=ordering,
             threads=threads,
             progress=progress,
         )
-    with _run(block, options, division, threads) as run:
-        return merged(run.folder, run.manifest, block, run.adjust(progress))
+    with _run(block, options, row, division, threads) as run:
+        return merged(run.folder, run.manifest, block, run.adjust(progress, block))
 
 
 def plan_in_parts(
     block: Block,
     division: Division,
     *,
+    datum: InnerConstraints | MinimumConstraints | None = None,
     unit_variance: UnitVariance = "constrained",
-    tolerance: float = 1e-5,
+    tolerance: float | AsPublished = 1e-5,
 ) -> PartsPlan:
     """Plan the adjustment of a block in parts: what it takes, before anything is adjusted.
 
@@ -120,7 +131,7 @@ def plan_in_parts(
 
     Parameters
     ----------
-    block, division, unit_variance, tolerance
+    block, division, datum, unit_variance, tolerance
         As of :func:`adjust_in_parts`.
 
     Returns
@@ -132,17 +143,38 @@ def plan_in_parts(
     InputError, AdjustmentError
         As of :func:`adjust_in_parts`.
     """
-    options = core_options(unit_variance, tolerance=tolerance)
-    with _run(_ready(block), options, division, None) as run:
+    options = core_options(unit_variance, None, tolerance=tolerance)
+    block, options, row = _ready(block, options, datum)
+    with _run(block, options, row, division, None) as run:
         return run.plan()
 
 
-def _ready(block: Block) -> Block:
-    """Return a block whose common unknowns have values to start from; refuse what cannot be adjusted."""
+def _ready(
+    block: Block, options: CoreOptions, datum: InnerConstraints | MinimumConstraints | None
+) -> tuple[Block, CoreOptions, DatumRow | None]:
+    """Return a block whose common unknowns have values to start from; refuse what cannot be adjusted.
+
+    With what is to be held of it in the options, and inner constraints as the core knows them.
+    """
     check_cameras(checked(block))
+    check_datum(datum)
     refuse_trajectories(block, "blocks in parts")
-    refuse_passages(block, "blocks in parts")
-    return started(block)
+    refuse_passages(block, "blocks in parts", but=Scan)
+    _check_films(block)
+    block = started(block)
+    if isinstance(datum, MinimumConstraints):
+        options = replace(options, minimum=minimum_row(block, datum))
+    return block, options, datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
+
+
+def _check_films(block: Block) -> None:
+    """Refuse films whose photos have many unknowns that do not stand in the blocks of these."""
+    for each in block.passages:
+        if isinstance(each, Scan) and isinstance(each.film.pattern, Reseau):
+            raise InputError(
+                f"blocks in parts: the film of the photo {each.photo} has a reseau of its own (pattern"
+                " local), which is not taken there"
+            )
 
 
 def _fits(block: Block, room: int | None) -> bool:
@@ -151,22 +183,26 @@ def _fits(block: Block, room: int | None) -> bool:
 
 
 @contextmanager
-def _run(block: Block, options: CoreOptions, division: Division, threads: int | None) -> Iterator[Run]:
+def _run(
+    block: Block, options: CoreOptions, row: DatumRow | None, division: Division, threads: int | None
+) -> Iterator[Run]:
     """Open the run of a block."""
+    if not math.isfinite(options.limit):  # which documents of a run have no way to write
+        raise InputError("in parts the tolerance must be finite")
     with ExitStack() as stack:
         if division.folder is None:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="photogram-")))
         else:
             folder = Path(division.folder)
         stack.enter_context(alone(folder))
-        source = fingerprint(block, options)
+        source = fingerprint(block, options, row)
         yield stack.enter_context(
             opened(
                 folder,
                 source,
                 len(block.photo_ids),
                 lambda parts: _counted(block, parts),
-                lambda parts: partition(block, folder, parts, options, source),
+                lambda parts: partition(block, folder, parts, options, source, row),
                 division,
                 threads,
             )
@@ -176,12 +212,15 @@ def _run(block: Block, options: CoreOptions, division: Division, threads: int | 
 def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
-    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts)[1]
+    films = films_of(block)
+    of_films = sum(len(each.deviations) for each in block.unknowns if id(each) in films and not each.is_held)
+    unknowns = UNKNOWNS + of_films / len(block.photo_ids)
+    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]
 
 
-def fingerprint(block: Block, options: CoreOptions) -> str:
+def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None) -> str:
     """Return what tells a block and how it is adjusted from others."""
-    digest = hashlib.sha256(repr(options).encode())
+    digest = hashlib.sha256(repr((options, row)).encode())
     for name in (
         *("photo_positions", "photo_attitudes", "photo_position_sd", "photo_attitude_sd", "photo_cameras"),
         *("point_positions", "point_sd", "image_photos", "image_points", "image_xy", "image_sd"),
@@ -190,6 +229,8 @@ def fingerprint(block: Block, options: CoreOptions) -> str:
         digest.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
     for each in (*block.cameras, *block.observations, *block.unknowns):
         digest.update(repr(each).encode())
+    for passage in block.passages:
+        digest.update(repr((passage, passage.numbers().tolist())).encode())
     return digest.hexdigest()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
@@ -9,6 +10,9 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
+from photogram.arguments.types import Indices
+from photogram.distributed.datum import local_row
+from photogram.distributed.engine import Node
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.parts import Names, Part
 from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
@@ -16,7 +20,8 @@ from photogram.io.structure import Decoder, Encoder
 from photogram.network.core import block_network
 from photogram.results.datum import datum_of
 from photogram.results.result import Result
-from photogram.results.saved_block import block_files
+from photogram.results.saved import read_summary
+from photogram.results.saved_block import block_files, read_block_result
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution
@@ -42,7 +47,9 @@ class CoreEngine:
         manifest = read_manifest(run)
         part = read_node(run, manifest, number)
         own = len(part.block.unknowns)
-        network = block_network(part.block, manifest.options, part.common[own:])
+        # What is held is told below.
+        options = replace(manifest.options, minimum=None)
+        network = block_network(part.block, options, part.common[own:])
         rows = [
             {row: place for place, row in enumerate(each)}
             for each in (part.photos.tolist(), range(len(part.block.cameras)), part.unknowns.tolist())
@@ -78,14 +85,42 @@ class CoreEngine:
         folder = result_folder(run, number)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / OUTCOME).unlink(missing_ok=True)
-        for name, content in block_files(_result(part, manifest, solution, variance)).items():
-            if isinstance(content, bytes):
-                plain = content
-                write_file(folder / name, lambda file, plain=plain: file.write(plain))  # type: ignore[misc]
-            else:
-                write_file(folder / name, content)
+        _write(folder, _result(part, manifest, solution, variance))
         # The last of its files: with it the node is done.
         write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
+
+    def unknowns(self, run: Path, number: int, node: Node) -> Indices:
+        """Return (N, 3) what the unknowns of a node belong to, rows being those of the whole block."""
+        part, names = read_node(run, read_manifest(run), number), node.unknown_names
+        cameras = np.arange(len(part.block.cameras))
+        for kind, rows in enumerate((part.photos, cameras, part.unknowns, part.points)):
+            own = names[:, 0] == kind
+            names[own, 1] = rows[names[own, 1]]
+        return names
+
+    def redundancies(self, run: Path, number: int) -> tuple[float, float, float, float]:
+        """Return sums of redundancy numbers, by kinds, of what was written of a node."""
+        camera, ground, plates, others = read_outcome(result_folder(run, number))["redundancies"]
+        return camera, ground, plates, others
+
+    def settle(self, run: Path, number: int, variance: float | None) -> None:
+        """Scale what was written of a node by a variance of unit weight that is known since."""
+        folder = result_folder(run, number)
+        found = read_block_result(folder, read_summary(folder))
+        scale = 1.0 if variance is None else variance
+        cameras = tuple(replace(each, covariance=scale * each.cofactors) for each in found.cameras)
+        unknowns = tuple(replace(each, covariance=scale * each.cofactors) for each in found.unknowns)
+        _write(folder, replace(found, variance_of_unit_weight=variance, cameras=cameras, unknowns=unknowns))
+
+
+def _write(folder: Path, result: Result) -> None:
+    """Write the result of a node."""
+    for name, content in block_files(result).items():
+        if isinstance(content, bytes):
+            plain = content
+            write_file(folder / name, lambda file, plain=plain: file.write(plain))  # type: ignore[misc]
+        else:
+            write_file(folder / name, content)
 
 
 def read_outcome(folder: Path) -> dict[str, Any]:
@@ -104,7 +139,8 @@ def read_outcome(folder: Path) -> dict[str, Any]:
 def _result(part: Part, manifest: Manifest, solution: BlockSolution, variance: float | None) -> Result:
     """Return the result of a node, scaled by the variance of unit weight of the whole."""
     scaled = cast("BlockSolution", _Scaled(part, solution, variance))
-    datum = datum_of(part.block, solution)
+    row = None if manifest.datum is None else local_row(manifest.datum, part.photos, part.points)
+    datum = datum_of(part.block, solution, row, held=manifest.held)
     return _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
 
 
@@ -145,6 +181,7 @@ def _outcome(part: Part, solution: BlockSolution) -> dict[str, Any]:
         "cameras": solution.cameras,
         "unknowns": list(zip(part.unknowns.tolist(), solution.adjusted_unknowns, strict=True)),
         "observed": list(observed),
+        "relative_error": solution.relative_error,
         "operations": solution.operations,
         "seconds": solution.seconds,
     }

@@ -7,17 +7,17 @@ numbers and contributions are then those of dense panels: multifrontal eliminati
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.distributed.cut import Incidence, Tree, cut, homes, tree_of
 
-__all__ = ["Counts", "counted_work", "outer_vertices"]
+__all__ = ["UNKNOWNS", "Counts", "counted_work", "outer_vertices"]
 
 UNKNOWNS = 6
-"""Of a photo."""
+"""Of the pose of a photo."""
 SMALLEST = 8
 """Photos of a piece that is a front of its own."""
 FORMATION, PAIR = 200.0, 108.0
@@ -70,7 +70,11 @@ class Counts:
 
 
 def counted_work(
-    positions: Floats, images: Floats, incidences: Callable[[], Iterable[Incidence]], parts: int
+    positions: Floats,
+    images: Floats,
+    incidences: Callable[[], Iterable[Incidence]],
+    parts: int,
+    unknowns: float = UNKNOWNS,
 ) -> tuple[Tree, Counts]:
     """Count the work of a block in parts.
 
@@ -84,6 +88,8 @@ def counted_work(
         Which photos the points tie; those of a thinned block do.
     parts
         How many; cut further, twice as fine again and again, for counting.
+    unknowns
+        Of a photo: of its pose, and of its film.
     """
     pieces = 1
     while len(positions) / (parts * pieces * 2) >= SMALLEST:
@@ -92,8 +98,8 @@ def counted_work(
     tree = tree_of(parts)
     node_of = _nodes_above(deep.tree, tree, pieces)
     outer = outer_vertices(deep.tree, deep.owners, list(incidences()))
-    inner: Floats = UNKNOWNS * np.bincount(deep.owners, minlength=len(deep.tree)).astype(np.float64)
-    above = UNKNOWNS * np.array([len(each) for each in outer], dtype=float)
+    inner: Floats = unknowns * np.bincount(deep.owners, minlength=len(deep.tree)).astype(np.float64)
+    above = unknowns * np.array([len(each) for each in outer], dtype=float)
     # Symmetric, dense: I^3 / 6 for the pivot, I^2 S / 2 for the panel, I S^2 / 2 for what is left.
     factor = inner**3 / 6 + inner**2 * above / 2 + inner * above**2 / 2
     numbers = inner**2 / 2 + inner * above
@@ -116,7 +122,7 @@ def counted_work(
     factor_bytes = WORD * summed(numbers)
     received = WORD * np.array([sum(contribution[tops[child]] for child in below) for below in tree.children])
     counts = Counts(
-        photos=(summed(inner) / UNKNOWNS).round().astype(np.int64),
+        photos=(summed(inner) / unknowns).round().astype(np.int64),
         images=summed(at_home).round().astype(np.int64),
         outer=above[tops].astype(np.int64),
         formation=FORMATION * summed(at_home) + PAIR * summed(pairs),

@@ -10,12 +10,12 @@ root (George 1973; Lipton, Rose and Tarjan 1979).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 
 __all__ = ["Cut", "Incidence", "Tree", "cut", "homes", "joined", "tree_of"]
 

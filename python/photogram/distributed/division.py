@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
 from photogram.arguments.annotations import path
 from photogram.arguments.arrays import shown, whole_number
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 __all__ = ["Division", "bytes_of"]

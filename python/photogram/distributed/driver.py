@@ -8,8 +8,8 @@ which steps fall. What is decided here rests on sums over all nodes, added in th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,10 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
+from photogram.distributed.course import Course
 from photogram.distributed.cut import Tree
+from photogram.distributed.datum import InDatum, Mover
 from photogram.distributed.executors import Executor, Handle
-from photogram.distributed.files import read_json, write_json
 from photogram.distributed.reforming import Reforming
 from photogram.distributed.tasks import (
     Formed,
@@ -32,12 +33,16 @@ from photogram.distributed.tasks import (
     finished,
     formed,
     inverted,
+    located,
     lost,
+    redundancies,
     relocated,
+    settled,
     solved,
     state_path,
+    write_state,
 )
-from photogram.errors import AdjustmentError, InputError, PhotogramError, RankError
+from photogram.errors import AdjustmentError, PhotogramError, RankError
 from photogram.results.iteration import Iteration
 
 __all__ = ["Driver", "Outcome", "Stop"]
@@ -47,7 +52,6 @@ RULES = _photocore.step_rules()
 ALIKE = round(RULES["alike"])
 ATTEMPTS = 20
 """So often is a node formed again that a worker has taken with it."""
-PROGRESS = "progress.json"
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ class Stop:
     unit_variance: str = "constrained"
     reweighted: bool = False
     """Whether a loss weights the observations."""
+    as_published: bool = False
+    """Whether steps are those of the 1987 program: the tolerance is its percentage."""
 
 
 @dataclass(frozen=True)
@@ -89,33 +95,11 @@ class Outcome:
     iterations: list[Iteration]
     sums_of_squares: tuple[float, float, float, float]
     counts: tuple[int, int, int]
-    degrees_of_freedom: int
+    degrees_of_freedom: float
     variance_of_unit_weight: float | None
     state: str
     before: str
     formations: int
-
-
-@dataclass
-class _Course:
-    """How far the iterations have come: what a run that died goes on from.
-
-    `curved`: whether the second-order term of a loss is taken in at the state; `near`: whether from there on.
-    `ending`, when they are over: the status, the state whose equations give cofactors, and the state reached.
-    """
-
-    state: str = "0"
-    before: str = "0"
-    damping: float = 0.0
-    curved: bool = False
-    near: bool = False
-    best: float = math.nan
-    initial: float = math.nan
-    refused: float | None = None
-    ending: tuple[str, str, str] | None = None
-    trials: int = 0
-    formations: int = 0
-    iterations: list[Iteration] = field(default_factory=list)
 
 
 @dataclass
@@ -126,6 +110,8 @@ class _Up:
     contributions: dict[int, Handle]
     sum_of_squares: float
     decrease: float
+    products: Floats | None
+    """B^T Q B, where the block was moved to a datum."""
 
 
 class LostFactorError(PhotogramError):
@@ -157,6 +143,8 @@ class Driver:
         When to stop.
     progress
         Told of parts done.
+    mover
+        Takes the block to a datum when it is adjusted.
     """
 
     def __init__(
@@ -166,10 +154,11 @@ class Driver:
         executor: Executor,
         stop: Stop,
         progress: Callable[[Progress], None] | None = None,
+        mover: Mover | None = None,
     ) -> None:
         self.job, self.tree, self.executor, self.stop = job, tree, executor, stop
-        self._progress = progress
-        self._course = _Course()
+        self._progress, self._mover = progress, mover
+        self._course = Course()
         # Neighbours to one worker: less is sent. Later, where nodes were last: they need not be read again.
         places, parts = executor.places(), int(tree.spans[:, 1].max())
         self._places = [places[first * len(places) // parts] for first in tree.spans[:, 0].tolist()]
@@ -192,7 +181,7 @@ class Driver:
             state of the last complete iteration stays.
         """
         if resume:
-            self._course = _read_course(self.job)
+            self._course = Course.read(self.job)
         try:
             return self._run()
         except BaseException:
@@ -203,12 +192,45 @@ class Driver:
         course = self._course
         self._unknowns = self._counts()
         if course.ending is not None:
-            return self._finish(self._up(Point(course.ending[1])))
+            return self._finish(None)
         up = self._up(Point(course.state, course.damping, course.curved))
         if not math.isfinite(up.sum_of_squares):
             raise AdjustmentError("the initial values give no finite image coordinates")
         if not course.iterations:
             course.initial = course.best = up.sum_of_squares
+            if self._mover is not None:
+                # A datum that is not carried is refused before anything is adjusted.
+                self._in_datum(self._mover, course.state)
+        return self._full_steps(up) if self.stop.as_published else self._damped_steps(up)
+
+    def _full_steps(self, up: _Up) -> Outcome:
+        """Take full steps, whatever becomes of the sum of squares (GIANT guide, section 6)."""
+        course = self._course
+        while (status := self._as_published()) is None:
+            change = math.sqrt(max(up.decrease, 0.0))
+            after = self._step(up)
+            self._forget(up)
+            up = self._up(Point(after))
+            if not math.isfinite(up.sum_of_squares):
+                self._forget(up)
+                self._remove(after)
+                return self._end("diverged", self._up(Point(course.state)), None)
+            self._accept(Iteration(len(course.iterations) + 1, up.sum_of_squares, change, 0.0), up.at)
+        return self._end(status, up, None)
+
+    def _as_published(self) -> str | None:
+        """Return how full steps have ended, by what the last one has changed; None where they have not."""
+        *_, last = sums = [each.weighted_sum_of_squares for each in self._course.iterations] or [math.nan]
+        change = 100.0 * (last / sums[-2] - 1.0) if len(sums) > 1 else math.nan
+        if abs(change) < self.stop.tolerance:
+            return "converged"
+        if change >= self.stop.tolerance:
+            return "diverged"
+        return "not converged" if len(self._course.iterations) >= self.stop.max_iterations else None
+
+    def _damped_steps(self, up: _Up) -> Outcome:
+        """Take steps that lower the sum of squares."""
+        course = self._course
         while len(course.iterations) < self.stop.max_iterations and up.at.damping <= RULES["most_damping"]:
             change = math.sqrt(max(up.decrease, 0.0))
             if up.at.damping == 0.0 and (self._is_last(change) or self._falls_no_more(change)):
@@ -284,7 +306,7 @@ class Driver:
         course.damping, course.curved = at.damping, at.curved
         course.near = self.stop.reweighted and iteration.largest_change <= RULES["near"]
         course.iterations.append(iteration)
-        _write_course(self.job, course)
+        course.write(self.job)
         if old not in (course.before, course.state):
             self._remove(old)
         self._tell("iteration", iteration.number, 0, iteration)
@@ -304,22 +326,38 @@ class Driver:
                 self._accept(last, Point(after))
                 return self._finish(up)
             self._accept(last, Point(after))
-        if up.at != Point(course.state):
-            self._forget(up)
-            up = self._up(Point(course.state))
         course.ending = status, course.state, course.state
-        _write_course(self.job, course)
-        return self._finish(up)
+        course.write(self.job)
+        if up.at == Point(course.state):
+            return self._finish(up)
+        self._forget(up)
+        return self._finish(None)
 
-    def _finish(self, up: _Up) -> Outcome:
-        """Invert, and write the results: all that is left when the iterations are over."""
+    def _finish(self, up: _Up | None) -> Outcome:
+        """Invert, and write the results: all that is left when the iterations are over.
+
+        Where there is a datum to go to, the normal equations are formed once more there.
+        """
         course = self._course
         assert course.ending is not None
-        status, _, after = course.ending
+        status, formed, after = course.ending
+        last = course.before, after
+        if self._mover is not None:
+            if up is not None:
+                self._forget(up)
+            formed = f"{after}-in-datum"
+            for node, arrays in enumerate(self._in_datum(self._mover, after)):
+                write_state(self.job, node, formed, arrays)
+            after, up = formed, None
+        if up is None:
+            up = self._up(Point(formed))
         sums = self._evaluated(after)[:4]
         freedom, variance = self._variance(sums)
         if self.stop.covariance:
-            self._invert(up, after, variance)
+            datum = None if up.products is None else InDatum(up.products, last)
+            self._invert(up, after, variance, datum)
+            if self.stop.unit_variance == "redundancy":
+                freedom, variance = self._settled(sums)
         else:
             self._sums([self._do(finished, n, course.before, after, variance) for n in self._nodes], "invert")
         self._forget(up)
@@ -336,6 +374,10 @@ class Driver:
             course.formations,
         )
 
+    def _in_datum(self, mover: Mover, state: str) -> list[dict[str, np.ndarray]]:
+        """Return a state of all nodes as it is moved to the datum, with what takes cofactors there."""
+        return mover(self._sums([self._do(located, n, state) for n in self._nodes], "solve"))
+
     def _evaluated(self, state: str) -> tuple[float, float, float, float, float]:
         """Return weighted sums of squares of all nodes, by kinds, and what is minimised."""
         found = np.array(self._sums([self._do(evaluated, n, state) for n in self._nodes], "solve"))
@@ -343,7 +385,7 @@ class Driver:
         camera, ground, plates, others, minimised = (sum(column) for column in found.T.tolist())
         return camera, ground, plates, others, minimised
 
-    def _variance(self, sums: tuple[float, float, float, float]) -> tuple[int, float | None]:
+    def _variance(self, sums: tuple[float, float, float, float]) -> tuple[float, float | None]:
         """Return degrees of freedom and variance of unit weight (GIANT guide, Appendix E)."""
         observations, weighted, unknowns, stations, _ = self._unknowns
         freedom, kind = observations + weighted - unknowns, self.stop.unit_variance
@@ -352,7 +394,22 @@ class Driver:
             return freedom, 1.0
         if kind == "free":
             freedom, total = freedom - stations, total - sums[0]
+        if kind == "redundancy":  # these are known when all nodes are inverted
+            return freedom, None
         return freedom, total / freedom if freedom > 0 else None
+
+    def _settled(self, sums: tuple[float, float, float, float]) -> tuple[float, float | None]:
+        """Have the nodes scale what they have found by q / r, of all but photos (docs/weights.md).
+
+        Returns
+        -------
+        The sum of redundancy numbers r and the variance of unit weight; None without redundancy.
+        """
+        found = self._sums([self._do(redundancies, n) for n in self._nodes], "invert")
+        freedom = math.fsum(own for _, *measured in found for own in measured)
+        variance = sum(sums[1:]) / freedom if freedom > RULES["least_redundancy"] else None
+        self._sums([self._do(settled, n, variance) for n in self._nodes], "invert")
+        return round(freedom, 6), variance
 
     def _counts(self) -> tuple[int, int, int, int, int]:
         found = self._sums([self._do(counted, n) for n in self._nodes], "read")
@@ -378,6 +435,7 @@ class Driver:
             handles,
             sum(each.sum_of_squares for each in found),
             sum(each.decrease for each in found),
+            _added([each.products for each in found if each.products is not None]),
         )
 
     def _step(self, up: _Up) -> str:
@@ -396,7 +454,7 @@ class Driver:
         self._down(up, task, then, "solve")
         return after
 
-    def _invert(self, up: _Up, after: str, variance: float | None) -> None:
+    def _invert(self, up: _Up, after: str, variance: float | None, datum: InDatum | None) -> None:
         """Invert from the root down; every node writes what has become of it.
 
         What a node has handed down, and what its children have left, stays until all below it is done: they
@@ -409,7 +467,7 @@ class Driver:
             parent = int(self.tree.parents[node])
             place = 0 if parent < 0 else self.tree.children[parent].index(node)
             above = None if parent < 0 else done[parent]
-            return self._do(inverted, node, up.at, after, variance, above, place)
+            return self._do(inverted, node, up.at, after, variance, above, place, datum)
 
         def then(node: int, handle: Handle) -> None:
             # Cofactors stay where they are: this asks only whether they are there.
@@ -533,20 +591,6 @@ class Driver:
             self._progress(Progress(phase, done, total, iteration))
 
 
-def _write_course(job: Job, course: _Course) -> None:
-    document = {name: each for name, each in vars(course).items() if name != "iterations"}
-    document["iterations"] = [asdict(each) for each in course.iterations]
-    document["source"] = job.source
-    write_json(job.folder / PROGRESS, document)
-
-
-def _read_course(job: Job) -> _Course:
-    if not (job.folder / PROGRESS).is_file():
-        return _Course()
-    document = read_json(job.folder / PROGRESS)
-    if document.pop("source", None) != job.source:
-        raise InputError("is the progress of another run", file=job.folder / PROGRESS)
-    rows: Iterable[dict[str, Any]] = document.pop("iterations")
-    ending = document.pop("ending")
-    iterations = [Iteration(**row) for row in rows]
-    return _Course(**document, ending=None if ending is None else tuple(ending), iterations=iterations)
+def _added(products: list[Floats]) -> Floats | None:
+    """Return a sum in the order of the nodes; None of nothing."""
+    return np.sum(products, axis=0) if products else None

@@ -8,10 +8,14 @@ from typing import Any, Protocol
 
 from photogram.arguments.types import Floats, Indices
 
-__all__ = ["ContributionRow", "Engine", "FormedNode", "Node"]
+__all__ = ["ContributionRow", "Engine", "FormedNode", "Node", "TransformationRow"]
 
 ContributionRow = tuple[Floats, Floats, Floats]
 """What a node leaves to the one above: packed triangle, right-hand side, diagonal before elimination."""
+
+
+TransformationRow = tuple[Floats, Floats, Floats, Floats, float, list[int]]
+"""T, W, B^T W, the last step, the condition of B^T G and unknowns that do not move (docs/distributed.md)."""
 
 
 class FormedNode(Protocol):
@@ -36,8 +40,16 @@ class FormedNode(Protocol):
     def solve(self, outer: Floats, *, threads: int) -> Floats:
         """Return the step of all unknowns, given that of the outer ones."""
 
-    def invert(self, outer: Floats, state: Floats, *, threads: int) -> tuple[Any, list[Floats]]:
-        """Return what is adjusted, and the cofactors for each child."""
+    def reduce(self, rights: Floats, *, threads: int) -> tuple[Floats, Floats]:
+        """Reduce right-hand sides; return what is left for the outer unknowns, and their products."""
+
+    def complete(self, outer: Floats, *, threads: int) -> Floats:
+        """Solve for all unknowns where right-hand sides were reduced, given the outer ones."""
+
+    def invert(
+        self, outer: Floats, state: Floats, *, threads: int, datum: TransformationRow | None = None
+    ) -> tuple[Any, list[Floats]]:
+        """Return what is adjusted, in a datum of the whole, and the cofactors for each child."""
 
 
 class Node(Protocol):
@@ -50,6 +62,10 @@ class Node(Protocol):
     @property
     def children(self) -> list[Indices]:
         """Where those of each child stand."""
+
+    @property
+    def unknown_names(self) -> Indices:
+        """What each unknown of a state belongs to, by rows of the node."""
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -117,3 +133,12 @@ class Engine(Protocol):
         variance
             The variance of unit weight of the whole; None without degrees of freedom.
         """
+
+    def unknowns(self, run: Path, number: int, node: Node) -> Indices:
+        """Return (N, 3) what the unknowns of a node belong to, rows being those of the whole block."""
+
+    def redundancies(self, run: Path, number: int) -> tuple[float, float, float, float]:
+        """Return sums of redundancy numbers, by kinds, of what was written of a node."""
+
+    def settle(self, run: Path, number: int, variance: float | None) -> None:
+        """Scale what was written of a node by a variance of unit weight that is known since."""

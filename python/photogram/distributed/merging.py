@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, cast
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import remarks_on
-from photogram.adjustment.robust import remark
+from photogram.adjustment.adjustment import messages_of
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
@@ -20,7 +19,7 @@ from photogram.distributed.parts import shared_cameras
 from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
-from photogram.results.datum import datum_messages, datum_of
+from photogram.results.datum import datum_of
 from photogram.results.result import Result
 from photogram.results.saved import read_summary
 from photogram.results.saved_block import read_block_result
@@ -117,10 +116,9 @@ def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InP
         orders += [int(part.photos[row]) for row in result.photo_order.tolist() if row in at_home]
     rest = _rest(owners, block, outcome, orders, details) | {"datum": manifest.held}
     solution = cast("BlockSolution", SimpleNamespace(**found, **rest))
-    datum = datum_of(block, solution)
+    datum = datum_of(block, solution, manifest.datum)
     options = manifest.options
-    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
-    messages += remark(options.loss, solution.image_weights)
+    messages = messages_of(block, solution, options, datum)
     freedom = outcome.degrees_of_freedom
     return InParts.from_solution(block, solution, options, datum, messages, freedom)
 
@@ -160,7 +158,7 @@ def _rest(
         "weak": [],
         "weak_cameras": [],
         "weak_unknowns": [],
-        "relative_error": 0.0,
+        "relative_error": max(each["relative_error"] for each in details),
         "minimal_control": False,
         "adjusted_unknowns": _unknowns(block, details),
         "cameras": _cameras(block, owners, details),
@@ -214,11 +212,13 @@ def _cameras(block: Block, owners: Indices, details: list[dict[str, Any]]) -> li
 
 
 def _unknowns(block: Block, details: list[dict[str, Any]]) -> list[Any]:
-    """Return the adjusted common unknowns: those of the root, with the observations of all nodes."""
-    found = []
-    for row, given in enumerate(block.unknowns):
-        each = [own for node in details for place, own in node["unknowns"] if place == row]
-        # The last node that has it is the root.
+    """Return the adjusted common unknowns, with the observations of all nodes."""
+    found: list[Any] = []
+    known: list[list[Any]] = [[] for _ in block.unknowns]
+    for row, own in _all(details, "unknowns"):
+        known[row].append(own)
+    for given, each in zip(block.unknowns, known, strict=True):
+        # The last node that has it is the root or, of a film, that of its photo.
         change, cofactors, redundancy = _of_home(
             [(own[0], own[3], own[5]) for own in each], len(each) - 1, given.deviations, None
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,11 @@ from photogram.io.structure import Decoder, Encoder
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.chosen import IMAGES, PHOTOS
+from photogram.network.films import Film, Pattern, Readings, Scan
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
+from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
@@ -32,6 +34,7 @@ __all__ = [
     "Names",
     "Part",
     "assembled_part",
+    "films_of",
     "homes_of",
     "incidence_of",
     "names_above",
@@ -164,6 +167,27 @@ def vertices_of(block: Block) -> Indices:
     return found
 
 
+def films_of(block: Block) -> dict[int, str]:
+    """Return the photos in whose blocks of unknowns those of films stand, by the identity of the unknowns.
+
+    Those that films of several photos have are common unknowns as any other, and so are all beside photos on
+    frames: halves of joined scans.
+    """
+    found: dict[int, set[str]] = {}
+    for each in () if block.mounts else block.passages:
+        if isinstance(each, Scan):
+            for own in (each.film.placement, each.film.size, each.film.bend):
+                found.setdefault(id(own), set()).add(each.photo)
+    found.pop(id(None), None)
+    return {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+
+
+def _photos_of(observation: Observation, films: Mapping[int, str]) -> list[str]:
+    """Return the photos that an observation touches, by their poses or by their films."""
+    of_films = [films[id(each)] for each in observation.unknowns if id(each) in films]
+    return [*dict.fromkeys([*observation.photos, *of_films])]
+
+
 def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
     """Return what each point and observation touches; the edge of each point, and of each observation.
 
@@ -174,13 +198,13 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
     photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
     tied = [tuple(points[name] for name in each.points) for each in block.observations]
     edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
-    own_edges, others, of_observations = [], [], []
+    own_edges, others, of_observations, films = [], [], [], films_of(block)
     count = len(block.point_ids)
     for each, members in zip(block.observations, tied, strict=True):
         edge = int(edges[members[0]]) if members else count
         count += not members
         of_observations.append(edge)
-        for name in each.photos:
+        for name in _photos_of(each, films):
             own_edges.append(edge)
             others.append(int(vertices[photos[name]]))
     incidence = Incidence(
@@ -281,6 +305,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         image_sd=at_home.image_sd,
         observations=own,
         mounts=[each for each in block.mounts if each.photo in present],
+        passages=[each for each in block.passages if isinstance(each, Scan) and each.photo in present],
     )
     whole = {id(each): row for row, each in enumerate(block.unknowns)}
     # Those of the block come first: in this order it knows them.
@@ -299,7 +324,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
     )
 
 
-def names_above(part: Part, below: Names, shared: Indices, *, root: bool) -> Names:
+def names_above(part: Part, below: Names, shared: Indices, films: Mapping[int, str], *, root: bool) -> Names:
     """Return what a part hands up: photos of nodes above, cameras and unknowns that belong to the root.
 
     Parameters
@@ -308,6 +333,8 @@ def names_above(part: Part, below: Names, shared: Indices, *, root: bool) -> Nam
         The part, and what nodes below it hand up.
     shared
         The cameras that have unknown parameters and several photos in the whole block.
+    films
+        Of the whole block (:func:`films_of`): these unknowns are handed up with their photos.
     root
         Whether it is the root, which hands nothing up.
     """
@@ -319,7 +346,7 @@ def names_above(part: Part, below: Names, shared: Indices, *, root: bool) -> Nam
     cameras = part.block.photo_cameras
     used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
     known = zip(part.unknowns.tolist(), part.common, strict=True)
-    unknowns = sorted(row for row, each in known if not each.is_held)
+    unknowns = sorted(row for row, each in known if not (each.is_held or id(each) in films))
     return Names(photos.tolist(), sorted(used | set(below.cameras)), unknowns)
 
 
@@ -336,9 +363,9 @@ def _touch(block: Block, touched: Bools, observations: list[Observation]) -> Non
     """Add the photos of observations, and of the frames that photos are on."""
     if not (observations or block.mounts):
         return
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    rows, films = {name: row for row, name in enumerate(block.photo_ids)}, films_of(block)
     for each in observations:
-        touched[[rows[name] for name in each.photos]] = True
+        touched[[rows[name] for name in _photos_of(each, films)]] = True
     vertices = vertices_of(block)
     touched[vertices[np.flatnonzero(touched)]] = True
 
@@ -414,7 +441,8 @@ def read_part(folder: Path, sealed: str) -> Part:
 
 
 def _classes() -> list[type]:
-    return [Camera, Frame, Mount, Refraction, Spheroid, *_below(Observation), *_below(Unknown)]
+    alone = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Spheroid)
+    return [*alone, *_below(Observation), *_below(Passage), *_below(Unknown)]
 
 
 def _below(base: type) -> Iterator[type]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.distributed.cut import Tree
 from photogram.distributed.engine import Node
 from photogram.distributed.schedule import Rates, Times, scheduled

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from photogram.distributed.files import read_json, write_json
 from photogram.distributed.parts import (
     Names,
     Part,
+    films_of,
     homes_of,
     incidence_of,
     names_above,
@@ -25,9 +27,10 @@ from photogram.distributed.parts import (
     vertices_of,
     write_part,
 )
-from photogram.errors import InputError
+from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
+from photogram.network.datum import DatumRow
 from photogram.network.observations.position import with_epochs
 from photogram.network.unknowns import Unknown
 
@@ -71,6 +74,8 @@ class Manifest:
         Of the parts of the nodes.
     held
         What is held where nothing gives a datum: photos, each with the number of one of its six unknowns.
+    datum
+        The datum that the block is taken to when it is adjusted; None for what is held, or observed.
     """
 
     version: str
@@ -85,6 +90,7 @@ class Manifest:
     images: list[int]
     seals: list[str]
     held: list[tuple[int, int]]
+    datum: DatumRow | None = None
 
 
 def part_folder(run: Path, number: int) -> Path:
@@ -106,7 +112,14 @@ def places_of(block: Block) -> Floats:
     return positions
 
 
-def partition(block: Block, run: Path, parts: int, options: CoreOptions, source: str) -> Manifest:
+def partition(
+    block: Block,
+    run: Path,
+    parts: int,
+    options: CoreOptions,
+    source: str,
+    datum: DatumRow | None = None,
+) -> Manifest:
     """Cut a block that is in memory into parts on disk.
 
     Parameters
@@ -117,14 +130,17 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
         The folder, which is made.
     parts
         How many.
-    options, source
+    options, source, datum
         As in :class:`Manifest`.
 
     Raises
     ------
     AdjustmentError
-        The folder cannot be written to.
+        The folder cannot be written to; a datum is asked for, and the block is not free.
     """
+    held = held_for_datum(block, options)
+    if datum is not None and not held:
+        raise AdjustmentError("the block is not free: control, weights or observations give its datum")
     # A node has some of the observations of a drift only.
     block = block.replace(observations=with_epochs(block.observations))
     incidence, _, _ = incidence_of(block)
@@ -138,7 +154,8 @@ def partition(block: Block, run: Path, parts: int, options: CoreOptions, source:
         lambda node, below: part_of(block, homes, node, below),
         options,
         source,
-        held_for_datum(block, options),
+        held,
+        datum,
     )
 
 
@@ -166,6 +183,7 @@ def divided(
     options: CoreOptions,
     source: str,
     held: list[tuple[int, int]],
+    datum: DatumRow | None = None,
 ) -> Manifest:
     """Write the parts of a block, one after the other.
 
@@ -175,7 +193,7 @@ def divided(
         The block, or all of it but points and images.
     run, options, source
         As of :func:`partition`.
-    held
+    held, datum
         As in :class:`Manifest`.
     tree
         The tree.
@@ -187,7 +205,7 @@ def divided(
     AdjustmentError
         The folder cannot be written to.
     """
-    shared = shared_cameras(block)
+    shared, films = shared_cameras(block), films_of(block)
     outer: list[Names] = []
     seals: list[str] = []
     counts: list[tuple[int, int, int, int]] = []
@@ -197,12 +215,12 @@ def divided(
             below = below.union(outer[child])
         part = part_at(node, below)
         root = node == tree.root
-        outer.append(names_above(part, below, shared, root=root))
+        outer.append(names_above(part, below, shared, films, root=root))
         folder = part_folder(run, node)
         folder.mkdir(parents=True, exist_ok=True)
         seals.append(write_part(folder, part))
         own = np.flatnonzero(part.owners == node)
-        stations = _weighted(part.block, own, shared, part.common if root else None)
+        stations = _weighted(part.block, own, shared, films, part.common if root else None)
         counts.append((stations, len(own), len(part.points), len(part.images)))
     weighted, photos, points, images = (list(column) for column in zip(*counts, strict=True))
     middle = np.median(block.photo_positions, axis=0)
@@ -219,22 +237,32 @@ def divided(
         images,
         seals,
         held,
+        datum,
     )
     write_manifest(run, manifest)
     return manifest
 
 
-def _weighted(block: Block, own: Indices, shared: Indices, common: Sequence[Unknown] | None) -> int:
+def _weighted(
+    block: Block,
+    own: Indices,
+    shared: Indices,
+    films: Mapping[int, str],
+    common: Sequence[Unknown] | None,
+) -> int:
     """Count the weighted unknowns of photos, cameras and common unknowns that are at home in a node.
 
-    `common` are those of the whole block, in the root; None elsewhere.
+    `common` are those of the whole block, in the root; None elsewhere. Unknowns of `films` are at home where
+    their photos are.
     """
+    names = {block.photo_ids[row] for row in own.tolist()}
     sd = [np.hstack([block.photo_position_sd[own], block.photo_attitude_sd[own]]).ravel()]
     cameras = set() if block.photo_cameras is None else set(block.photo_cameras[own].tolist())
     cameras -= set(shared.tolist())
     if common is not None:
         cameras |= set(shared.tolist())
-        sd += [each.deviations for each in common]
+        sd += [each.deviations for each in common if id(each) not in films]
+    sd += [each.deviations for each in block.unknowns if films.get(id(each)) in names]
     sd += [block.cameras[row].deviations for row in sorted(cameras)]
     return sum(int(np.count_nonzero(np.isfinite(each) & (each > 0))) for each in sd)
 
@@ -248,7 +276,7 @@ def write_manifest(run: Path, manifest: Manifest) -> None:
     write_json(run / MANIFEST, document)
 
 
-_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held")
+_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held", "datum")
 
 
 def read_manifest(run: Path) -> Manifest:
@@ -267,16 +295,22 @@ def read_manifest(run: Path) -> Manifest:
         )
     options = document["options"]
     for name in ("loss", "minimum"):
-        options[name] = None if options[name] is None else tuple(options[name])
+        options[name] = _as_tuple(options[name])
     plain = {name: document[name] for name in _PLAIN}
     plain["middle"] = tuple(plain["middle"])
     plain["held"] = [(photo, number) for photo, number in plain["held"]]
+    if plain["datum"] is not None:
+        plain["datum"] = tuple(plain["datum"])
     return Manifest(
         tree=tree_of(document["parts"]),
         outer=[Names(*rows) for rows in document["outer"]],
         options=CoreOptions(**options),
         **plain,
     )
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(map(_as_tuple, value)) if isinstance(value, list) else value
 
 
 def read_node(run: Path, manifest: Manifest, number: int) -> Part:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import Progress, UnitVariance, check_iteration, most_iterations
-from photogram.adjustment.robust import Loss, loss_row
+from photogram.adjustment.adjustment import Progress
 from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts
+from photogram.distributed.datum import Mover
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Driver, Outcome, Stop
 from photogram.distributed.executors import Executor, Serial
@@ -22,9 +21,9 @@ from photogram.distributed.tasks import Job, predicted, shelf
 from photogram.distributed.workers import Workers, check_workers, connected
 from photogram.errors import InputError
 from photogram.memory import resident_memory
-from photogram.network.core import CoreOptions
+from photogram.network.block import Block
 
-__all__ = ["Run", "core_options", "opened"]
+__all__ = ["Run", "opened"]
 
 PARTS_A_WORKER = 4
 """So that a slow worker does not hold the rest."""
@@ -76,8 +75,17 @@ class Run:
         photos, tree = self.manifest.photos, self.manifest.tree
         return PartsPlan(tree, predictions, photos, self.workers, self.memory, rates, self.held)
 
-    def adjust(self, progress: Callable[[Progress], None] | None = None) -> Outcome:
+    def adjust(
+        self, progress: Callable[[Progress], None] | None = None, block: Block | None = None
+    ) -> Outcome:
         """Adjust, or go on where a run that died has ended.
+
+        Parameters
+        ----------
+        progress
+            Told of what is going on.
+        block
+            What was divided: it is needed where it is to be taken to a datum.
 
         Raises
         ------
@@ -92,40 +100,12 @@ class Run:
             options.covariance,
             options.unit_variance,
             options.loss is not None,
+            options.criterion == "percent",
         )
-        return Driver(self.job, self.manifest.tree, self.executor, stop, progress).run(resume=True)
-
-
-def core_options(
-    unit_variance: UnitVariance,
-    *,
-    tolerance: float = 1e-5,
-    max_iterations: int | None = None,
-    covariance: bool = True,
-    loss: Loss | None = None,
-) -> CoreOptions:
-    """Return how the core adjusts in parts: the options of :func:`photogram.adjust_in_parts`.
-
-    Raises
-    ------
-    InputError
-        No iteration, a tolerance that is not positive or not finite, a unit variance based on redundancy
-        numbers, a loss that there is not.
-    """
-    if unit_variance == "redundancy":
-        raise InputError(
-            "in parts the unit variance is not based on redundancy numbers:"
-            " --unit-variance constrained (or unity)"
-        )
-    weighted = loss_row(loss)
-    if max_iterations is None:
-        max_iterations = most_iterations(weighted)
-    check_iteration("auto", max_iterations, tolerance)
-    if not math.isfinite(tolerance):  # which documents of a run have no way to write
-        raise InputError("in parts the tolerance must be finite")
-    return CoreOptions(
-        "fraction", tolerance, max_iterations, covariance, weighted, "auto", unit_variance, None
-    )
+        found, mover = self.manifest, None
+        if block is not None and found.datum is not None:
+            mover = Mover(block, options, found.datum, found.held, found.middle)
+        return Driver(self.job, found.tree, self.executor, stop, progress, mover).run(resume=True)
 
 
 @contextmanager
@@ -184,7 +164,8 @@ def opened(
             room = None if memory is None else int(SHARE * memory) - held
             manifest = divided(division.parts_of(photos) or _parts_for(counted, photos, workers, room))
         most = None if memory is None else int(SHARE * memory) + others
-        job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, most, source)
+        columns = 0 if manifest.datum is None else len(manifest.held)
+        job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, most, source, columns)
         yield Run(folder, manifest, executor, job, workers, memory, held)
 
 

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
+from photogram.distributed.datum import InDatum, rights_of, with_columns
 from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.errors import InputError
@@ -39,12 +40,16 @@ __all__ = [
     "finished",
     "formed",
     "inverted",
+    "located",
     "lost",
     "predicted",
+    "redundancies",
     "relocated",
+    "settled",
     "shelf",
     "solved",
     "state_path",
+    "write_state",
 ]
 
 GIVEN = "0"
@@ -84,6 +89,8 @@ class Job:
         Bytes that a process may hold; None for any number.
     source
         What tells the block and its options from others.
+    columns
+        How many right-hand sides the datum takes that the block is moved to at the end; 0 without one.
     """
 
     folder: Path
@@ -92,6 +99,7 @@ class Job:
     threads: int = 0
     memory: int | None = None
     source: str = ""
+    columns: int = 0
 
 
 @dataclass(frozen=True)
@@ -112,21 +120,28 @@ class Formed:
     decrease: float
     seconds: float
     place: str
+    products: Floats | None = None
+    """(d, d) its share in B^T Q B, where there is a datum to go to."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contribution:
-    """What a node leaves to its parent, and what the driver wants to know."""
+    """What a node leaves to its parent, and what the driver wants to know.
+
+    `columns`: (d, S) what it leaves of right-hand sides for a datum, where there is one to go to.
+    """
 
     row: ContributionRow
     formed: Formed
+    columns: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Inverted:
-    """The cofactors that the children of a node go on with, in their order."""
+    """The cofactors that the children of a node go on with, in their order, and W = Q B of a datum."""
 
     children: list[Floats]
+    columns: list[Floats] | None = None
 
 
 class Shelf:
@@ -229,25 +244,35 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
     with shelf.lock:
         start = time.perf_counter()
         node = _node(job, number)
-        prediction = node.prediction
+        prediction = _prediction(job, node)
         # A factor at another state is of no use any more.
         shelf.drop(lambda key: key[0] == "factor" and key[1:3] == (job.folder, number))
         shelf.make_room(
             prediction["memory_bytes"] - prediction["node_bytes"], job.memory, (job.folder, number)
         )
+        state = _arrays(job, node, number, at.state)
         found = node.form(
-            _state(job, node, number, at.state),
+            state["values"],
             [(_plain(each.row[0]), _plain(each.row[1]), _plain(each.row[2])) for each in contributions],
             damping=at.damping,
             curved=at.curved,
             threads=job.threads,
         )
         row = found.contribution
-        told = Formed(number, found.sum_of_squares, found.decrease, time.perf_counter() - start, _place())
         if found.undetermined is not None:
             raise job.engine.failure(job.folder, number, found.undetermined)
+        columns = products = None
+        if "b" in state:
+            below = [each.columns for each in contributions if each.columns is not None]
+            rights = rights_of(state["b"], node.outer, node.children, below)
+            columns, products = found.reduce(_plain(rights), threads=job.threads)
+            columns = columns.reshape(len(rights), -1)
+            # A node may have nothing to eliminate.
+            products = products.reshape(len(rights), -1) if rights.size else np.zeros((len(rights),) * 2)
+        seconds = time.perf_counter() - start
+        told = Formed(number, found.sum_of_squares, found.decrease, seconds, _place(), products)
         shelf.put(_factor_key(job, number, at), found, prediction["factor_bytes"])
-        return Contribution(row, told)
+        return Contribution(row, told, columns)
 
 
 def about(contribution: Contribution) -> Formed:
@@ -269,7 +294,7 @@ def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[
         node = _node(job, number)
         step = factor.solve(_plain(outer), threads=job.threads)
         state = node.advance(_state(job, node, number, at.state), step)
-        _write_state(job, number, after, state)
+        write_state(job, number, after, {"values": state})
         return [step[rows] for rows in node.children]
 
 
@@ -279,7 +304,7 @@ def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, flo
         node = _node(job, number)
         before = _state(job, node, number, state)
         moved = node.relocate(before, threads=job.threads)
-        _write_state(job, number, after, moved)
+        write_state(job, number, after, {"values": moved})
         one, other = (node.objective(each, threads=job.threads)[-1] for each in (before, moved))
         return one, other
 
@@ -299,6 +324,7 @@ def inverted(
     variance: float | None,
     above: Inverted | Lost | None,
     place: int,
+    datum: InDatum | None = None,
 ) -> Inverted | Lost:
     """Invert a node, and write what has become of its observations and unknowns; or say which factor is lost.
 
@@ -312,6 +338,8 @@ def inverted(
         The variance of unit weight of the whole.
     above, place
         What the parent has handed down, and which of its children this one is; None for the root.
+    datum
+        Where the block was moved to a datum, what takes cofactors there.
     """
     if isinstance(above, Lost):
         return above
@@ -319,14 +347,26 @@ def inverted(
         if shelf.get(_factor_key(job, number, at)) is None:
             return Lost(number)
         node = _node(job, number)
-        prediction = node.prediction
+        prediction = _prediction(job, node)
         there = prediction["node_bytes"] + prediction["factor_bytes"]
         shelf.make_room(prediction["memory_bytes"] - there, job.memory, (job.folder, number))
         factor = shelf.take(_factor_key(job, number, at))
         outer = np.zeros(0) if above is None else _plain(above.children[place])
-        solution, children = factor.invert(outer, _state(job, node, number, after), threads=job.threads)
+        state = _arrays(job, node, number, after)
+        columns = transformation = None
+        if datum is not None:
+            given = np.zeros(0) if above is None or above.columns is None else above.columns[place]
+            w = factor.complete(_plain(given), threads=job.threads)
+            before, reached = (_state(job, node, number, each) for each in datum.last)
+            transformation = (
+                *(_plain(each) for each in (state["t"], w, datum.common, reached - before)),
+                float(state["condition"]),
+                state["staying"].tolist(),
+            )
+            columns = [w.reshape(len(state["t"]), -1)[:, rows] for rows in node.children]
+        solution, children = factor.invert(outer, state["values"], datum=transformation, threads=job.threads)
         job.engine.keep(job.folder, number, solution, variance)
-        return Inverted(children)
+        return Inverted(children, columns)
 
 
 def lost(found: object) -> Lost | None:
@@ -340,6 +380,17 @@ def finished(job: Job, number: int, before: str, after: str, variance: float | N
         node = _node(job, number)
         states = [_state(job, node, number, each) for each in (after, before)]
         job.engine.keep(job.folder, number, node.solution(*states, threads=job.threads), variance)
+
+
+def redundancies(job: Job, number: int) -> tuple[float, float, float, float]:
+    """Return the sums of redundancy numbers, by kinds, that a node has written."""
+    return job.engine.redundancies(job.folder, number)
+
+
+def settled(job: Job, number: int, variance: float | None) -> None:
+    """Scale what has become of a node by a variance of unit weight that is known since."""
+    with shelf.lock:
+        job.engine.settle(job.folder, number, variance)
 
 
 def counted(job: Job, number: int) -> tuple[int, int, int, int, int]:
@@ -356,10 +407,21 @@ def counted(job: Job, number: int) -> tuple[int, int, int, int, int]:
         return *node.counts, job.engine.stations(job.folder, number), size
 
 
+def located(job: Job, number: int, state: str) -> tuple[Indices, Floats]:
+    """Return (N, 3) what the unknowns of a node belong to in the whole block, and (N,) a state of them."""
+    with shelf.lock:
+        node = _node(job, number)
+        return job.engine.unknowns(job.folder, number, node), _state(job, node, number, state)
+
+
 def predicted(job: Job, number: int) -> dict[str, float]:
     """Return what work and memory a node takes."""
     with shelf.lock:
-        return dict(_node(job, number).prediction)
+        return _prediction(job, _node(job, number))
+
+
+def _prediction(job: Job, node: Node) -> dict[str, float]:
+    return with_columns(node.prediction, len(node.initial), len(node.outer), job.columns)
 
 
 def _plain(values: Floats) -> Floats:
@@ -398,23 +460,32 @@ def _factor_key(job: Job, number: int, at: Point) -> tuple[Any, ...]:
 
 
 def _state(job: Job, node: Node, number: int, state: str) -> Floats:
+    return _arrays(job, node, number, state)["values"]
+
+
+def _arrays(job: Job, node: Node, number: int, state: str) -> dict[str, np.ndarray]:
+    """Return the `values` of a state and, where it was moved to a datum, what takes cofactors there."""
     if state == GIVEN:
-        return node.initial
+        return {"values": node.initial}
     path = state_path(job.folder, number, state)
     found = read_arrays(path)
-    if found.keys() != {"values", "seal"} or str(found["seal"]) != _seal(job, number, state, found["values"]):
+    sealed = found.pop("seal", None)
+    if "values" not in found or str(sealed) != _seal(job, number, state, found):
         raise InputError("was changed, or is a state of another node, step or run", file=path)
-    return found["values"]
+    return found
 
 
-def _write_state(job: Job, number: int, state: str, values: Floats) -> None:
+def write_state(job: Job, number: int, state: str, arrays: dict[str, np.ndarray]) -> None:
+    """Write a state of a node: its `values`, and what belongs to them."""
     path = state_path(job.folder, number, state)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_arrays(path, {"values": values, "seal": np.array(_seal(job, number, state, values))})
+    write_arrays(path, {**arrays, "seal": np.array(_seal(job, number, state, arrays))})
 
 
-def _seal(job: Job, number: int, state: str, values: Floats) -> str:
-    """Return what binds values to the run, node and step that they belong to."""
-    digest = hashlib.sha256(f"{job.source} {number} {state} {values.dtype.str}".encode())
-    digest.update(np.ascontiguousarray(values).tobytes())
+def _seal(job: Job, number: int, state: str, arrays: dict[str, np.ndarray]) -> str:
+    """Return what binds arrays to the run, node and step that they belong to."""
+    digest = hashlib.sha256(f"{job.source} {number} {state}".encode())
+    for name, values in sorted(arrays.items()):
+        digest.update(f" {name} {values.dtype.str} {values.shape}".encode())
+        digest.update(np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from datetime import date
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.film.certificate_check import DistanceDifference, difference_of
 from photogram.film.certificate_file import REFERENCES, read_toml
@@ -365,17 +365,25 @@ class Certificate(Shown, Brief):
         """Return by how much K0, K1 ... as printed differ from the table at most, mm; None without either."""
         if not self.radial_coefficients or self.radial is None or self.c is None:
             return None
+        return self._printed_less(1.0)
+
+    def _printed_less(self, sign: float) -> float:
+        """Return by how much printed coefficients differ at most from the table with a sign, mm."""
+        assert self.radial is not None
+        assert self.c is not None
         radius = self.c * np.tan(self.radial.angle)
         powers = radius[:, np.newaxis] ** (2 * np.arange(len(self.radial_coefficients)) + 1)
-        return float(np.abs(powers @ self.radial_coefficients - self.radial.distortion).max())
+        return float(np.abs(powers @ self.radial_coefficients - sign * self.radial.distortion).max())
 
     def told(self) -> list[str]:
         """Return what a user should know beside the verdict, as sentences."""
         said = [*self.remarks]
         apart = self.printed_coefficients()
         if apart is not None and apart > PRINTED:
+            turned = self._printed_less(-1.0) <= PRINTED
             said.append(
                 f"the printed coefficients differ from the table of distortion by up to {1e3 * apart:.1f} um"
+                f"{'; they are those of the table with the other sign: is its sign -1?' if turned else ''}"
             )
         if self.radial_coefficients and self.radial is None:
             said.append("printed coefficients without a table of distortion are not used")

@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Literal, get_args
+
+from photogram.declared import dataclass, replace
 
 __all__ = ["DistanceDifference", "Explanation", "difference_of", "explained"]
 

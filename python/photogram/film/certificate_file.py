@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import date
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -13,7 +13,13 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.film.decentring import SEMI_DIAGONALS, Tangential, of_profile, of_semi_diagonals
+from photogram.film.decentring import (
+    SEMI_DIAGONALS,
+    SemiDiagonals,
+    Tangential,
+    of_profile,
+    of_semi_diagonals,
+)
 from photogram.film.distances import Crossing, MarkDistance, RightAngle
 from photogram.film.lens_table import RadialTable
 from photogram.film.marks import DataStrip, by_side, turned, turned_name
@@ -191,6 +197,13 @@ def _numbers(table: Table, key: str, count: int | None = None) -> Floats:
     return found
 
 
+def _sign(table: Table, key: str, why: str) -> int:
+    value = table.values.get(key)
+    if value not in (1, -1) or isinstance(value, bool):
+        raise table.error(key, f"must say 1 or -1: {why}")
+    return int(value)
+
+
 def _angles(own: Table, c: float | None) -> Floats:
     """Return angles from the axis, rad, of a table that has these in degrees or radii in mm."""
     if ("angle" in own) == ("radius" in own):
@@ -213,29 +226,38 @@ def _radial(table: Table, c: float | None, frame: _Frame) -> dict[str, Any]:
     if "radial" not in table:
         return found
     own = table.table("radial")
-    own.only(("angle", "radius", "distortion", "sd_um", "correlation", *SEMI_DIAGONALS))
+    own.only(("angle", "radius", "distortion", "sign", "sd_um", "correlation", *SEMI_DIAGONALS))
     if c is None:
         raise own.error("distortion", "needs c, the focal length that it belongs to")
     angle = _angles(own, c)
     correlation = own.number("correlation", 0.0, low=0.0, high=0.999)
+    outwards = UM * _sign(own, "sign", "distortion outwards is 1, inwards -1") if "sign" in own else UM
     if "distortion" in own:
-        values = UM * _numbers(own, "distortion", len(angle))
+        values = outwards * _numbers(own, "distortion", len(angle))
         return found | {
             "radial": RadialTable(angle, values, UM * own.positive("sd_um", SD_DISTORTION_UM), correlation)
         }
-    singly = {frame.mark(name): UM * _numbers(own, name, len(angle)) for name in SEMI_DIAGONALS}
+    singly = {frame.mark(name): outwards * _numbers(own, name, len(angle)) for name in SEMI_DIAGONALS}
     try:
-        mean, largest, sd = of_semi_diagonals(
-            angle, singly, UM * own.positive("sd_um") if "sd_um" in own else None
-        )
+        four = of_semi_diagonals(angle, singly, UM * own.positive("sd_um") if "sd_um" in own else None)
     except InputError as error:
         raise own.error("ll", error.message) from None
-    said = (
-        f"opposite semi-diagonals show decentring of up to {significant(largest / UM, 2)} um"
-        f" (sd {significant(sd / UM, 2)} um)"
+    radial = RadialTable(angle, four.mean, four.sd, correlation)
+    return found | {"radial": radial, "remarks": tuple(_told_by(four))}
+
+
+def _told_by(four: SemiDiagonals) -> Iterator[str]:
+    if four.is_elsewhere:
+        x, y = four.centre.tolist()
+        yield (
+            f"opposite semi-diagonals differ alike at all radii: that of symmetry is at ({x:.3f}, {y:.3f}) mm"
+            f" (sd {significant(four.sd_centre, 2)}) from the point about which these count: the indicated"
+            " principal point, and not the calibrated one? Their mean is free of it"
+        )
+    yield (
+        f"opposite semi-diagonals show decentring of up to {significant(four.decentring / UM, 2)} um"
+        f" (sd {significant(four.sd_half_difference / UM, 2)} um)"
     )
-    radial = RadialTable(mean.angle, mean.distortion, mean.sd, correlation)
-    return found | {"radial": radial, "remarks": (said,)}
 
 
 def _tangential(
@@ -243,12 +265,7 @@ def _tangential(
 ) -> Tangential | None:
     if "tangential" not in table:
         return None
-    sign = table.values.get("tangential_sign")
-    if sign not in (1, -1) or isinstance(sign, bool):
-        raise table.error(
-            "tangential_sign",
-            "must say 1 or -1: laboratories count the profile either way, it is not guessed",
-        )
+    sign = _sign(table, "tangential_sign", "laboratories count the profile either way, it is not guessed")
     own = table.table("tangential")
     own.only(("J1", "phi0", "angle", "radius", "displacement", "sd_um"))
     phi0 = math.radians(own.number("phi0")) + (math.pi / 2 if frame.data_strip == "top" else 0.0)

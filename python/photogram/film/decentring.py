@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.film.lens_table import RadialTable
 from photogram.statistics.fits import Fit
 
-__all__ = ["SEMI_DIAGONALS", "Tangential", "of_profile", "of_semi_diagonals"]
+__all__ = ["SEMI_DIAGONALS", "SemiDiagonals", "Tangential", "of_profile", "of_semi_diagonals"]
 
 SEMI_DIAGONALS = ("ll", "ul", "ur", "lr")
+ELSEWHERE = 4.0
+"""Standard deviations by which the point of symmetry is away from that about which radii count."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,45 @@ def of_profile(radius: Floats, displacement: Floats, sd: float) -> tuple[float, 
     return float(fit.parameters[0]), math.sqrt(float(fit.cofactors[0, 0]))
 
 
-def of_semi_diagonals(
-    angle: Floats, distortion: Mapping[str, Floats], sd: float | None
-) -> tuple[RadialTable, float, float]:
-    """Return the mean table of four semi-diagonals, and what decentring they show.
+@dataclass(frozen=True, eq=False)
+class SemiDiagonals:
+    """Distortion along four semi-diagonals.
 
-    Opposite ones differ by decentring, which the mean is free of; what is left, half of ll + ur - ul - lr,
-    has the variance of a single reading, and gives the standard deviation of the mean.
+    Opposite ones differ by what lies to one side, h = u o + d r^2 with the direction u: decentring, and the
+    place o of the point of symmetry, as seen from the point about which radii count.
+
+    Attributes
+    ----------
+    mean, sd
+        (n,) of the four, free of that; its standard deviation (mm).
+    centre, sd_centre
+        (2,) o, the data strip at the left; its standard deviation (mm).
+    decentring
+        The largest half difference of opposite ones, but for o (mm).
+    """
+
+    mean: Floats
+    sd: float
+    centre: Floats
+    sd_centre: float
+    decentring: float
+
+    @property
+    def sd_half_difference(self) -> float:
+        """Of a half difference, mm: it has twice the variance of a mean of four."""
+        return self.sd * math.sqrt(2)
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether radii count about another point than that of symmetry, beyond chance."""
+        return float(np.abs(self.centre).max()) > ELSEWHERE * self.sd_centre
+
+
+def of_semi_diagonals(angle: Floats, distortion: Mapping[str, Floats], sd: float | None) -> SemiDiagonals:
+    """Return the mean of four semi-diagonals, and what opposite ones differ by.
+
+    What is left, half of ll + ur - ul - lr, has the variance of a single reading, and gives the standard
+    deviation of the mean.
 
     Parameters
     ----------
@@ -74,10 +107,6 @@ def of_semi_diagonals(
         (n,) mm along each of `SEMI_DIAGONALS`.
     sd
         Of a mean, where it is known.
-
-    Returns
-    -------
-    The table; the largest half difference of opposite semi-diagonals, and its standard deviation (mm).
 
     Raises
     ------
@@ -89,6 +118,14 @@ def of_semi_diagonals(
     found = single / 2 if sd is None else sd
     if not found > 0:
         raise InputError("the four semi-diagonals are alike: give sd_um, which cannot be found from them")
-    largest = float(np.abs([(ur - ll) / 2, (ul - lr) / 2]).max())
-    # A half difference has twice the variance of a mean of four.
-    return RadialTable(angle, (ll + ul + ur + lr) / 4, found), largest, found * math.sqrt(2)
+    halves: Floats = np.column_stack([ur - ll, ul - lr]) / 2
+    columns = np.column_stack([np.ones(len(angle)), np.tan(angle) ** 2])
+    constant, sd_constant = np.zeros(2), math.inf
+    if len(np.unique(angle)) > columns.shape[1]:
+        constant = np.linalg.lstsq(columns, halves, rcond=None)[0][0]
+        sd_constant = found * math.sqrt(2 * np.linalg.inv(columns.T @ columns)[0, 0])
+    # Along the diagonals to ur and to ul.
+    centre = np.array([[1.0, -1.0], [1.0, 1.0]]) @ constant / math.sqrt(2)
+    four = SemiDiagonals((ll + ul + ur + lr) / 4, found, centre, sd_constant, 0.0)
+    left = halves - constant if four.is_elsewhere else halves
+    return replace(four, decentring=float(np.abs(left).max()))

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import ContradictionError, InputError
 from photogram.network.film_form import Affine, affine_form
 from photogram.network.films import (

@@ -12,12 +12,12 @@ A_j = k_j / (1 + k0)^(2j + 1) the forward camera `brown_forward` is the same map
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.fits import Fit

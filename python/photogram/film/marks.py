@@ -7,12 +7,12 @@ the corners, `ml, mt, mr, mb` amid the sides.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 
 __all__ = ["SIDES", "DataStrip", "UsualPlaces", "by_side", "turned", "turned_name", "usual_places"]
 

@@ -13,12 +13,12 @@ blanks, a line for each thing, `#` before comments; millimetres and radians.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.cards import Card, cards, one_file
 from photogram.formats.format import Format, Wishes

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.formats.column_words import (
     ANGULAR,

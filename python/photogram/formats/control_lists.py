@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
+from photogram.declared import dataclass
 from photogram.formats.project import Project
 from photogram.io.delimited import ColumnTable
 from photogram.io.files import read_lines

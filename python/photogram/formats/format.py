@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from photogram.declared import dataclass, field
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
 from photogram.results.result import Result

@@ -7,13 +7,13 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from photogram.adjustment.adjustment import Progress, UnitVariance
+from photogram.adjustment.adjustment import Progress, UnitVariance, core_options
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import Manifest, result_folder
-from photogram.distributed.running import Run, core_options, opened
+from photogram.distributed.running import Run, opened
 from photogram.formats.format import Wishes
 from photogram.formats.plain.streamed import Streamed
 
@@ -130,7 +130,7 @@ def _run(
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
         given = streamed.project.options
-        options = core_options(unit_variance or given.unit_variance, loss=given.loss)
+        options = core_options(unit_variance or given.unit_variance, given.loss)
         source = streamed.source(options)
         with opened(
             folder,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from photogram.declared import dataclass
 from photogram.formats.project import Size
 from photogram.network.cameras import Camera
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
@@ -11,6 +10,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.film.interior import is_mirrored
 from photogram.formats.plain.films_written import WrittenFilms

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.formats.crs import axes_of, has_place, is_on, to_system
 from photogram.formats.project import frame_of

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.intersection import complete_positions

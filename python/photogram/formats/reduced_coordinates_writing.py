@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+from photogram.declared import dataclass
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.block_contents import check_films
 from photogram.formats.cameras_alone import FORMATS_OF_CAMERAS

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.rigs import Mount
+from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
 __all__ = ["FrameOf", "Rig", "Stand", "mounted"]
@@ -26,11 +27,14 @@ class Rig:
         The sensor that is the frame.
     sensors
         The pose of each other sensor.
+    clocks
+        The clocks of sensors on trajectories whose offset is said.
     """
 
     name: str
     reference: str
     sensors: Mapping[str, Sensor]
+    clocks: Mapping[str, Clock] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
 from photogram.messages import Message

@@ -8,13 +8,13 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number

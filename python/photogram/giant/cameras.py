@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 
+from photogram.declared import dataclass, field
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 

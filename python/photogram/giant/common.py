@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
+from photogram.declared import dataclass
 from photogram.giant.fields import format_deviations, format_real
 from photogram.giant.records import Record, Source
 from photogram.show.angles import ARCSEC

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera, camera_records
 from photogram.giant.common import Common, common_records

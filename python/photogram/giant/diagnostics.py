@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.giant.contents import Contents
 from photogram.giant.limits import Limits
 from photogram.network.block import Block

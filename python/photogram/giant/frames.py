@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 
 import numpy as np
 
+from photogram.declared import dataclass, field
 from photogram.giant.columns import Columns, angle_fields, deviation_fields, position_fields, texts
 from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source

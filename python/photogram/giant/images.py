@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.declared import dataclass, field
 from photogram.giant.columns import Columns, deviation_fields, real_fields, texts
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.declared import dataclass, fields
 from photogram.errors import InputError
 from photogram.giant.records import error_at, message_at
 from photogram.messages import Message, listed

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from photogram.declared import dataclass
 from photogram.messages import quoted
 
 __all__ = ["Marks", "marks_of"]

@@ -6,13 +6,13 @@ pyarrow is an extra (`pip install 'photogram[parquet]'`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from photogram.arguments.types import Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.messages import quoted
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import orjson
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.messages import quoted

@@ -8,7 +8,6 @@ towards the viewer; the camera looks along -z. Whatever numbers a file or a user
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -18,6 +17,7 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import frozen, length, numbers, one_of, shaped
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ import copy
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import frozen, indices, length, shaped, shown, text, truth_value
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows
@@ -723,15 +723,15 @@ def refuse_trajectories(block: Block, what: str, why: str = "which is not taken 
         raise InputError(f"{what}: {flown}, {why}")
 
 
-def refuse_passages(block: Block, what: str) -> None:
-    """Refuse a block whose images pass something beside pose, point and camera.
+def refuse_passages(block: Block, what: str, *, but: type[Passage] | tuple[()] = ()) -> None:
+    """Refuse a block whose images pass something beside pose, point and camera, `but` what is of a kind.
 
     Raises
     ------
     InputError
         `what` does not take what is named.
     """
-    if passed := block.all_passages:
+    if passed := [each for each in block.all_passages if not isinstance(each, but)]:
         raise InputError(f"{what}: images of the block pass a {passed[0].KIND}, which is not taken there")
 
 

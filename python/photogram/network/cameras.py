@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
@@ -16,6 +15,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import is_covariance, number, one_of, shaped, shown, text
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
 from photogram.show.brief import Brief, Rows

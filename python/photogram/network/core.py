@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.memory import available_memory
 from photogram.network.block import Block
 from photogram.network.flown import flown

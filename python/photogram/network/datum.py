@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from photogram.arguments.arrays import names, number, shown, text, truth_value
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.block import Block, position_columns
 
-__all__ = ["DatumRow", "InnerConstraints", "MinimumConstraints", "datum_row", "minimum_row"]
+__all__ = [
+    "DatumRow",
+    "InnerConstraints",
+    "MinimumConstraints",
+    "check_datum",
+    "datum_row",
+    "minimum_row",
+]
 
 DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
 """`inner` or `relative`, points, photos, whether scale counts, photos whose attitudes count, the radius."""
@@ -91,6 +98,18 @@ class MinimumConstraints:
             if len(pair) != 2:
                 raise InputError(f"coordinate is no photo with an axis: {shown(self.coordinate)}")
             object.__setattr__(self, "coordinate", (pair[0], pair[1]))
+
+
+def check_datum(datum: object) -> None:
+    """Refuse what is no datum to choose.
+
+    Raises
+    ------
+    InputError
+        It is none.
+    """
+    if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
+        raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
 
 
 def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:

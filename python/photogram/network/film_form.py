@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network.films import Film
 
 __all__ = ["Affine", "affine_form"]

@@ -8,7 +8,6 @@ p = R(theta) J e + t; the reading is what the scanner has where p is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
@@ -46,47 +46,40 @@ MOST_SHIFTS = 200
 """Unknowns of the reseau of a photo."""
 
 
-@dataclass(frozen=True, eq=False)
 class FilmNumbers(Numbers):
     """Those that readings of scanned films have in common."""
 
 
-@dataclass(frozen=True, eq=False)
 class FilmPlacement(FilmNumbers):
     """Where the film of a photo lay: t1, t2 in mm, theta in radians."""
 
     KIND: ClassVar[str] = "film placement"
 
 
-@dataclass(frozen=True, eq=False)
 class FilmSize(FilmNumbers):
     """How the size of the film of a photo has changed: m, b1, b2."""
 
     KIND: ClassVar[str] = "film size"
 
 
-@dataclass(frozen=True, eq=False)
 class FilmBend(FilmNumbers):
     """What is not affine in the film of a photo: h1, h2 or g1, g2 in 1/mm."""
 
     KIND: ClassVar[str] = "film bend"
 
 
-@dataclass(frozen=True, eq=False)
 class Roll(FilmNumbers):
     """The mean change of size m of the films of a roll."""
 
     KIND: ClassVar[str] = "roll"
 
 
-@dataclass(frozen=True, eq=False)
 class Mark(FilmNumbers):
     """The place of a fiducial mark in the frame of its camera, mm."""
 
     KIND: ClassVar[str] = "fiducial"
 
 
-@dataclass(frozen=True, eq=False)
 class Weights(FilmNumbers):
     """Two weights of a pattern, mm."""
 
@@ -102,7 +95,6 @@ class Scanner(FilmNumbers):
     value: ArrayLike = (1.0, 1.0, 0.0)
 
 
-@dataclass(frozen=True, eq=False)
 class ScannerCurve(FilmNumbers):
     """Three coefficients of the polynomials of a scanner, mm."""
 

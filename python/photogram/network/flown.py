@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.block import Block
 from photogram.network.observations import moments
 from photogram.network.timed import Moment, Timed

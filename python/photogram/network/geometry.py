@@ -7,7 +7,6 @@ frames and collinearity follow the GIANT Program User's Guide (Elassal and Malho
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +15,7 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import length, shaped
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.refraction import Refraction
 

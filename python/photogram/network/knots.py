@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import frozen, numbers, shaped
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.unknowns import Numbers, Unknown
 
@@ -20,7 +20,6 @@ PassageRow = tuple[str, list[int], list[int], Floats]
 """Kind; indices of unknowns; of points, photos or cameras; numbers, as the core takes a passage."""
 
 
-@dataclass(frozen=True, eq=False)
 class Bend(Numbers):
     """The two numbers w of a figure, lengths: of a board, how far its middle is bent along x and along y."""
 

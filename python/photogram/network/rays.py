@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.motion import on_shared

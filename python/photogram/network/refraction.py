@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from photogram.arguments.annotations import check_arguments
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 if TYPE_CHECKING:

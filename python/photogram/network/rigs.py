@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from photogram.arguments.arrays import names, shown
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.timed import Timed
 from photogram.network.unknowns import Sensor, Unknown

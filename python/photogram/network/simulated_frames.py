@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.geometry import Spheroid

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.memory import available_memory
 from photogram.network import geometry

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import get_args
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.attitudes import Attitudes

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position
 from photogram.network.projecting import projected, standing

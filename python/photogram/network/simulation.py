@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from photogram.arguments.arrays import number, one_of, shaped, shown, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.messages import counted
 from photogram.network import geometry

@@ -8,11 +8,10 @@ its entry until the last point that it observes; points share one set of storage
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Indices
+from photogram.declared import dataclass
 
 __all__ = ["Overflow", "Structure", "structure"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Literal, get_args
 
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.lens import Lens

@@ -11,7 +11,6 @@ weighted or known. Times are seconds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown, whole_number
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.network.unknowns import Unknown
 
@@ -51,14 +51,12 @@ class Coefficient(Unknown):
     sd: ArrayLike = np.inf
 
 
-@dataclass(frozen=True, eq=False)
 class PositionCoefficient(Coefficient):
     """A coefficient of the positions of a trajectory, in its axes and the linear unit."""
 
     KIND = "position coefficient"
 
 
-@dataclass(frozen=True, eq=False)
 class RotationCoefficient(Coefficient):
     """A coefficient of the rotation vectors of a trajectory, about the axes of the photo, in radians."""
 
@@ -83,7 +81,6 @@ class GyroBias(Unknown):
     sd: ArrayLike = np.inf
 
 
-@dataclass(frozen=True, eq=False)
 class _Scalar(Unknown):
     def _position(self) -> Floats:
         return np.array([number(f"value of {self.title}", getattr(self, "value")), 0.0, 0.0])  # noqa: B009

@@ -7,7 +7,6 @@ adjustment starts from and, where its standard deviations are neither 0 (known) 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, ClassVar, Self
 
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import names, number, shaped
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 
 __all__ = [

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
+from photogram.declared import dataclass, field
 from photogram.errors import InputError, PhotogramError
 from photogram.messages import Message
 from photogram.perspective_center.deck import Deck

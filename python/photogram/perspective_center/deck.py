@@ -8,12 +8,12 @@ card behind it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.io.records import Record, Source
 from photogram.messages import Message
 from photogram.perspective_center.formats import CardFormat

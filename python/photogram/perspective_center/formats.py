@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 
 import fortranformat
 
+from photogram.declared import dataclass
 from photogram.io.records import Record
 
 __all__ = ["CardFormat"]

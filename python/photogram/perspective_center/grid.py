@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.arrays import names, number, shaped
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.show.brief import Brief
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -20,6 +19,7 @@ from photogram.adjustment.ends import hidden
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.arrays import one_of, shaped
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, listed
 from photogram.network.geometry import rotation_matrix

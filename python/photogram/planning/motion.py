@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.trajectories import Readout
 from photogram.results.result import Result

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -12,6 +11,7 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
 from photogram.arguments.annotations import check_arguments
+from photogram.declared import asdict, dataclass
 from photogram.errors import InputError, RankError
 from photogram.io import json
 from photogram.network.block import Block

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from photogram.adjustment.prediction import image_depths
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.motion import on_shared

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.planning.locations import LOCATIONS
 from photogram.planning.motion import photo_redundancy
 from photogram.results.result import Result

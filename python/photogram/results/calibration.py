@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.declared import dataclass
 from photogram.network.block import ATTITUDE_COLUMNS, position_columns
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
-from photogram.network.observations import Control
-from photogram.results.axes import point_axes
+from photogram.network.observations.control import Control
 from photogram.results.network import AdjustedNetwork
-from photogram.show.quantity import Axis
-from photogram.statistics.agreement import agreement
-from photogram.statistics.findings import Agreement
 
-__all__ = ["CheckPoints", "check_points"]
+if TYPE_CHECKING:
+    from photogram.show.quantity import Axis
+    from photogram.statistics.findings import Agreement
+
+__all__ = ["CheckPoints", "check_points", "point_kinds", "tested_together"]
 
 MOST = 1000
 """Check points that are tested together: of more every second, third ..."""
@@ -112,6 +114,9 @@ def check_points(
 def _agreement(
     network: AdjustedNetwork, block: Block, found: CheckPoints, second: float, whole: bool
 ) -> Agreement:
+    from photogram.results.axes import point_axes  # few blocks have check points
+    from photogram.statistics.agreement import agreement
+
     survey = np.zeros((len(found.rows), 3, 3))
     survey[:, range(3), range(3)] = found.given_sd**2
     asked = partial(agreement, scale=network.covariance_scale, second=second)
@@ -124,12 +129,32 @@ def _agreement(
     )
     if not whole:
         return alone
-    some = slice(None, None, -(-len(found.rows) // MOST))
-    try:
-        joint = network.covariance(("point", found.names[some])) / network.covariance_scale
-    except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
-        return alone
+    some = together(len(found.rows))
+    joint = network.state.joint(found.rows[some].tolist())
+    if joint is None:
+        try:
+            joint = network.covariance(("point", found.names[some])) / network.covariance_scale
+        except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
+            return alone
     return replace(alone, together=asked(found.differences[some], joint, survey[some]).together)
+
+
+def together(count: int) -> slice:
+    """Return which of so many check points are tested together: every so many of too many."""
+    return slice(None, None, -(-count // MOST) or None)
+
+
+def tested_together(block: Block) -> list[int]:
+    """Return the points of a block whose cofactors with each other that test needs, where all take part."""
+    rows = np.flatnonzero(point_kinds(block) == "check")
+    return rows[together(len(rows))].tolist()
+
+
+def point_kinds(block: Block) -> NDArray[np.str_]:
+    """Return (n,) `control` with a component held, `check` with some known but none held, else `pass`."""
+    held = np.isfinite(block.point_sd).any(axis=1)
+    known = np.isfinite(block.point_positions).any(axis=1)
+    return np.where(held, "control", np.where(known, "check", "pass"))
 
 
 def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:

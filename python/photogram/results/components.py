@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from photogram import _photocore
+from photogram.declared import dataclass, replace
 from photogram.io import json
 from photogram.results.network import AdjustedNetwork
 from photogram.show.brief import Brief

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network.knots import Knot
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 from photogram.results.result import Result

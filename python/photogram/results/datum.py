@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.declared import dataclass, field
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
@@ -113,23 +113,39 @@ def held_lines(held: Sequence[tuple[str, str]]) -> str:
     )
 
 
-def datum_of(block: Block, solution: BlockSolution, row: DatumRow | None = None) -> ResultDatum:
-    """Return the datum of what the core found: that of inner constraints or, without, what it held."""
+def datum_of(
+    block: Block,
+    solution: BlockSolution,
+    row: DatumRow | None = None,
+    *,
+    held: Sequence[tuple[int, int]] | None = None,
+) -> ResultDatum:
+    """Return the datum of what the core found: that of inner constraints or, without, what it held.
+
+    Parameters
+    ----------
+    block, solution
+        The block, and what the core found.
+    row
+        Inner constraints, or what cofactors are relative to.
+    held
+        What is held of the block that this one is a part of; None: what the core has held.
+    """
     names = [name.removesuffix("_deg") for name in (*position_columns(block), *ATTITUDE_COLUMNS)]
-    held = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
+    own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
     if row is None:
         given = "minimal control" if solution.minimal_control else "observations"
-        return ResultDatum("minimum constraints" if held else given, held)
+        return ResultDatum("minimum constraints" if own else given, own)
     name, points, photos, scale, attitudes, _ = row
     used = solution.point_rays > 0
     # Where the scale is open, the core has held it by one coordinate of a photo that holds nothing else.
     unknowns: dict[int, list[int]] = {}
-    for photo, unknown in solution.datum:
+    for photo, unknown in solution.datum if held is None else held:
         unknowns.setdefault(photo, []).append(unknown)
-    is_open = any(len(own) == 1 and own[0] < 3 for own in unknowns.values())
+    is_open = any(len(each) == 1 and each[0] < 3 for each in unknowns.values())
     return ResultDatum(
         kind="inner constraints" if name == "inner" else name,
-        held=held,
+        held=own,
         points=tuple(block.point_ids[point] for point in points if used[point]),
         photos=tuple(block.photo_ids[photo] for photo in photos),
         scale=scale and is_open,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.results.result import Result, adjusted

@@ -12,12 +12,12 @@ the lens is forward.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera

@@ -12,12 +12,12 @@ for k pairs that are looked at and m degrees of freedom: the factor 3 stands for
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, meet

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.films import Film, FilmPlacement, FilmSize, Pattern, Readings, Scanner
 from photogram.network.observations import Fiducial
 from photogram.plots.pictured import VectorField

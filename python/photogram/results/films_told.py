@@ -72,19 +72,24 @@ def _photos(result: Result) -> Quantity:
 
 
 def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
-    """Return the marks that were read on other photos of a camera, by the row of the photo."""
+    """Return the marks that were read on other photos of a camera, by the row of the photo.
+
+    The halves of a joined scan are one photo in this.
+    """
     cameras, names = result.block.photo_cameras, result.block.camera_names
     of = {row: 0 if cameras is None else int(cameras[row]) for row, _ in result.films}
-    read = {row: set[str]() for row in of}
+    on = {each.photo: each.frame for each in result.block.mounts}
+    both = {row: on.get(name, name) for row, name in enumerate(result.block.photo_ids) if row in of}
+    read = {name: set[str]() for name in both.values()}
     every: dict[int, dict[str, None]] = {}
     for photo, mark in zip(residuals.photos.tolist(), residuals.marks, strict=True):
-        read[photo].add(mark)
+        read[both[photo]].add(mark)
         every.setdefault(of[photo], {})[mark] = None
     return {
         row: [
             mark.removeprefix(f"{names[camera]} " if names else "")
             for mark in every.get(camera, {})
-            if mark not in read[row]
+            if mark not in read[both[row]]
         ]
         for row, camera in of.items()
     }

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.network.block import Block
 from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners

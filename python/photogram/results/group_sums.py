@@ -10,7 +10,6 @@ redundancy.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.core import core_network

@@ -9,12 +9,12 @@ residuals, c = B' ~v and C = B' R B: the weighted sum of squares would fall by T
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays

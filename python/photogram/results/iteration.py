@@ -1,16 +1,10 @@
-"""The iterations of an adjustment, and how people read them."""
+"""The iterations of an adjustment."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from photogram.declared import dataclass
 
-import numpy as np
-
-from photogram.show.lines import field, table_lines
-from photogram.show.quantity import Quantity, Table
-
-__all__ = ["Iteration", "iteration_lines", "iteration_table"]
+__all__ = ["Iteration"]
 
 
 @dataclass(frozen=True)
@@ -33,37 +27,3 @@ class Iteration:
     weighted_sum_of_squares: float
     largest_change: float
     damping: float
-
-
-def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
-    """Return numbers, sums after the corrections, largest changes, damping; first the start, if it is given.
-
-    Parameters
-    ----------
-    iterations
-        In their order.
-    start
-        Weighted sum of squares before the first.
-    """
-    first = [] if start is None else [(0, start, np.nan, np.nan)]
-    rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in iterations]
-    number, squares, change, damping = np.array([*first, *rows]).reshape(-1, 4).T
-    return [
-        Quantity(number.astype(int), member="number", head="Iteration", decimals=0),
-        Quantity(squares, member="weighted_sum_of_squares", head="Weighted sum of squares", figures=7),
-        Quantity(change, member="largest_change_sd", head="Largest change over sd"),
-        Quantity(damping, member="damping", head="Damping", figures=2),
-    ]
-
-
-def iteration_lines(table: Table, form: str) -> list[str]:
-    """Return the iterations as text, sums of squares in a form."""
-    number, squares, change, damping = table
-    return table_lines(
-        [
-            *field(number, 6, ".0f", "number"),
-            *field(squares, 24, form, "weighted sum of squares", " "),
-            *field(change, 20, ".3e", "largest change / sd", " "),
-            *field(damping, 9, ".1e", "damping", " "),
-        ]
-    )

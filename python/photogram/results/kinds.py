@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.arrays import freeze_fields
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.block import Block
-from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram import _photocore
+    from photogram.statistics.outliers import Observations
 
 __all__ = ["ObservedKind", "observed_kinds", "tested_kind"]
 
@@ -142,6 +142,8 @@ def tested_kind(kind: ObservedKind) -> Observations:
 
     def named(index: tuple[int, ...]) -> str:
         return f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}"
+
+    from photogram.statistics.outliers import Observations
 
     standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
     return Observations(f"components of observations of the kind {kind.kind}", standardized, named)

@@ -6,12 +6,11 @@ at a position and the block Q of their cofactors, the vector there has the covar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network.cameras import Camera
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR, RADIAL, own_images

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -18,6 +17,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import finite_rows, freeze_fields, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, fields
 from photogram.messages import Message
 from photogram.network.core import CoreOptions, core_network
 from photogram.network.given import Given

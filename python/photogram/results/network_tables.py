@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.results.iteration import iteration_table
+from photogram.declared import dataclass, replace
+from photogram.results.iterations_told import iteration_table
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.show.quantity import Axis, Link, Quantity

@@ -8,19 +8,22 @@ from itertools import chain
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
+from photogram.messages import counted, listed
 from photogram.results.kinds import tested_kind
-from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import images, part, terms_of
+from photogram.results.network import AdjustedNetwork, Observed
+from photogram.results.network_tables import control, images, part, terms_of
 from photogram.show.lines import field, stacked, table_lines
-from photogram.show.quantity import Quantity, labelled, long
+from photogram.show.quantity import Quantity, chosen, labelled, long
 from photogram.statistics.findings import Tested, by_t, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = [
     "NOTABLE",
+    "control_lines",
     "image_lines",
+    "is_held",
     "observed_lines",
     "suspect_lines",
     "tested_observations",
@@ -93,6 +96,20 @@ def observed_lines(table: Sequence[Quantity], kind: str) -> list[str]:
     """List observed photos or points, four lines for each: what was observed, and how it fits."""
     forms = {"sd": ".5f", "difference": ".5f", "redundancy": ".3f", "standardized": ".2f"}
     return stacked(table[0], kind, [(labelled(table, label), form) for label, form in forms.items()])
+
+
+def is_held(control: Observed) -> Bools:
+    """Return (r,) whether points are held in all their coordinates: nothing tests them."""
+    found: Bools = (control.sd == 0).all(axis=1)
+    return found
+
+
+def control_lines(result: AdjustedNetwork) -> list[str]:
+    """List control as observations; points that are held in one line."""
+    table, held = control(result), is_held(result.control)
+    weighted, names = np.flatnonzero(~held), [str(each) for each in np.asarray(table[0].values)[held]]
+    told = [f"{counted(len(names), 'point')} held where given, which nothing tests: {listed(names)}"]
+    return [*(observed_lines(chosen(table, weighted), "point") if len(weighted) else ()), *told[: len(names)]]
 
 
 def suspect_lines(result: AdjustedNetwork, tests: Floats, statistic: str) -> list[str]:

@@ -20,12 +20,13 @@ from photogram.results.calibration_report import calibration_sections
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
 from photogram.results.films_told import film_lines
-from photogram.results.iteration import iteration_lines
+from photogram.results.iterations_told import iteration_lines
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, iterations, part, photos, points, stations
 from photogram.results.observed import (
     NOTABLE,
+    control_lines,
     image_lines,
     observed_lines,
     suspect_lines,
@@ -94,7 +95,7 @@ def details(result: Result) -> list[Section]:
         ("Check points: adjusted minus given, standard deviations, test", _check_points(result)),
         (
             "Control as observations: adjusted minus given, redundancy, standardized difference",
-            observed_lines(control(result), "point"),
+            control_lines(result),
         ),
         (
             "Components of control that are not held: adjusted minus given",

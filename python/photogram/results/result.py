@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -13,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import refuse_datum, timed_photos
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
-from photogram.results.check_points import CheckPoints, check_points
+from photogram.results.check_points import CheckPoints, check_points, point_kinds
 from photogram.results.covariance import Failure
 from photogram.results.datum import (
     ResultDatum,
@@ -363,9 +363,7 @@ class Result(OnFilm, AdjustedNetwork):
     @property
     def point_kinds(self) -> NDArray[np.str_]:
         """(n,) `control` with a component held, `check` with components known but none held, else `pass`."""
-        held = np.isfinite(self.block.point_sd).any(axis=1)
-        known = np.isfinite(self.block.point_positions).any(axis=1)
-        return np.where(held, "control", np.where(known, "check", "pass"))
+        return point_kinds(self.block)
 
     @property
     def point_differences(self) -> Floats:

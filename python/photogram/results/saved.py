@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -17,6 +16,7 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.parquet import Column, Repeated, Sheet, packed, parquet_content, read_sheet, unpacked

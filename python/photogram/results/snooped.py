@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import orjson
 
+from photogram.declared import dataclass, replace
 from photogram.io import json
 from photogram.results.exchanged import Exchange
 from photogram.results.network import AdjustedNetwork

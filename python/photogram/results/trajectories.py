@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import freeze_fields, shaped, standard_deviations
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from photogram import _photocore
+from photogram.declared import dataclass
 from photogram.io import json
 from photogram.plots.panels import Where, panels, placed
 from photogram.results.group_sums import GroupSum

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
 from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork

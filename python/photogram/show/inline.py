@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+from typing import Any
 
 from photogram.show.page import Drawing, Picture
 
@@ -28,12 +29,15 @@ def inlined(drawing: Drawing) -> Picture | None:
 
     # Ticks are made when a figure is saved; identifiers are the same in every run.
     with styled({"svg.hashsalt": drawing.name}):
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+
         figure = drawing.draw()
         if figure is None:
             return None
         width, height = figure.get_size_inches()
         content = io.StringIO()
-        figure.savefig(content, format="svg", metadata={"Date": None, "Creator": None})
+        canvas: Any = FigureCanvasSVG(figure)  # without types; savefig would draw all of it twice
+        canvas.print_svg(content, metadata={"Date": None, "Creator": None})
         markup = _embedded(content.getvalue(), drawing, width)
         if len(markup) > LARGEST:
             dots = io.BytesIO()

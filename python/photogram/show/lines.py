@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.show.angles import degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity
 
@@ -172,8 +172,10 @@ def stacked(
     above
         Heads of the components.
     """
-    named = field(names, 10, head=head)
-    blank = [Field("", [" " * 10] * len(named[0].texts))]
+    longest = max((len(str(name)) for name in np.asarray(names.values).tolist()), default=0)
+    width = max(10, longest + 1)
+    named = field(names, width, head=head)
+    blank = [Field("", [" " * width] * len(named[0].texts))]
     rows = []
     for place, (each, form) in enumerate(quantities):
         labels = [each.label] * len(named[0].texts) if isinstance(each.label, str) else each.label

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field, replace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.show.angles import ARCSEC
 
 __all__ = [

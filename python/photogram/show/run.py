@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
 from photogram import _photocore
+from photogram.declared import dataclass, field
 from photogram.messages import printable
 from photogram.show.page import Column, Fact, Facts, Part, Section, Table
 

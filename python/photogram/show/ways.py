@@ -14,13 +14,12 @@ from functools import cached_property, singledispatch, update_wrapper
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, BinaryIO, Generic, NoReturn, ParamSpec, TypeVar, overload
 
-from photogram.statistics.findings import Findings
-from photogram.statistics.verdict import Verdict, verdict
-
 if TYPE_CHECKING:
     import pandas as pd
 
     from photogram.show.page import Page
+    from photogram.statistics.findings import Findings
+    from photogram.statistics.verdict import Verdict
 
 __all__ = [
     "Judged",
@@ -142,6 +141,8 @@ class Judged:
     @cached_property
     def verdict(self) -> Verdict:
         """Whether the result can be used, and if not, what is wrong; see `docs/tests.md`."""
+        from photogram.statistics.verdict import verdict  # what is only adjusted is not judged
+
         return verdict(findings_of(self))
 
 

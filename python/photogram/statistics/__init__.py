@@ -13,8 +13,6 @@ from photogram.statistics.distributions import (
     log_chi_square,
     log_fisher,
 )
-from photogram.statistics.evidence import Test
-from photogram.statistics.findings import Findings, Removed, Tested
 from photogram.statistics.groups import GroupTests, group_tests, parts_tests
 from photogram.statistics.limits import (
     NOTABLE_FACTOR,
@@ -24,17 +22,11 @@ from photogram.statistics.limits import (
     normal_limit,
     studentized_limit,
 )
-from photogram.statistics.verdict import Verdict, verdict
 
 __all__ = [
     "NOTABLE_FACTOR",
-    "Findings",
     "GlobalTest",
     "GroupTests",
-    "Removed",
-    "Test",
-    "Tested",
-    "Verdict",
     "b_method",
     "benjamini_hochberg",
     "bonferroni",
@@ -52,5 +44,4 @@ __all__ = [
     "normal_limit",
     "parts_tests",
     "studentized_limit",
-    "verdict",
 ]

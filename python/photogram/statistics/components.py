@@ -19,13 +19,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.messages import listed
 from photogram.statistics.distributions import bonferroni, critical_normal
 

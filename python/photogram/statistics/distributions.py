@@ -18,7 +18,6 @@ as logarithms: 1e-5000 is still ordered against 1e-4000.
 from __future__ import annotations
 
 import math
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +46,8 @@ LEVEL = 0.05
 
 def critical_normal(level: float) -> float:
     """Return the value that the absolute value of a standard normal variable exceeds with the level."""
+    from statistics import NormalDist  # takes long to import
+
     return -NormalDist().inv_cdf(_level(level) / 2)
 
 

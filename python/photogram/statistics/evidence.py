@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.messages import listed
 from photogram.statistics.distributions import (
     bonferroni,

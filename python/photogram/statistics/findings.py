@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
 from photogram.statistics.groups import GroupTests
 from photogram.statistics.limits import GlobalTest, externally_studentized

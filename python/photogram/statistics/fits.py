@@ -9,11 +9,10 @@ The residuals v have the cofactors Q_vv = L (I - B B') L'; redundancy numbers ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 __all__ = ["Fit"]

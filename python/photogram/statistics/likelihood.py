@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from photogram.declared import dataclass
 from photogram.statistics.limits import global_test
 
 __all__ = ["CHANCE", "IMPROVEMENT", "RIVAL", "TESTED", "Judged", "judged", "likelihood"]

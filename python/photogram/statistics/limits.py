@@ -15,12 +15,12 @@ freedom, r the redundancy number of an observation, and w = v / (sd sqrt(r)) its
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
+from photogram.declared import dataclass
 from photogram.statistics.distributions import (
     LEVEL,
     bonferroni,

@@ -7,11 +7,11 @@ in twenty has a residual beyond it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.declared import dataclass
 from photogram.messages import Message
 
 __all__ = ["Observations", "outliers"]

@@ -9,12 +9,12 @@ unknowns; tests that take the sum of r for the variance are conservative: they f
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 
 __all__ = [
     "SPEAKING",

@@ -16,12 +16,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 
 __all__ = ["FunctionEstimate", "Residuals", "estimate_function", "nonnegative"]
 

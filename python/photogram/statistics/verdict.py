@@ -8,9 +8,9 @@ level and number of tests.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
 from typing import Any
 
+from photogram.declared import asdict, dataclass
 from photogram.messages import counted, listed
 from photogram.statistics.evidence import NAMED, WITHHELD, Evidence, Test
 from photogram.statistics.findings import Findings

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.network.cameras import Camera

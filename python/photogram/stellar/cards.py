@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.fields import parse_integer, parse_real
 from photogram.io.records import Record, Source

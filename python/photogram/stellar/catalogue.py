@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Self
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.show.angles import ARCSEC

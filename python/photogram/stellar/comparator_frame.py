@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.declared import dataclass
 from photogram.stellar.parameters import INDEX
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ adjustment (W. Baarda's test of a group of observations, Netherlands Geodetic Co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.odds import binomial_tail
 from photogram.stellar.places import Earth

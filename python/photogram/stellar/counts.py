@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
 from photogram.stellar.problem import Problem
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.sky import TAU, refraction
 

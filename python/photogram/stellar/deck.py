@@ -6,12 +6,12 @@ camera.md`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cards import Card, Cards

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from photogram.declared import dataclass, replace
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.identification import identify
 from photogram.stellar.matching import STRETCH

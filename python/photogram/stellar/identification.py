@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import FEWEST, STRETCH, Match, Search, match

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Bools
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth

@@ -8,12 +8,11 @@ zero; the level is that of all groups together (Bonferroni).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["LEVEL", "LensTest", "equal", "test_scale", "test_terms"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 __all__ = ["LENSES", "Lens", "lens_named"]

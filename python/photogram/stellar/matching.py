@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 

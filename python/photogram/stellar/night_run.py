@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.messages import Message, listed
 from photogram.stellar.comparison import fewer_stars, held_out

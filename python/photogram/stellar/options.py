@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
 
+from photogram.declared import dataclass, fields
 from photogram.errors import InputError
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import Site

@@ -6,12 +6,12 @@ import math
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.show.angles import ARCSEC
 from photogram.stellar.catalogue import Catalogue

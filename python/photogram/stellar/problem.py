@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.show.brief import Brief

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.show.brief import Brief

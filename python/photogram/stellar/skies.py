@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import available_memory
 from photogram.messages import listed

@@ -6,14 +6,13 @@ angles are positive west; longitudes are positive west.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.show.angles import ARCSEC
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.network.cameras import Camera
@@ -203,7 +203,6 @@ class SkyCamera:
         return of(values, covariance, lens, document.get("common_scale") is True)
 
 
-@dataclass(frozen=True, eq=False)
 class BrownCamera(SkyCamera):
     """A pinhole camera with Brown's distortion: `SkyCamera` of the lens `brown`.
 

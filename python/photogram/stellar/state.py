@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, field
 from photogram.stellar.problem import Problem
 
 __all__ = ["Level", "Solved"]

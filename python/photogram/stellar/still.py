@@ -8,12 +8,11 @@ chi-squared with 3 (E - 1) degrees of freedom, that of one exposure against the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.stellar.skies import SkyCalibration
 
 __all__ = ["LEVEL", "Standstill", "stood_still"]

@@ -7,7 +7,6 @@ y along the rows.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import frozen, length, names, number, one_of, shaped, text, whole_number
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.show.brief import Brief, Rows
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import ClassVar, Literal, get_args
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, fields
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
 from photogram.network.trajectories import Clock

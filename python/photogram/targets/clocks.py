@@ -40,7 +40,7 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
             photos = [result.block.photo_ids[row] for row in calibrated.photos[views].tolist()]
             what = f"the offset of {each.name} is not determined: the board hardly moves"
             told = (
-                f"{what}; {share:.0%} of its motion are errors of its poses. Give sd_offsets, or sync known"
+                f"{what}; {share:.0%} of its motion are errors of its poses. Weigh it (sd_offsets, --offset)"
             )
             raise RankError(told, photos, [], [each.name], what)
         if share > NOTABLE:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
 from photogram.show.brief import Brief, Rows

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import is_covariance, number, whole_number
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.csv_text import csv_text

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
+from photogram.declared import dataclass
 from photogram.io.files import read_beginning, reading
 from photogram.targets.board import Board
 from photogram.targets.board_files import is_board

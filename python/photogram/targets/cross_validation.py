@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.show.brief import Brief, Rows
 from photogram.targets.datums import datum_rows
 from photogram.targets.difference_test import EXPLAINED, DifferenceTest

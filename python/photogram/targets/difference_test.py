@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.statistics.distributions import log_chi_square, log_fisher
 
 __all__ = ["DifferenceTest"]

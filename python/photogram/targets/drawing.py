@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, INK, ORDERED, VERMILION

@@ -7,11 +7,11 @@ triangulation) is computed from these arrays; steps are R <- Exp(w) R, t <- t + 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.network.cameras import Camera
 from photogram.targets.imaging import unknown_of
 from photogram.targets.vision import cross_matrices

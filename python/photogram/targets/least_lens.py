@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.imaging import TURNED, motion_partials, values_of

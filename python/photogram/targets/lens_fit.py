@@ -41,8 +41,10 @@ GRID = (60, 40)
 NEARLY_ACROSS = math.cos(math.radians(89.0))
 """Rays further from the axis have no image in a perspective camera."""
 _FIRST = frozenset({"f", "fx", "fy", "cx", "cy"})
-_STAGES = (frozenset({"k", "k0", "k1"}), frozenset({"k2"}), frozenset({"p0", "p1", "p2"}))
+_STAGES = (frozenset({"k", "k0", "k1", "r1"}), frozenset({"k2", "r2"}), frozenset({"p0", "p1", "p2"}))
 """Terms in the order in which they are freed, after these; the rest follow together."""
+_SCALES = frozenset({"r0"})
+"""Terms that are held: fx and fy do the same."""
 _STARTS = (("alpha", 0.5), ("beta", 1.0), ("omega", 0.5))
 """Where terms begin that say nothing at 0."""
 KNOTS, ORDER = (30, 20), 3.0
@@ -106,7 +108,7 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
     start = _start(source, size, "w" in names)
     if splined:
         start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": _field(source, size, knots)}
-    free = {*()} if splined else {*names} - {"w", "h"} if count is None else {*names[: 4 + count]}
+    free = {*()} if splined else {*names} - {"w", "h", *_SCALES} if count is None else {*names[: 4 + count]}
     return Camera(
         own,
         {name: value for name, value in start.items() if name in names},

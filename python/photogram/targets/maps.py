@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import io
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.io.csv_text import csv_text
 from photogram.network.hull import hull, outside
 from photogram.show.brief import Brief, Rows

@@ -7,12 +7,12 @@ lies where on the board, whichever way its pattern was printed, and tells false 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.targets.board import Board
 from photogram.targets.saddles import settled
 

@@ -6,12 +6,12 @@ With the rays r_a of camera a at pixels q and the motion T of the axes,  d(q) = 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed

@@ -20,6 +20,7 @@ LENSES = {
     "PINHOLE": ("pinhole", 4),
     "STEREOGRAPHIC": ("stereographic", 4),
     **{f"OPENCV{terms}": ("opencv_pinhole", 4 + terms) for terms in (4, 5, 8, 12)},
+    "CAHVOR": ("cahvor", 9),
 }
 """Models by the name here, with as many of its parameters."""
 SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x_deg=([\d.]+)")
@@ -46,7 +47,10 @@ def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera
             knots=np.reshape(values[4:], (int(ny), int(nx), 2)),
         )
     if said not in LENSES:
-        raise InputError(f"{model} is none of the lenses that are taken: {', '.join(LENSES)}, splined ones")
+        raise InputError(
+            f"{model} is none of the lenses that are taken, {', '.join(LENSES)}, splined ones:"
+            f" `mrcal-convert-lensmodel --sampled --intrinsics-only {PREFIX}OPENCV8 FILE` fits one that is"
+        )
     own, count = LENSES[said]
     _count(model, values, count)
     names = Camera(own, dict.fromkeys(CORE, 1.0)).names[:count]

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import ast
 import base64
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import read_text
 from photogram.network.cameras import Camera

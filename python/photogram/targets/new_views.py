@@ -10,11 +10,10 @@ where only the unknowns that the view touches, and those that J is of, count.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.show.brief import Brief, Rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.imaging import rays

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.targets.families import POOR, rays_of

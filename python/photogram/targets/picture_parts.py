@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from photogram.declared import dataclass
 
 __all__ = ["PARTS", "PicturePart", "parts_of"]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -42,6 +43,7 @@ def read(
     views: ViewBy = "name",
     within: float = 0.005,
     sync: Synchronisation = "known",
+    offsets: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     pixel_origin: str = "center",
     size: tuple[int, int] | None = None,
     sd0: float | None = None,
@@ -70,6 +72,9 @@ def read(
     sync
         `known`: images of one view were taken at one time; `none`: each has a pose of its own; `offset`: at
         their times by the clock of their camera, whose offset is unknown.
+    offsets
+        What is known of these by the names of cameras: seconds, and their standard deviations, 0 where one is
+        held, infinite where it is free (the default, from 0).
     sd0, regularise
         As of :class:`Calibration`.
     progress
@@ -92,9 +97,10 @@ def read(
         given = _given(path, models, corners, own)
         prior = None if knot_sd and not regularise else regularise or given.regularise
         given = given.replace(cameras=with_knot_sd(given.cameras, knot_sd, prior), regularise=prior, sd0=sd0)
-        if sync != "known":
+        if sync != "known" or offsets:
             raise InputError(
-                f"{models[0].name} says which pictures are of one view: --sync {sync} goes without", file=path
+                f"{models[0].name} says which pictures are of one view: --sync, --offset go without",
+                file=path,
             )
         return given if shape is None else given.replace(board=given.board.replace(shape=shape))
     how = Grouping(
@@ -117,7 +123,7 @@ def read(
     seen, told = grouped(found, how)
     start = first_values(own, seen, model, knots or KNOTS)
     poses = start.picture_poses if sync == "none" else start.poses
-    return Calibration(
+    calibration = Calibration(
         board=own,
         corners=start.corners,
         cameras=with_knot_sd(start.cameras, knot_sd, regularise),
@@ -129,6 +135,7 @@ def read(
         regularise=regularise,
         messages=[*found.messages, *told, *start.remarks],
     )
+    return calibration.with_offsets(offsets) if offsets else calibration
 
 
 def _only_board(boards: Sequence[Path]) -> Board | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.results.network_tables import points
 from photogram.results.report import details, summary
 from photogram.show.lines import fact_lines, field, table_lines
 from photogram.show.quantity import Quantity
@@ -25,7 +26,21 @@ ON_TOP = 2
 @np.errstate(over="ignore")
 def report(calibrated: Calibrated) -> str:
     """Return the report of a calibration."""
-    return composed(headline(TITLE), [*calibration_summary(calibrated), *details(calibrated.result)])
+    block = [
+        (title, _held_points(calibrated) or lines if title == "Points" else lines)
+        for title, lines in details(calibrated.result)
+    ]
+    return composed(headline(TITLE), [*calibration_summary(calibrated), *block])
+
+
+def _held_points(calibrated: Calibrated) -> list[str]:
+    """Return a line of the points of a board that is held; none of other boards."""
+    if calibrated.calibration.shape != "held":
+        return []
+    *_, rays, _, _ = points(calibrated.result)
+    few, many = int(np.min(rays.values)), int(np.max(rays.values))
+    pictures = f"{few}" if few == many else f"{few} to {many}"
+    return [f"{len(rays.values)} points of the board, held, in {pictures} pictures each"]
 
 
 def calibration_summary(calibrated: Calibrated) -> list[Section]:

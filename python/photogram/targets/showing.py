@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.messages import counted, listed
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.imaging import rays

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
 from photogram.messages import Undetermined
 from photogram.network.attitudes import Attitudes

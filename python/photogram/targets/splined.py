@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.declared import dataclass
 from photogram.network.knots import Knot, beyond_knots
 from photogram.network.observations.prior import Prior
 from photogram.targets.calibrated import Calibrated

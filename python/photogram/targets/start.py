@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Self, get_args
 
@@ -158,6 +158,30 @@ class Start(Valued, Brief):
     def replace(self, **changes: Any) -> Self:
         """Return the calibration with some fields replaced, checked anew."""
         return replace(self, **changes)
+
+    def with_offsets(self, known: Mapping[str, tuple[float, float]]) -> Self:
+        """Return the calibration with what is known of the offsets of some cameras' clocks.
+
+        Parameters
+        ----------
+        known
+            Offsets and their standard deviations by the names of cameras, seconds: 0 where one is held,
+            infinite where it is free.
+
+        Raises
+        ------
+        InputError
+            A camera without an offset: none of that name, a reference, or pictures that are synchronised.
+        """
+        places = {each.name: row for row, each in enumerate(self.cameras)}
+        there = [name for name, row in places.items() if self.tied[row] and self.sync == "offset"]
+        if strange := [name for name in known if name not in there]:
+            why = f"cameras with one are {', '.join(there)}" if there else "--sync offset makes them unknowns"
+            raise InputError(f"the camera {strange[0]} has no offset: {why}")
+        offsets, sd = np.array(self.offsets), np.array(self.sd_offsets)
+        for name, own in known.items():
+            offsets[places[name]], sd[places[name]] = own
+        return self.replace(offsets=offsets, sd_offsets=sd)
 
     @property
     def tied(self) -> Bools:

@@ -12,11 +12,11 @@ have in common: no mean of many points is free of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.targets.housing import Housing
 from photogram.targets.imaging import imaged, motion_partials, rays
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
+from photogram.declared import dataclass, field
 from photogram.targets.compared import CameraDifference
 from photogram.targets.cross_validation import CrossValidation, Into
 from photogram.targets.datums import DatumName

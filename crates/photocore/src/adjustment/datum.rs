@@ -86,6 +86,34 @@ pub(super) struct Target<'a> {
     pub reference: &'a [f64],
 }
 
+/// What a network that is adjusted in parts is taken to a datum by: columns over all unknowns, one after the other.
+#[derive(Debug)]
+pub struct DatumColumns {
+    /// B.
+    pub b: Vec<f64>,
+    /// T = G (B^T G)^-1.
+    pub t: Vec<f64>,
+    /// Of B^T G, its columns scaled.
+    pub condition: f64,
+    /// Whether there are no more carriers than columns: they do not move in this datum.
+    pub exact: bool,
+}
+
+/// Moves a network to a datum, as it is adjusted, with what takes its cofactors there.
+///
+/// # Errors
+/// A network that is not free, carriers that do not carry all null vectors.
+pub fn moved_with_columns(
+    problem: &AnyProblem<'_>,
+    adjusted: Adjusted<'_>,
+    datum: &Datum,
+    reference: &[f64],
+    threads: &Threads,
+) -> Result<(Vec<f64>, DatumColumns), DatumError> {
+    let (unknowns, basis) = moved(problem, adjusted, datum, reference, threads)?;
+    Ok((unknowns, basis.columns()))
+}
+
 /// B in the rows of the carriers, and T = G (B^T G)^-1, in the columns for which B divided by the factors is orthonormal.
 #[derive(Debug)]
 pub(super) struct Basis {
@@ -100,6 +128,17 @@ pub(super) struct Basis {
 }
 
 impl Basis {
+    /// Both over all unknowns.
+    fn columns(self) -> DatumColumns {
+        let Self { carriers, b: of_carriers, t, d, condition } = self;
+        let (count, mut b) = (t.len() / d.max(1), vec![0.0; t.len()]);
+        for (row, &carrier) in carriers.iter().enumerate() {
+            (0..d).for_each(|k| b[k * count + carrier] = of_carriers[(row, k)]);
+        }
+        let t = (0..d).flat_map(|k| t.iter().skip(k).step_by(d)).copied().collect();
+        DatumColumns { b, t, condition, exact: carriers.len() == d }
+    }
+
     /// The right-hand sides B, over all unknowns, one after the other. Held unknowns stand in the normal equations with unit weight: their
     /// columns of Q are zero.
     pub fn rights(&self, problem: &AnyProblem<'_>, held: &[usize]) -> Vec<f64> {

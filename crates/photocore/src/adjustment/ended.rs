@@ -35,6 +35,7 @@ impl Adjustment {
             cofactors: None,
             lost: None,
             selected: None,
+            joint: None,
             undetermined: None,
             counts: problem.counts(&[]),
             datum: vec![],

@@ -208,7 +208,7 @@ impl Linearized {
     }
 
     /// Whether an unknown is neither fixed nor held.
-    fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
+    pub(super) fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
         problem.sd[unknown] != 0.0 && !self.held.contains(&unknown)
     }
 
@@ -251,6 +251,23 @@ impl Linearized {
             transformation.apply_to_functions(rows, columns, &mut matrix);
         }
         Ok(matrix)
+    }
+
+    /// The cofactors of every two of some unknowns; None where they would take more memory than there may be.
+    pub(super) fn joint(
+        &self,
+        problem: &AnyProblem<'_>,
+        unknowns: &[usize],
+        threads: &Threads,
+        between: Between<'_>,
+    ) -> Result<Option<Vec<f64>>, AdjustError> {
+        let rows: Vec<Function> =
+            unknowns.iter().map(|&unknown| std::iter::once((unknown, 1.0)).collect()).collect();
+        match self.cofactors(problem, &rows, None, None, threads, between) {
+            Ok(found) => Ok(Some(found)),
+            Err(CofactorError::Memory { .. }) => Ok(None),
+            Err(CofactorError::Adjust(error)) => Err(error),
+        }
     }
 
     /// What a function takes of unknowns that are neither held nor fixed: the cofactors of others are zero in this datum.

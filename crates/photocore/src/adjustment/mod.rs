@@ -95,7 +95,7 @@ mod trust_region;
 mod walk;
 
 pub use damped::step_rules;
-pub use datum::{Adjusted, Datum, DatumError};
+pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
@@ -121,3 +121,4 @@ pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use term::Term;
 pub use terms::Terms;
 pub use traces::{EquationGroups, GroupSquares, Probing};
+pub use transformation::DatumOfPart;

@@ -12,10 +12,13 @@ use super::linearized::Linearized;
 use super::loss::{Loss, Reweighting};
 use super::options::Phase;
 use super::problem::AnyProblem;
-use super::result::{AdjustError, Adjustment};
+use super::result::{AdjustError, Adjustment, unless_stopped};
 use super::run::{Watch, between};
+use super::transformation::{DatumOfPart, Transformation};
 use crate::Threads;
-use crate::normals::{Contribution, FactorOptions, InvertOptions, SolveOptions, packed};
+use crate::normals::{
+    Contribution, Equations, FactorOptions, InvertOptions, ReducedRights, SolveOptions, packed,
+};
 
 /// Why a part is not formed, solved or inverted.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -104,10 +107,54 @@ impl Linearized {
         Ok(self.solve(&self.equations(problem, threads), &options, threads, &mut between)?)
     }
 
+    /// Reduces right-hand sides over the unknowns of a part, one after the other: those at home here, with what the parts below have left.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn reduce_rights(
+        &self,
+        problem: &AnyProblem<'_>,
+        mut rights: Vec<f64>,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<ReducedRights, PartError> {
+        // What is held or fixed stands in the normal equations by itself.
+        let unknowns = problem.layout().unknowns();
+        let fixed: Vec<usize> = (0..unknowns).filter(|&unknown| !self.is_free(problem, unknown)).collect();
+        for right in rights.chunks_exact_mut(unknowns.max(1)) {
+            fixed.iter().for_each(|&unknown| right[unknown] = 0.0);
+        }
+        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        let equations = self.equations(problem, threads);
+        let of = (&equations as &dyn Equations, &self.prior);
+        Ok(unless_stopped(problem.system.reduce_rights(threads, &self.factor, of, &rights, &mut between))?)
+    }
+
+    /// Solves where right-hand sides were reduced, the solutions for the outer unknowns being given.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn solve_reduced_rights(
+        &self,
+        problem: &AnyProblem<'_>,
+        reduced: ReducedRights,
+        outer: &[f64],
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Vec<f64>, PartError> {
+        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        let equations = self.equations(problem, threads);
+        let of = (&equations as &dyn Equations, &self.prior);
+        let system = &problem.system;
+        let found = system.solve_reduced_rights(threads, &self.factor, of, reduced, outer, &mut between);
+        Ok(unless_stopped(found)?)
+    }
+
     /// The adjustment of what is at home in a part, and the cofactors of the unknowns of each part below: lower triangles, column by column.
     ///
     /// * `outer`: the same of the outer unknowns;
-    /// * `reached`: the values after the last step; cofactors are those of the values before it.
+    /// * `reached`: the values after the last step; cofactors are those of the values before it;
+    /// * `datum`: what takes them to a datum of the whole. Those of the parts below are not taken there.
     ///
     /// # Errors
     /// Unknowns that are not determined, an interruption, no memory; another number of outer unknowns.
@@ -116,10 +163,12 @@ impl Linearized {
         problem: &AnyProblem<'_>,
         outer: &[f64],
         reached: Vec<f64>,
+        datum: Option<DatumOfPart<'_>>,
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<(Adjustment, Vec<Vec<f64>>), PartError> {
-        let (layout, part) = (problem.layout(), self.determined()?);
+        let (layout, mut part) = (problem.layout(), self.determined()?);
+        part.transformation = datum.map(|datum| Transformation::of_part(&datum, layout.unknowns()));
         let outer_cofactors = packed(problem.system.symbolic().outer_unknowns());
         if outer.len() != outer_cofactors || part.damping() != 0.0 || part.is_curved() {
             return Err(PartError::Foreign);
@@ -134,8 +183,9 @@ impl Linearized {
         problem.system.release();
         let below = layout.contributions().iter().map(|blocks| inverted.selected.triangle(layout, blocks));
         let below = below.collect();
-        let mut adjustment =
-            Adjustment::between(problem, loss, &inverted.held, &inverted.values, reached, threads);
+        let before = datum.map(|datum| reached.iter().zip(datum.last).map(|(x, dx)| x - dx).collect());
+        let before: &Vec<f64> = before.as_ref().unwrap_or(&inverted.values);
+        let mut adjustment = Adjustment::between(problem, loss, &inverted.held, before, reached, threads);
         adjustment.put(problem, inverted);
         Ok((adjustment, below))
     }

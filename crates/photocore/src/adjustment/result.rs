@@ -76,6 +76,8 @@ pub struct Adjustment {
     pub cofactors: Option<Cofactors>,
     /// The inverse that they come from, where tests of groups are to follow.
     pub(super) selected: Option<SelectedInverse>,
+    /// Of every two unknowns that were to be asked together, row by row (see [`super::adjust_by_groups`]).
+    pub joint: Option<Vec<f64>>,
     /// Why the last values give no cofactors although they were asked for.
     pub undetermined: Option<AdjustError>,
     /// Local blocks that the last step has led to where they harm all others (see [`super::Evaluated::collapsed`]): the iterations

@@ -45,7 +45,7 @@ pub fn adjust(
     threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, None, threads, watch, false)
+    adjusted(problem, options, None, threads, watch, None)
 }
 
 /// Adjusts a network that is free, to end in a datum: it is moved there before the last formation, so that this one serves the cofactors
@@ -63,10 +63,12 @@ pub fn adjust_in_datum(
     threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, Some(Target { datum, reference }), threads, watch, false)
+    adjusted(problem, options, Some(Target { datum, reference }), threads, watch, None)
 }
 
 /// Adjusts, and keeps what tests of groups of observations need: [`Leverages::of`] takes it over.
+///
+/// * `joint`: unknowns whose cofactors with each other are kept too ([`Adjustment::joint`]), from the last factor.
 ///
 /// # Errors
 /// Those of [`adjust`].
@@ -75,10 +77,11 @@ pub fn adjust_in_datum(
 pub fn adjust_by_groups(
     problem: &AnyProblem<'_>,
     options: &Options,
+    joint: &[usize],
     threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, None, threads, watch, true)
+    adjusted(problem, options, None, threads, watch, Some(joint))
 }
 
 fn adjusted(
@@ -87,7 +90,7 @@ fn adjusted(
     target: Option<Target<'_>>,
     threads: &Threads,
     watch: Watch<'_>,
-    by_groups: bool,
+    by_groups: Option<&[usize]>,
 ) -> Result<Adjustment, AdjustError> {
     let mut run = Run {
         problem,
@@ -196,8 +199,8 @@ impl<'a> End<'a> {
 pub(super) struct Run<'a, 'w> {
     pub problem: &'a AnyProblem<'a>,
     pub options: &'a Options,
-    /// Whether to keep what tests of groups need.
-    by_groups: bool,
+    /// Where what tests of groups need is kept: unknowns whose cofactors with each other are kept too.
+    by_groups: Option<&'a [usize]>,
     /// The datum to end in.
     target: Option<Target<'a>>,
     /// Whether the next formation will be the last one, there being a datum to end in.
@@ -353,7 +356,11 @@ impl<'a> Run<'a, '_> {
                 let mut between = between(&mut *self.watch, Phase::Solve, locals);
                 linearized.take_to_datum(&equations, self.threads, &mut between)?;
             }
-            let what = InvertOptions { by_groups: self.by_groups, ..InvertOptions::default() };
+            if let Some(joint) = self.by_groups.filter(|joint| !joint.is_empty()) {
+                let mut between = between(&mut *self.watch, Phase::Invert, locals);
+                adjustment.joint = linearized.joint(problem, joint, self.threads, &mut between)?;
+            }
+            let what = InvertOptions { by_groups: self.by_groups.is_some(), ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);
             adjustment.put(problem, linearized.invert(&equations, &what, self.threads, &mut between)?);
             adjustment.redundancy_excess = options.loss.is_none().then(|| adjustment.excess());

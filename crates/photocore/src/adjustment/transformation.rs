@@ -28,6 +28,24 @@ pub(super) struct Transformation {
     pub staying: Vec<usize>,
 }
 
+/// What takes the cofactors of a part to a datum of the whole (see [`super::datum`]): columns over the unknowns of the part, outer ones
+/// too, one after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct DatumOfPart<'a> {
+    /// T, as of [`super::DatumColumns`].
+    pub t: &'a [f64],
+    /// W = Q B.
+    pub w: &'a [f64],
+    /// B^T W of the whole, row by row.
+    pub common: &'a [f64],
+    /// The last step, which was taken before the whole was moved to the datum.
+    pub last: &'a [f64],
+    /// Of B^T G of the whole.
+    pub condition: f64,
+    /// Unknowns that do not move in the new datum, ascending.
+    pub staying: &'a [usize],
+}
+
 /// Cofactors of one block, and of which unknowns they are.
 struct Block<'a> {
     rows: Range<usize>,
@@ -36,6 +54,21 @@ struct Block<'a> {
 }
 
 impl Transformation {
+    /// Of a part, from what the whole has (see [`DatumOfPart`]).
+    pub fn of_part(datum: &DatumOfPart<'_>, unknowns: usize) -> Self {
+        let d = datum.t.len() / unknowns.max(1);
+        let by_rows = |columns: &[f64]| {
+            (0..unknowns).flat_map(|unknown| (0..d).map(move |k| columns[k * unknowns + unknown])).collect()
+        };
+        Self {
+            t: by_rows(datum.t),
+            w: by_rows(datum.w),
+            common: Mat::from_fn(d, d, |i, j| datum.common[i * d + j]),
+            condition: datum.condition,
+            staying: datum.staying.to_vec(),
+        }
+    }
+
     /// Whether an unknown does not move in the new datum.
     pub fn stays(&self, unknown: usize) -> bool {
         self.staying.binary_search(&unknown).is_ok()

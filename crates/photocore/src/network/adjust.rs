@@ -1,8 +1,14 @@
 //! The adjustment of a network: iterations, and what leaves it between them.
 
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
 use super::problem::{Assembled, Reached};
 use super::screens::{Begin, Ended, Screening};
-use super::{Converged, InnerConstraints, Network, NetworkDatum, NetworkError, Options, Solution, State};
+use super::{
+    Converged, InnerConstraints, Joint, Network, NetworkDatum, NetworkError, Options, Solution, State,
+};
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
 
@@ -28,7 +34,8 @@ pub struct NetworkAdjustment<'a> {
 #[derive(Debug, Clone, Copy, Default)]
 struct Goal<'a> {
     datum: Option<&'a InnerConstraints>,
-    keep: bool,
+    /// Where what tests need is kept: points whose cofactors with each other are kept too.
+    keep: Option<&'a [usize]>,
 }
 
 impl<'a> NetworkAdjustment<'a> {
@@ -49,10 +56,10 @@ impl<'a> NetworkAdjustment<'a> {
     }
 
     /// Keeps what tests of it need ([`Solution::converged`]) where it converges by least squares and there is memory: it takes about a
-    /// twentieth longer.
+    /// twentieth longer. Cofactors of some points with each other are kept too ([`Solution::joint`]), from the last factor.
     #[must_use]
-    pub fn kept(mut self) -> Self {
-        self.goal.keep = true;
+    pub fn kept(mut self, points: &'a [usize]) -> Self {
+        self.goal.keep = Some(points);
         self
     }
 
@@ -146,7 +153,7 @@ impl Network {
                 }
                 (None, Ok(mut ended)) => {
                     ended.go_on_from(before.map(|(earlier, _)| earlier));
-                    return self.solved(options, goal.datum, assembled, ended, screening, threads, watch);
+                    return self.solved(options, goal, assembled, ended, screening, threads, watch);
                 }
                 (_, Err(error)) => {
                     let error = NetworkError::new(error, &assembled);
@@ -160,7 +167,7 @@ impl Network {
     fn solved(
         &self,
         options: &Options,
-        datum: Option<&InnerConstraints>,
+        Goal { datum, keep }: Goal<'_>,
         assembled: Assembled,
         mut ended: Adjustment,
         Screening { leaving, .. }: Screening,
@@ -173,6 +180,12 @@ impl Network {
             }
             (lost, _) => lost.unwrap_or(0.0),
         };
+        let joint = ended.joint.take().map(|found| {
+            let points = assembled.taking_part(keep.unwrap_or_default());
+            let points = points.into_iter().map(|(point, _)| point).collect();
+            let size = found.len().isqrt();
+            Joint { points, cofactors: DMatrix::from_vec(size, size, found) }
+        });
         let left_out = &leaving.left_out.points;
         let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
         let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, threads);
@@ -186,6 +199,7 @@ impl Network {
         solution.datum.relative_error = lost;
         solution.dropped.extend(leaving.harmful);
         solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
+        solution.joint = joint.filter(|_| found.is_some()).map(Arc::new);
         solution.converged =
             found.map(|found| Box::new(Converged::new(assembled, options.adjustment, found)));
         Ok(solution)
@@ -218,11 +232,14 @@ fn iterated(
         Some(_) => own.covariance = false,
         None => {}
     }
-    let by_groups = keep && datum.is_none() && plain && !matches!(own.method, Method::Full(_));
-    if by_groups && assembled.may_keep(options) {
-        adjustment::adjust_by_groups(problem, &own, threads, watch)
-    } else {
-        adjustment::adjust(problem, &own, threads, watch)
+    let by_groups = datum.is_none() && plain && !matches!(own.method, Method::Full(_));
+    match keep.filter(|_| by_groups && assembled.may_keep(options)) {
+        Some(points) => {
+            let unknowns = |(_, place)| problem.model.of_point(place);
+            let joint: Vec<usize> = assembled.taking_part(points).into_iter().flat_map(unknowns).collect();
+            adjustment::adjust_by_groups(problem, &own, &joint, threads, watch)
+        }
+        None => adjustment::adjust(problem, &own, threads, watch),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Where the unknowns of photos, cameras and common unknowns are among the retained ones.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::commons::Common;
 use super::in_block::InBlock;
@@ -28,8 +28,9 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// `shared` are the cameras that have a block of their own, ascending.
-    pub fn new(network: &Network, shared: Vec<usize>) -> Self {
+    /// `shared` are the cameras that have a block of their own, ascending; so have the common unknowns `elsewhere`, which other nodes of a
+    /// larger network touch, each.
+    pub fn new(network: &Network, shared: Vec<usize>, elsewhere: &BTreeSet<usize>) -> Self {
         let mut first = vec![0];
         let mut add = |width: usize| first.push(first[first.len() - 1] + width);
         let photos = network.photos.len();
@@ -45,7 +46,7 @@ impl Blocks {
             }
             width
         };
-        let (of_photo, commons) = network.commons_by_block();
+        let (of_photo, commons) = network.commons_by_block(elsewhere);
         for (index, photo) in network.photos.iter().enumerate() {
             let camera = network.camera(photo);
             let own = !camera.is_held() && shared.binary_search(&photo.camera).is_err();
@@ -82,7 +83,7 @@ impl Network {
     ///
     /// Together are the coefficients of one trajectory by functions that are never zero, all of which every image of it touches, and what
     /// the same passages have everywhere: in the block of a photo where that is the only one to pass them.
-    fn commons_by_block(&self) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
+    pub(super) fn commons_by_block(&self, elsewhere: &BTreeSet<usize>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
         let mut leader: Vec<usize> = (0..self.commons.len()).collect();
         let mut uses = vec![0; self.commons.len()];
         self.trajectories.iter().flat_map(Trajectory::everywhere).for_each(|common| uses[common] += 1);
@@ -92,12 +93,12 @@ impl Network {
             together.iter().for_each(|&common| leader[common] = together[0]);
         }
         let mut of_photo = vec![];
-        let mut elsewhere: Vec<bool> = self.commons.iter().map(Common::is_held).collect();
-        for (passages, together) in self.passed_together() {
+        let mut placed: Vec<bool> = self.commons.iter().map(Common::is_held).collect();
+        for (passages, together) in self.passed_together(elsewhere) {
             // The block of an image with a mount is that of its frame or trajectory.
             let photo = self.passages[passages[0]].photo().filter(|_| self.mounts.is_empty());
             if let (Some(photo), [_]) = (photo, &*passages) {
-                together.iter().for_each(|&common| elsewhere[common] = true);
+                together.iter().for_each(|&common| placed[common] = true);
                 of_photo.resize(self.photos.len(), vec![]);
                 of_photo[photo] = together;
             } else {
@@ -105,16 +106,18 @@ impl Network {
             }
         }
         let mut members = vec![vec![]; self.commons.len()];
-        for (common, &leader) in leader.iter().enumerate().filter(|&(own, _)| !elsewhere[own]) {
+        for (common, &leader) in leader.iter().enumerate().filter(|&(own, _)| !placed[own]) {
             members[leader].push(common);
         }
         (of_photo, members.into_iter().filter(|own| !own.is_empty()).collect())
     }
 
-    /// The common unknowns that are not known and that passages have everywhere, together those of which that is the same passages.
-    fn passed_together(&self) -> BTreeMap<Vec<usize>, Vec<usize>> {
+    /// The common unknowns that are not known and that passages have everywhere, together those of which that is the same passages; but for
+    /// those that are touched elsewhere.
+    fn passed_together(&self, elsewhere: &BTreeSet<usize>) -> BTreeMap<Vec<usize>, Vec<usize>> {
         let mut having = vec![vec![]; self.commons.len()];
-        let mut everywhere = vec![true; self.commons.len()];
+        let mut everywhere: Vec<bool> =
+            (0..self.commons.len()).map(|own| !elsewhere.contains(&own)).collect();
         for (passage, own) in self.passages.iter().enumerate() {
             let all = own.everywhere();
             for (common, _) in own.unknowns() {

@@ -43,7 +43,11 @@ impl Network {
                 .refraction
                 .map(|refraction| Refraction { datum: refraction.datum + origin[2], ..refraction }),
             cameras: self.photos.iter().map(|photo| self.camera(photo).camera.clone()).collect(),
-            blocks: Blocks::new(self, self.shared_cameras(&selected.surroundings)),
+            blocks: Blocks::new(
+                self,
+                self.shared_cameras(&selected.surroundings),
+                &selected.surroundings.commons(),
+            ),
             camera_priors: vec![],
             commons: self.placed_commons(selected, &mounts, (&images, &image_times), middle),
             datum: self.given_datum(selected, &mounts),

@@ -98,8 +98,7 @@ impl Network {
                 }
             }
         };
-        let mut point = vec![None; self.points.len()];
-        assembled.points.iter().enumerate().for_each(|(place, &index)| point[index] = Some(place));
+        let point = assembled.places(self.points.len());
         let mut photo_of_camera = vec![None; self.cameras.len()];
         self.photos.iter().enumerate().for_each(|(index, photo)| photo_of_camera[photo.camera] = Some(index));
         Ok(Covariances {

@@ -67,6 +67,7 @@ pub mod mounts;
 mod naming;
 mod neighbourhood;
 mod node;
+mod node_datum;
 pub mod observations;
 mod parts;
 pub mod passages;
@@ -106,12 +107,15 @@ pub(crate) use intersection::meet;
 pub(crate) use median::median;
 pub use mounts::{Mount, Trajectory};
 pub use node::{FormedNode, Node, NodePrediction};
+pub use node_datum::{AdjustedInParts, UnknownName};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use passages::Passage;
 pub use predictions::{OnPoint, Prediction};
 pub use responses::{Moved, UnknownOf};
 pub use selection::{Dropped, Reason};
-pub use solution::{DatumInForce, Redundancies, Solution, SumsOfSquares, Unseen, Weak};
+pub use solution::{
+    DatumInForce, Joint, LEAST_REDUNDANCY, Redundancies, Solution, SumsOfSquares, Unseen, Weak,
+};
 pub use state::{InnerConstraints, NetworkDatum, State};
 pub use surroundings::{BlockOf, Surroundings};
 pub use suspects::{Subject, Suspects};

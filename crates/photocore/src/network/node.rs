@@ -9,8 +9,8 @@ use super::solution::{observations, of_photo, sums_of_squares};
 use super::surroundings::{BlockOf, Surroundings};
 use super::{Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsOfSquares};
 use crate::Threads;
-use crate::adjustment::{Adjustment, Counts, Linearized, Model, PartError, PartOptions, Watch};
-use crate::normals::{Contribution, Operations, packed};
+use crate::adjustment::{Adjustment, Counts, DatumOfPart, Linearized, Model, PartError, PartOptions, Watch};
+use crate::normals::{Contribution, Operations, ReducedRights, packed};
 
 /// A node, its blocks ordered; it has no values.
 #[derive(Debug)]
@@ -27,7 +27,9 @@ pub struct Node {
 /// A node at given values, what is at home in it eliminated.
 #[derive(Debug)]
 pub struct FormedNode {
-    part: Linearized,
+    pub(super) part: Linearized,
+    /// Right-hand sides for a datum of the larger network, on their way.
+    pub(super) reduced: Option<ReducedRights>,
 }
 
 /// What a node takes, from its pattern alone.
@@ -68,9 +70,7 @@ impl Network {
         options: &Options,
         threads: &Threads,
     ) -> Result<Vec<(usize, usize)>, NetworkError> {
-        self.check()?;
-        let left_out = self.left_out(self.untouched_photos(), None)?;
-        let selected = threads.install(|| self.select(&left_out, Surroundings::default()));
+        let selected = self.select_whole(None, threads)?;
         if self.is_placed(&selected) {
             return Ok(vec![]);
         }
@@ -93,7 +93,7 @@ impl Network {
         self.check()?;
         self.check_blocks(&surroundings)?;
         let mut network = self.clone();
-        network.release(&surroundings.outer);
+        network.release(&surroundings);
         let in_photos = surroundings.held.clone();
         let none = self.left_out(vec![false; self.photos.len()], None)?;
         let selected = threads.install(|| network.select(&none, surroundings));
@@ -109,17 +109,21 @@ impl Network {
     }
 
     /// Takes the weights of outer blocks away: they count where these are eliminated. What is fixed stays so.
-    pub(super) fn release(&mut self, outer: &[BlockOf]) {
+    pub(super) fn release(&mut self, surroundings: &Surroundings) {
+        let outer = &surroundings.outer;
+        let (films, _) = self.commons_by_block(&surroundings.commons());
         let mut photos_of = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos_of[photo.camera] += 1);
         let named = |camera: usize| outer.contains(&BlockOf::Camera(camera));
         let mut cameras: Vec<usize> = (0..self.cameras.len()).filter(|&camera| named(camera)).collect();
         for block in outer {
             match *block {
-                BlockOf::Photo(photo) => {
-                    let photo = &mut self.photos[photo];
+                BlockOf::Photo(own) => {
+                    let photo = &mut self.photos[own];
                     free(&mut photo.sd);
                     cameras.extend(Some(photo.camera).filter(|&camera| photos_of[camera] == 1));
+                    let film = films.get(own).into_iter().flatten();
+                    film.for_each(|&common| free(&mut self.commons[common].sd));
                 }
                 BlockOf::Camera(_) => {}
                 BlockOf::Common(common) => free(&mut self.commons[common].sd),
@@ -266,7 +270,7 @@ impl Node {
         let loss = self.options.adjustment.loss;
         let options = PartOptions { held: self.held.clone(), damping, loss, curved };
         let part = Linearized::of_part(problem, state.to_vec(), contributions, options, threads, watch);
-        Ok(FormedNode { part: part.map_err(|error| self.named(error))? })
+        Ok(FormedNode { part: part.map_err(|error| self.named(error))?, reduced: None })
     }
 
     /// What the observations leave undetermined of what is at home here.
@@ -294,7 +298,8 @@ impl Node {
     /// What is adjusted here, with its cofactors, and the cofactors that each node below needs for its own: lower triangles, column by column.
     ///
     /// * `outer`: those of the outer unknowns;
-    /// * `state`: where the adjustment has ended.
+    /// * `state`: where the adjustment has ended;
+    /// * `datum`: what takes the cofactors of this node to a datum of the larger network.
     ///
     /// # Errors
     /// Other numbers of unknowns, what is not determined, an interruption, no memory.
@@ -303,14 +308,26 @@ impl Node {
         formed: FormedNode,
         outer: &[f64],
         state: &[f64],
+        datum: Option<DatumOfPart<'_>>,
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<(Solution, Vec<Vec<f64>>), NetworkError> {
         self.check(&[state])?;
+        let size = |datum: &DatumOfPart<'_>| {
+            let d = datum.common.len().isqrt();
+            let columns = [datum.t.len(), datum.w.len()] == [d * self.size(); 2];
+            columns && datum.common.len() == d * d && datum.last.len() == self.size()
+        };
+        if !datum.as_ref().is_none_or(size) {
+            return Err(NetworkError::State);
+        }
         let problem = &self.assembled.problem;
-        let found = formed.part.invert_part(problem, outer, state.to_vec(), threads, watch);
+        let found = formed.part.invert_part(problem, outer, state.to_vec(), datum, threads, watch);
         let (adjustment, below) = found.map_err(|error| self.named(error))?;
-        Ok((self.solution_of(adjustment, threads), below))
+        let lost = adjustment.lost.unwrap_or(0.0);
+        let mut solution = self.solution_of(adjustment, threads);
+        solution.datum.relative_error = lost;
+        Ok((solution, below))
     }
 
     /// What is adjusted here, without cofactors; `before` is the state before the last step.
@@ -340,7 +357,11 @@ impl Node {
         if fit { Ok(()) } else { Err(NetworkError::State) }
     }
 
-    fn named(&self, error: PartError) -> NetworkError {
+    pub(super) fn assembled(&self) -> &Assembled {
+        &self.assembled
+    }
+
+    pub(super) fn named(&self, error: PartError) -> NetworkError {
         match error {
             PartError::Foreign => {
                 NetworkError::Node("what a node is given is over other unknowns, or damped")

@@ -34,6 +34,20 @@ pub(super) struct Reached {
 }
 
 impl Assembled {
+    /// The place in the model of each of so many points, where it takes part.
+    pub fn places(&self, points: usize) -> Vec<Option<usize>> {
+        let mut place = vec![None; points];
+        self.points.iter().enumerate().for_each(|(index, &point)| place[point] = Some(index));
+        place
+    }
+
+    /// Those of some points that take part, each with its place in the model.
+    pub fn taking_part(&self, points: &[usize]) -> Vec<(usize, usize)> {
+        let count = self.points.iter().chain(points).max().map_or(0, |last| last + 1);
+        let place = self.places(count);
+        points.iter().filter_map(|&point| Some((point, place[point]?))).collect()
+    }
+
     /// Refuses what takes more memory than it may.
     pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
         let needed = options.reserved + self.problem.system.memory();

@@ -1,6 +1,7 @@
 //! The adjusted network.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
@@ -15,7 +16,7 @@ use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
 
 /// A redundancy of less is rounding.
-const LEAST_REDUNDANCY: f64 = 1e-9;
+pub const LEAST_REDUNDANCY: f64 = 1e-9;
 
 /// Weighted sums of squares, weights as the loss has changed them.
 #[derive(Debug, Clone, Copy)]
@@ -96,6 +97,15 @@ pub struct DatumInForce {
     pub minimal_control: bool,
 }
 
+/// Cofactors of some points with each other.
+#[derive(Debug)]
+pub struct Joint {
+    /// Those that take part.
+    pub points: Vec<usize>,
+    /// (3k, 3k) of their coordinates, a priori unit weight.
+    pub cofactors: DMatrix<f64>,
+}
+
 /// An adjusted network, photo by photo, point by point, image by image, as in the input.
 #[derive(Debug)]
 pub struct Solution {
@@ -134,6 +144,8 @@ pub struct Solution {
     pub variance_of_unit_weight: Option<f64>,
     /// Where the adjustment has ended: what covariances are computed from, and other datums.
     pub state: State,
+    /// Cofactors of the points that were to be asked together (see [`super::NetworkAdjustment::kept`]).
+    pub joint: Option<Arc<Joint>>,
     /// Where the adjustment has converged, the problem with its cofactors: tests of it form nothing again.
     pub converged: Option<Box<Converged>>,
     /// Status, iterations, counts, operations and times.
@@ -226,6 +238,7 @@ impl Solution {
                 datum: None,
                 released: false,
             },
+            joint: None,
             converged: None,
             sums_of_squares,
             redundancies,

@@ -48,23 +48,25 @@ impl Network {
         let mut all = Vec::new();
         let mut used = vec![false; self.cameras.len()];
         surroundings.cameras().into_iter().for_each(|camera| used[camera] = true);
-        let elsewhere = surroundings.commons();
-        let of_common = |&common: &usize| {
-            let is_used = model.commons[common].uses > 0 || elsewhere.contains(&common);
-            self.commons[common].sd.iter().map(move |&sd| if is_used { sd } else { 0.0 })
+        let (commons, photos) = (surroundings.commons(), surroundings.photos());
+        let of_commons = |own: &[usize], elsewhere: bool| {
+            let of_common = |&common: &usize| {
+                let is_used = elsewhere || model.commons[common].uses > 0 || commons.contains(&common);
+                self.commons[common].sd.iter().map(move |&sd| if is_used { sd } else { 0.0 })
+            };
+            own.iter().flat_map(of_common).collect::<Vec<f64>>()
         };
-        let of_commons = |own: &[usize]| own.iter().flat_map(of_common).collect::<Vec<f64>>();
         for (index, photo) in self.photos.iter().enumerate() {
             let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
             used[photo.camera] |= !unused(index);
             let held = unused(index) || model.is_carried(index);
             all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
-            all.extend(of_commons(model.blocks.commons_of(index)));
+            all.extend(of_commons(model.blocks.commons_of(index), photos.contains(&index)));
         }
         for &camera in &model.blocks.shared {
             all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
         }
-        model.blocks.commons.iter().for_each(|own| all.extend(of_commons(own)));
+        model.blocks.commons.iter().for_each(|own| all.extend(of_commons(own, false)));
         all
     }
 

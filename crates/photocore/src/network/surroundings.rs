@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 /// What a block of unknowns that several nodes touch belongs to: indices into the network of the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockOf {
-    /// The pose of a photo, with a camera that is its alone.
+    /// The pose of a photo, with a camera that is its alone, and with its film.
     Photo(usize),
     /// A camera that several photos of the larger network share.
     Camera(usize),
@@ -38,6 +38,13 @@ impl Surroundings {
     pub(super) fn points(&self) -> BTreeSet<usize> {
         self.all()
             .filter_map(|block| if let BlockOf::Point(point) = block { Some(point) } else { None })
+            .collect()
+    }
+
+    /// The photos that have unknowns in other nodes.
+    pub(super) fn photos(&self) -> BTreeSet<usize> {
+        self.all()
+            .filter_map(|block| if let BlockOf::Photo(photo) = block { Some(photo) } else { None })
             .collect()
     }
 

@@ -130,8 +130,7 @@ impl Trial {
         for suspect in &suspects.all {
             block_starts.push(block_starts[block_starts.len() - 1] + suspect.rows.len().pow(2));
         }
-        let mut place = vec![None; network.points.len()];
-        assembled.points.iter().enumerate().for_each(|(index, &point)| place[point] = Some(index));
+        let place = assembled.places(network.points.len());
         let locals = assembled.problem.model.locals;
         let mut on_place: Vec<Vec<usize>> = vec![vec![]; locals];
         for (index, suspect) in suspects.all.iter().enumerate() {
@@ -200,7 +199,7 @@ impl Trial {
         let method = self.method(tolerance);
         let options = adjustment::Options { method, covariance: true, loss: None, ..self.options };
         let failed = |error| NetworkError::new(error, &self.assembled);
-        let adjusted = adjustment::adjust_by_groups(&self.assembled.problem, &options, threads, watch);
+        let adjusted = adjustment::adjust_by_groups(&self.assembled.problem, &options, &[], threads, watch);
         let mut adjusted = adjusted.map_err(failed)?;
         let values = std::mem::take(&mut adjusted.unknowns);
         let Some(found) = Leverages::of(&mut adjusted, &values) else {

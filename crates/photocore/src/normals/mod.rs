@@ -49,6 +49,7 @@ mod assembly;
 mod batch;
 mod chord;
 mod cofactors;
+mod columns;
 mod contribution;
 mod deficiency;
 mod dense;
@@ -86,6 +87,7 @@ mod watch;
 mod workspace;
 
 pub use cofactors::{Cofactors, GroupCofactors};
+pub use columns::ReducedRights;
 pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
 pub use equation_block::LocalCofactors;

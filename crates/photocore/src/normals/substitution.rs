@@ -40,6 +40,12 @@ impl Factor {
     /// Replaces columns, in the order of elimination, by (L L^T)^-1 times them. Outer unknowns must be zero: they stay so only where the
     /// others leave nothing for them, so that this is for whole systems.
     pub(super) fn solve_columns(&self, columns: &mut [f64]) {
+        self.forward_columns(columns);
+        self.backward_columns(columns);
+    }
+
+    /// Replaces columns by L^-1 times them, and what they have of outer unknowns by what is left of it.
+    pub(super) fn forward_columns(&self, columns: &mut [f64]) {
         let symbolic = &*self.panels.symbolic;
         let count = columns.len() / symbolic.unknowns().max(1);
         let mut x = MatMut::from_column_major_slice_mut(columns, symbolic.unknowns(), count);
@@ -58,6 +64,14 @@ impl Factor {
                 target -= product.as_ref().subrows(offset - s.width, range.len());
             }
         }
+    }
+
+    /// Replaces columns by L^-T times them; outer unknowns stay as they are.
+    pub(super) fn backward_columns(&self, columns: &mut [f64]) {
+        let symbolic = &*self.panels.symbolic;
+        let count = columns.len() / symbolic.unknowns().max(1);
+        let mut x = MatMut::from_column_major_slice_mut(columns, symbolic.unknowns(), count);
+        let mut below = Vec::new();
         for index in (0..symbolic.closed().len()).rev() {
             let (s, first) = (&symbolic.supernodes()[index], symbolic.first_unknown(index));
             let (top, rest) = self.panel(index);

@@ -1,8 +1,11 @@
 //! A block as the core has it: adjusted, taken to other datums, asked for covariances.
 
+use numpy::{PyArray1, PyReadonlyArrayDyn};
 use photocore::Threads;
-use photocore::adjustment::DatumError;
-use photocore::network::{Network, NetworkDatum, NetworkError as Failure, Options, Solution};
+use photocore::adjustment::{DatumColumns, DatumError};
+use photocore::network::{
+    AdjustedInParts, Network, NetworkDatum, NetworkError as Failure, Options, Solution, UnknownName,
+};
 use pyo3::prelude::*;
 
 use super::covariances::{BlockCovariances, factored, refused};
@@ -11,7 +14,11 @@ use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
 use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
+use crate::arrays::{indices, numbers};
+use crate::options::unknown;
 use crate::work::{Workers, watched};
+
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Adds the classes to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -41,7 +48,7 @@ impl BlockNetwork {
 
 #[pymethods]
 impl BlockNetwork {
-    #[pyo3(signature = (*, datum, threads, progress, start = None, keep = false))]
+    #[pyo3(signature = (*, datum, threads, progress, start = None, keep = None))]
     fn adjust(
         &self,
         py: Python<'_>,
@@ -49,17 +56,17 @@ impl BlockNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
         start: Option<PyRef<'_, BlockState>>,
-        keep: bool,
+        keep: Option<Vec<usize>>,
     ) -> PyResult<BlockSolution> {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
         let start = start.map(|start| start.state.clone());
         let told = watched(py, workers, progress, |pool, watch| {
             let adjustment = self.network.adjustment(&self.options).on(pool).watched(watch);
-            let adjustment = match (&inner, &start) {
-                (Some(NetworkDatum::Inner(inner)), _) => adjustment.in_datum(inner),
-                (_, Some(start)) => adjustment.from_state(start),
-                _ if keep => adjustment.kept(),
+            let adjustment = match (&inner, &start, &keep) {
+                (Some(NetworkDatum::Inner(inner)), ..) => adjustment.in_datum(inner),
+                (_, Some(start), _) => adjustment.from_state(start),
+                (_, _, Some(points)) => adjustment.kept(points),
                 _ => adjustment,
             };
             adjustment.run().map(|solution| self.told(solution, pool))
@@ -125,6 +132,30 @@ impl BlockNetwork {
         let workers = Workers::of(threads, self.network.images.len());
         let held = watched(py, workers, None, |pool, _| self.network.held_for_datum(&self.options, pool))?;
         held.map_err(|error| refused(&error))
+    }
+
+    #[pyo3(signature = (datum, held, *, middle, names, values, threads))]
+    fn parts_in_datum<'py>(
+        &self,
+        py: Python<'py>,
+        datum: DatumRow,
+        held: Vec<(usize, usize)>,
+        middle: Option<[f64; 3]>,
+        names: PyReadonlyArrayDyn<'py, i64>,
+        values: PyReadonlyArrayDyn<'py, f64>,
+        threads: usize,
+    ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, f64, bool)> {
+        let NetworkDatum::Inner(inner) = datum_of(datum)? else { return Err(unknown("datum", "relative")) };
+        let names: Vec<UnknownName> = indices("names", &names)?.as_chunks().0.to_vec();
+        let values = numbers("values", &values)?;
+        let workers = Workers::of(threads, self.network.images.len());
+        let found = watched(py, workers, None, |pool, _| {
+            let adjusted = AdjustedInParts { middle, held: &held, names: &names, values: &values };
+            self.network.parts_in_datum(&self.options, &inner, adjusted, pool)
+        })?;
+        let (moved, DatumColumns { b, t, condition, exact }) = found.map_err(|error| refused(&error))?;
+        let [moved, b, t] = [moved, b, t].map(|column| PyArray1::from_vec(py, column));
+        Ok((moved, b, t, condition, exact))
     }
 
     #[pyo3(signature = (outer, children, *, middle, threads, held = vec![]))]

@@ -63,7 +63,11 @@ pub fn refused(error: &Failure) -> PyErr {
 }
 
 /// As an array, (rows, columns); what is symmetric may be large, and is not copied.
-fn matrix(py: Python<'_>, found: DMatrix<f64>, symmetric: bool) -> PyResult<Bound<'_, PyArray2<f64>>> {
+pub(super) fn matrix(
+    py: Python<'_>,
+    found: DMatrix<f64>,
+    symmetric: bool,
+) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let shape = [found.nrows(), found.ncols()];
     let rows = if symmetric { found } else { found.transpose() };
     PyArray1::from_vec(py, rows.data.into()).reshape(shape)

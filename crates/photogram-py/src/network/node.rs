@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use numpy::{PyArray1, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
+use photocore::adjustment::DatumOfPart;
 use photocore::network::{
     BlockOf, FormedNode as Formed, Network, NetworkError as Failure, Node as Core, NodePrediction, Options,
     Surroundings,
@@ -31,7 +32,9 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 #[pyfunction]
 fn step_rules() -> BTreeMap<&'static str, f64> {
-    photocore::adjustment::step_rules().into()
+    let mut rules = BTreeMap::from(photocore::adjustment::step_rules());
+    rules.insert("least_redundancy", photocore::network::LEAST_REDUNDANCY);
+    rules
 }
 
 type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -39,6 +42,9 @@ type Vector<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Matrix, right-hand side and diagonal of what a node leaves.
 type ContributionRow<'py> = (Numbers<'py>, Numbers<'py>, Numbers<'py>);
+
+/// T, W and B^T W, the last step, the condition of B^T G, and unknowns that do not move: see `FormedNode.invert`.
+type TransformationRow<'py> = (Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, f64, Vec<usize>);
 
 /// What a block of unknowns belongs to, and its index.
 pub type BlockRow = (String, usize);
@@ -93,6 +99,13 @@ impl Node {
     #[getter]
     fn children<'py>(&self, py: Python<'py>) -> Vec<Bound<'py, PyArray1<i64>>> {
         self.node.below().iter().map(|places| indices(py, places)).collect()
+    }
+
+    #[getter]
+    fn unknown_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let names = self.node.names();
+        let flat = names.iter().flatten().map(|&number| number as i64);
+        PyArray1::from_iter(py, flat).reshape([names.len(), 3])
     }
 
     #[getter]
@@ -315,20 +328,69 @@ impl FormedNode {
         Ok(PyArray1::from_vec(py, step))
     }
 
-    #[pyo3(signature = (outer, state, *, threads, progress = None))]
+    #[pyo3(signature = (rights, *, threads, progress = None))]
+    fn reduce<'py>(
+        &self,
+        py: Python<'py>,
+        rights: Numbers<'py>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Vector<'py>, Vector<'py>)> {
+        let rights = slice("rights", &rights)?.to_vec();
+        let workers = Workers::of(threads, self.node.images());
+        let found = watched(py, workers, progress, |pool, watch| match &mut *lock(&self.formed) {
+            Some(formed) => self.node.reduce_rights(formed, rights, pool, watch).map(Some),
+            None => Ok(None),
+        })?;
+        let found = found.map_err(|error: Failure| failed(&error))?;
+        let (left, products) = found.ok_or_else(|| used_up("the factor"))?;
+        Ok((PyArray1::from_vec(py, left), PyArray1::from_vec(py, products)))
+    }
+
+    #[pyo3(signature = (outer, *, threads, progress = None))]
+    fn complete<'py>(
+        &self,
+        py: Python<'py>,
+        outer: Numbers<'py>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Vector<'py>> {
+        let outer = slice("outer", &outer)?;
+        let workers = Workers::of(threads, self.node.images());
+        let found = watched(py, workers, progress, |pool, watch| match &mut *lock(&self.formed) {
+            Some(formed) => self.node.solve_reduced_rights(formed, outer, pool, watch).map(Some),
+            None => Ok(None),
+        })?;
+        let found = found.map_err(|error: Failure| failed(&error))?;
+        Ok(PyArray1::from_vec(py, found.ok_or_else(|| used_up("the factor"))?))
+    }
+
+    #[pyo3(signature = (outer, state, *, threads, datum = None, progress = None))]
     fn invert<'py>(
         &self,
         py: Python<'py>,
         outer: Numbers<'py>,
         state: Numbers<'py>,
         threads: usize,
+        datum: Option<TransformationRow<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(BlockSolution, Vec<Vector<'py>>)> {
         let (given, state) = (slice("outer", &outer)?, numbers("state", &state)?);
+        let datum = match &datum {
+            Some((t, w, common, last, condition, staying)) => Some(DatumOfPart {
+                t: slice("T", t)?,
+                w: slice("W", w)?,
+                common: slice("B^T W", common)?,
+                last: slice("the last step", last)?,
+                condition: *condition,
+                staying,
+            }),
+            None => None,
+        };
         let formed = lock(&self.formed).take().ok_or_else(|| used_up("the factor"))?;
         let workers = Workers::of(threads, self.node.images());
         let found = watched(py, workers, progress, |pool, watch| {
-            let found = self.node.invert(formed, given, &state, pool, watch);
+            let found = self.node.invert(formed, given, &state, datum, pool, watch);
             found.map(|(solution, below)| (Told::new(solution, pool), below))
         })?;
         let (told, below) = found.map_err(|error| failed(&error))?;

@@ -216,7 +216,8 @@ macro_rules! solution_class {
 
             #[getter]
             fn state(&self) -> BlockState {
-                BlockState { state: self.solution.state.clone(), kept: Arc::clone(&self.kept) }
+                let Solution { state, joint, .. } = &self.solution;
+                BlockState { state: state.clone(), kept: Arc::clone(&self.kept), joint: joint.clone() }
             }
 
             #[getter]

@@ -2,9 +2,11 @@
 
 use std::sync::{Arc, Mutex};
 
-use photocore::network::{Converged, InnerConstraints, NetworkDatum, Solution, State};
+use numpy::PyArray2;
+use photocore::network::{Converged, InnerConstraints, Joint, NetworkDatum, Solution, State};
 use pyo3::prelude::*;
 
+use super::covariances::matrix;
 use crate::options::{named_ordering, unknown};
 
 /// What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, and what makes these lengths.
@@ -50,6 +52,8 @@ pub fn kept(solution: &mut Solution) -> Kept {
 pub struct BlockState {
     pub state: State,
     pub kept: Kept,
+    /// None of copies and of what was read.
+    pub joint: Option<Arc<Joint>>,
 }
 
 impl BlockState {
@@ -73,7 +77,12 @@ impl BlockState {
     ) -> PyResult<Self> {
         let (ordering, datum) = (named_ordering(ordering)?, datum.map(datum_of).transpose()?);
         let state = State { unknowns, held, collapsed, loose, ordering, datum, released };
-        Ok(Self { state, kept: Kept::default() })
+        Ok(Self { state, kept: Kept::default(), joint: None })
+    }
+
+    fn joint<'py>(&self, py: Python<'py>, points: Vec<usize>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let joint = self.joint.as_ref().filter(|joint| joint.points == points);
+        joint.map(|joint| matrix(py, joint.cofactors.clone(), true)).transpose()
     }
 
     /// So that results are copied and sent to other processes.

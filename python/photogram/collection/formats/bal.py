@@ -7,7 +7,6 @@ photo and three coordinates of each point, one number a line. Any white space se
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
 from photogram.collection.formats.format import Format
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.memory import require

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.collection.collection import Collection
+from photogram.declared import dataclass
 
 __all__ = ["Format"]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from photogram.comparator.polynomial import Frame, Polynomial
 from photogram.comparator.years.quantities import common_range, quantities_of
 from photogram.comparator.years.record import RecordedCalibration
 from photogram.comparator.years.together import Together, adjust_together
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.show.brief import Brief
 from photogram.show.ways import Shown

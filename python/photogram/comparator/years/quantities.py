@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from photogram.arguments.types import Floats
 from photogram.comparator.correction import Correction
 from photogram.comparator.polynomial import Frame
 from photogram.comparator.years.record import RecordedCalibration
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 __all__ = ["Quantities", "common_range", "quantities_of"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
 from photogram.comparator.document import to_json
 from photogram.comparator.grid import Grid
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes

@@ -14,7 +14,6 @@ common errors of plates between calibrations is in the covariance of their param
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.grid import Grid
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.years.record import RecordedCalibration, RecordedCase
+from photogram.declared import dataclass
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import require
 from photogram.statistics.limits import GlobalTest, global_test

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.film.certificate import Certificate
 from photogram.film.years.dated import DatedCamera

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from datetime import date
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.film.certificate import Certificate
 from photogram.network.cameras import Camera

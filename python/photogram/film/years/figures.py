@@ -10,11 +10,11 @@ affinity and shear. With rho = tan(angle) / tan(alpha) each has the length 1 at 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.colmap.binary import binary_files

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.formats.csm.angles import fitted_angles, of_angles
 from photogram.formats.csm.isd import Framelets, Isd, Pixels, Turns, check_choice

@@ -9,12 +9,12 @@ affinity.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.project import Options, Project, Size, assembled

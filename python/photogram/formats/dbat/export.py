@@ -8,12 +8,12 @@ then control, points and measurements, each list ended by an empty line; what co
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.cards import Card
 from photogram.formats.dbat.content import Content, Sensor, sensor_of

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
 from photogram.io.pvl import Group
 

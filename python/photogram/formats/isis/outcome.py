@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from photogram.adjustment.known import Cartesian
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.formats.isis.contents import Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.points import per_metre
 from photogram.network.geometry import local_frames

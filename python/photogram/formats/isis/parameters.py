@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.formats.csm.angles import to_angles
 from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.photos import to_camera

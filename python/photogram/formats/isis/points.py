@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from photogram.adjustment.known import Cartesian
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.io.places import Place

@@ -6,10 +6,10 @@ import math
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.messages import nearest

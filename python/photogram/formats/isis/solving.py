@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.formats.csm.angles import Polynomials, fitted, fitted_angles, of_angles
 from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import trajectory_of

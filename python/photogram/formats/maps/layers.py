@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
 from photogram.formats.placing import Placed, placed
 from photogram.formats.project import frame_of

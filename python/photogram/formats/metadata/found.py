@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.metadata.geo_txt import NAME as GEO_TXT
 from photogram.formats.metadata.geo_txt import read_geo_txt

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.metadata.merged import PhotoRecord
 from photogram.formats.metadata.said import ELLIPSOIDAL, SEA_LEVEL, Said

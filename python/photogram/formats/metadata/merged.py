@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
+from photogram.declared import dataclass
 from photogram.formats.metadata.found import found_in
 from photogram.formats.metadata.said import FIXED, Said
 from photogram.messages import Message, counted, listed

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.formats.metadata.said import (
     ELLIPSOIDAL,
     Said,

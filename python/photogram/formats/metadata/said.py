@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from photogram.declared import dataclass
 from photogram.io.places import Place
 
 __all__ = [

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast, get_args
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field, replace
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances

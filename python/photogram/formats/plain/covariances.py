@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.shared import made, word_of
 from photogram.formats.plain.tables import DEGREE, Tables

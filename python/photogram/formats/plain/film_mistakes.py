@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,12 @@ from photogram.errors import InputError
 from photogram.film.interior import conformal
 from photogram.film.which import DECIDED, which_mark
 from photogram.formats.plain.film_readings import ScannedPhoto
+from photogram.network.cameras import Camera
 
-__all__ = ["mark_remarks", "scale_message"]
+if TYPE_CHECKING:
+    from photogram.film import Certificate
+
+__all__ = ["beyond_message", "mark_remarks", "scale_message"]
 
 SHRUNK = 0.01
 """No film has changed its size by more."""
@@ -20,6 +25,8 @@ INCH = 25.4
 """Millimetres."""
 SAME = 0.5
 """Pixels within which the marks of all photos of a resampled scan lie."""
+SHORTEST = 4
+"""Angles of a table of distortion that has a curve."""
 FEWEST = 4
 """Marks of a photo that tell whether they are named a quarter turn round."""
 
@@ -47,6 +54,37 @@ def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> str
         f"photo {photo.name}: its marks are {1.0 + m:.5g} times as far apart as they should be: pitch_mm"
         f" would be {meant:.5g} (about {round(INCH / meant, -1):.0f} dpi), not {pitch:.6g}; or they are those"
         " of another camera"
+    )
+
+
+def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats) -> str:
+    """Return what is said of images beyond a table of distortion, where its curve is worth less than they.
+
+    Parameters
+    ----------
+    camera
+        Of the images; nothing is said where it is not that of the certificate.
+    own
+        The certificate.
+    places
+        (m,) complex, in the camera's frame, mm.
+    sd
+        (m,) standard deviations of the images, mm.
+    """
+    if own.radial is None or own.c is None or len(own.radial.angle) < SHORTEST:
+        return ""
+    if camera.parameters != own.camera(camera.model).parameters:  # type: ignore[arg-type]
+        return ""
+    radius = np.abs(places - complex(camera.parameters["xp"], camera.parameters["yp"]))
+    last, curve = own.c * float(np.tan(own.radial.angle.max())), own.curve()
+    beyond = radius[(radius > last) & (curve.sd_at(radius) > sd)]
+    if not len(beyond):
+        return ""
+    farthest = beyond.max(keepdims=True)
+    return (
+        f"camera {camera.name}: {len(beyond)} of {len(places)} images lie beyond the table of distortion of"
+        f" its certificate, which ends at {last:.0f} mm; at {farthest[0]:.0f} mm it is extrapolated, sd"
+        f" {1e3 * float(curve.sd_at(farthest)[0]):.2g} um"
     )
 
 

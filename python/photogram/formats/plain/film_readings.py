@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import is_mirrored, mirror_message, side_residuals, true_places
 from photogram.film.which import which_mark

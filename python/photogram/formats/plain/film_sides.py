@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.film.interior import conformal
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.images import Images
@@ -98,6 +98,12 @@ class Seen:
     def readings(self, photo: str) -> Floats:
         """Return (m, 2) readings of a photo."""
         found: Floats = self.images.xy[self._rows(photo)]
+        return found
+
+    def deviations(self, photo: str) -> Floats:
+        """Return (m,) the larger standard deviations of these; 1 where nothing is said of them."""
+        rows, sd = self._rows(photo), self.images.sd
+        found: Floats = np.ones(len(rows)) if sd is None else sd[rows].max(axis=1)
         return found
 
     def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, field, replace
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import (
     FilmModel,
@@ -20,9 +20,9 @@ from photogram.film.interior import (
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.fiducials import read_fiducials
-from photogram.formats.plain.film_mistakes import mark_remarks, scale_message
+from photogram.formats.plain.film_mistakes import beyond_message, mark_remarks, scale_message
 from photogram.formats.plain.film_readings import MarkReadings, ScannedPhoto
-from photogram.formats.plain.film_sides import Seen
+from photogram.formats.plain.film_sides import Lying, Seen
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
@@ -166,6 +166,7 @@ class _Reader:
             for camera, own in self.places.items()
         }
         starts = self._starts()
+        self._tell_beyond([mirrored for mirrored, _ in starts])
         for photo, (mirrored, start) in zip(self.photos, starts, strict=True):
             film = self._film(photo, mirrored, start)
             found.scans.append(Scan(photo.name, film))
@@ -185,6 +186,21 @@ class _Reader:
             found.observations.extend(self.fiducials.known(marks, read, self.covariances))
             machines = {id(each.machine): each.machine for each in self.photos}
             found.observations.extend(each.known for each in machines.values() if each.known is not None)
+
+    def _tell_beyond(self, sides: Sequence[bool]) -> None:
+        """Say where images lie beyond the table of distortion of the certificate of their camera."""
+        cameras = {each.name: each for each in self.seen.cameras.cameras}
+        for camera, own in self.seen.cameras.certificates.items():
+            places, sd = [np.zeros(0, dtype=complex)], [np.zeros(0)]
+            for photo, mirrored in zip(self.photos, sides, strict=True):
+                if photo.camera == camera and len(photo.marks) > 1:
+                    way = Lying(self.marks.places_of(photo), mirrored)
+                    images = photo.true_places(self.seen.readings(photo.name))
+                    places.append(way.back(photo.true, images))
+                    sd.append(photo.machine.readings.pitch * self.seen.deviations(photo.name))
+            said = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
+            if said:
+                self.tables.messages.append(Message(said, own.file))
 
     def _remark(self, photo: ScannedPhoto) -> None:
         """Say it where a film stands on what is known of it beforehand."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.formats.plain.scanners import BENDS, CURVES, GRID, LOCAL, Machine
 from photogram.formats.project import Project

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.schema import ANGLES, AXES, BIAS, ROTATIONS, deviation_columns
 from photogram.formats.plain.shared import called, word_of

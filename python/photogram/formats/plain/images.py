@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.image_axes import from_tables, in_unit
 from photogram.formats.plain.photos import Photos

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
 from photogram.formats.plain.shared import made

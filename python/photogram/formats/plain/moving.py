@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from photogram.adjustment.known import Cartesian
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.photos import Photos
@@ -25,7 +25,7 @@ from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
 from photogram.network.timed import Lines, Timed
-from photogram.network.trajectories import Readout, Trajectory
+from photogram.network.trajectories import Clock, Readout, Trajectory
 from photogram.network.unknowns import Sensor
 from photogram.network.whereabouts import about
 
@@ -152,11 +152,12 @@ class _Columns:
 
     def of(self, row: int, photo: str, camera: str) -> dict[str, Any]:
         """Return what a row says, as arguments of :class:`Timed`."""
+        sensor, clock = self._place(row, camera)
         found: dict[str, Any] = {
             "trajectory": self.trajectories[row],
-            "offset": self.clocks[row],
+            "offset": self.clocks[row] or clock,
             "rate": self.rates[row],
-            "sensor": self._sensor(row, camera),
+            "sensor": sensor,
         }
         values, sd = self.motion[row], self.motion_sd[row]
         if not (np.isnan(values).all() and np.isnan(sd).all()):
@@ -165,11 +166,11 @@ class _Columns:
             found |= {"sd_velocity": sd[:3], "sd_rate": sd[3:]}
         return found
 
-    def _sensor(self, row: int, camera: str) -> Sensor | None:
-        """Return the pose of a photo's camera on what moves; None where it has that of the trajectory."""
+    def _place(self, row: int, camera: str) -> tuple[Sensor | None, Clock | None]:
+        """Return pose and clock of a photo's camera on what moves; None: those of the trajectory."""
         name, own = self.table.texts("rig")[row], self.table.texts("sensor")[row]
         if not name and not own:
-            return None
+            return None, None
         if not name and len(self.rigs) != 1:
             raise self.table.error(row, f"column rig: is empty, and there are {len(self.rigs)} rigs")
         if name and name not in self.rigs:
@@ -179,7 +180,7 @@ class _Columns:
         if sensor != rig.reference and sensor not in rig.sensors:
             what = "sensor" if own else "camera"
             raise self.table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
-        return rig.sensors.get(sensor)
+        return rig.sensors.get(sensor), rig.clocks.get(sensor)
 
 
 def _rates(tables: Tables, table: ColumnTable) -> list[Readout | None]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
@@ -26,6 +26,7 @@ from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.photos import Photos, read_photos
 from photogram.formats.plain.rigs import read_frames, read_rigs
 from photogram.formats.plain.schema import AXES
+from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
 from photogram.formats.plain.subjects import Subjects
@@ -76,6 +77,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     settings = tables.settings
     if "images" not in settings.tables:
         raise InputError("has no table of images (images.csv)", file=settings.path)
+    tables, seams = with_seams(tables)
     transform = Transform(settings, tables.messages)
     cameras = read_cameras(tables if wishes.cameras is None else _with_cameras(tables, wishes.cameras))
     trajectories = read_trajectories(tables)
@@ -98,6 +100,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     mounts, stands = mounted(
         read_frames(tables, rigs, photos.names, photos.taken), photos.names, photos.centres, photos.matrices
     )
+    mounts = mounted_halves(seams, mounts, timed, photos.names)
     subjects = Subjects(
         {name: row for row, name in enumerate(photos.names)}, photos.times.tolist(), trajectories
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.formats.plain.clocks import clocks
 from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
 from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables, angles_of, indices_of
@@ -17,6 +18,7 @@ from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
 from photogram.network.rigs import Mount
+from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
 __all__ = ["Rigs", "read_bases", "read_frames", "read_rigs"]
@@ -43,14 +45,17 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
     lengths = table.vectors(deviation_columns(AXES), math.inf, infinite=True)
     angles = table.vectors(deviation_columns(ROTATIONS), math.inf, infinite=True, read=tables.angle)
     found: dict[str, tuple[str, dict[str, Sensor]]] = {}
-    for row, (rig, camera, own) in enumerate(
-        zip(*(table.texts(column) for column in ("rig", "camera", "sensor")), strict=True)
-    ):
+    clocked: dict[str, dict[str, Clock]] = {}
+    rows = list(zip(*(table.texts(column) for column in ("rig", "camera", "sensor")), strict=True))
+    dated = clocks(tables, table, [own or f"{rig}/{camera}" for rig, camera, own in rows])
+    for row, (rig, camera, own) in enumerate(rows):
         if camera and camera not in cameras:
             raise table.error(row, f"column camera: there is no camera {quoted(camera)}")
         name = own or camera
         if not name:
             raise table.error(row, "there is neither a camera nor a sensor")
+        if (clock := dated[row]) is not None:
+            clocked.setdefault(rig, {})[name] = clock
         matrix = np.eye(3) if np.isnan(matrices[row]).any() else matrices[row]
         value, sd = np.nan_to_num(values[row]), np.concatenate([lengths[row], angles[row]])
         if rig not in found:
@@ -69,7 +74,10 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
         sensors[name] = made(
             table, row, partial(Sensor, title) if nothing else partial(Sensor, title, value, matrix, sd)
         )
-    return {name: Rig(name, reference, sensors) for name, (reference, sensors) in found.items()}
+    return {
+        name: Rig(name, reference, sensors, clocked.get(name, {}))
+        for name, (reference, sensors) in found.items()
+    }
 
 
 def read_frames(
@@ -107,6 +115,10 @@ def read_frames(
         if found[frame][0] is not rig or sensor in members:
             what = "sensor" if own else "camera"
             raise table.error(row, f"the frame {frame} has two rigs, or two photos of the {what} {sensor}")
+        if sensor in rig.clocks:
+            raise table.error(
+                row, f"the rig {rig.name} has a time_offset of {sensor}: its photos are on trajectories"
+            )
         members[sensor] = photo
     return [FrameOf(name, rig, members) for name, (rig, members) in found.items()]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
 
 from photogram import _photocore
+from photogram.declared import dataclass, field
 
 __all__ = [
     "ALL_ANGLES",
@@ -152,7 +152,7 @@ TABLES: Mapping[str, Schema] = {
             *(*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
             *(*VELOCITY, *RATE, *deviation_columns((*VELOCITY, *RATE))),
             *(*_CLOCK, "line_rate", "sd_line_rate"),
-            *("start_t1", "start_t2", "start_theta"),
+            *("start_t1", "start_t2", "start_theta", "seam_column", "seam_row"),
         ),
         "`photo`; `camera` (if there are several), `x`, `y`, `z`, angles by `[axes] attitude`, `sd_x` ..,"
         " `sd_omega` .. or `sd_rotation_x` .., `group`, `time` (s), `use`;"
@@ -165,7 +165,8 @@ TABLES: Mapping[str, Schema] = {
         " (default: as the marks tell), `certificate` (a file of a"
         " [certificate](certificates.md): camera and marks), `flown` (the day, as 1983-07-02; default:"
         " `[film] flown`), `start_t1`, `start_t2` (mm), `start_theta`"
-        " (rad; default: as marks have them)",
+        " (rad; default: as marks have them), `seam_column` or `seam_row` (of a scan that was joined of two"
+        " parts: from there on is the second)",
         deviations=(1, 3),
         has_system=True,
     ),
@@ -465,9 +466,10 @@ TABLES: Mapping[str, Schema] = {
     "rigs": Schema(
         ("rig",),
         ("rig", "camera", "sensor"),
-        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS),
+        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS, *_CLOCK),
         "`rig`, `camera` or `sensor`; `x`, `y`, `z`, angles, `sd_x` .., `sd_rotation_x` ..; the first row of"
-        " a rig is its reference, a row with no numbers an unknown sensor",
+        " a rig is its reference, a row with no numbers an unknown sensor; of sensors whose photos are on"
+        " trajectories and say none of their own `time_offset` (0; s), `sd_time_offset` (s; 0: known)",
     ),
     "frames": Schema(
         ("frame", "rig", "photo"),

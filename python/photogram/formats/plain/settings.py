@@ -6,12 +6,12 @@ import difflib
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from datetime import date, datetime
 from pathlib import Path
 from typing import Any, cast
 
 from photogram.arguments.arrays import shown
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io.delimited import FALSE, TRUE, ColumnTable
 from photogram.network.unknowns import Unknown

@@ -108,7 +108,8 @@ class Streamed:
         self.project: Project = read_tables(Tables(held, []), wishes)
         if self.project.options.datum in ("inner", "minimum"):
             raise InputError(
-                "in parts there is no datum to choose: take it out, or adjust in one process",
+                "the datum of a project that is read batch by batch is that of its observations: take it"
+                " out, or photogram.adjust_in_parts(photogram.formats.read(path).block, ..., datum=...)",
                 file=settings.path,
             )
         if self.project.block.timed:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from photogram.declared import dataclass
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, counted, quoted

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.formats.column_words import UNITS
 from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
 from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns

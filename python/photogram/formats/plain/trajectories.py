@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import cast, get_args
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.formats.plain.schema import AXES, BASES, VELOCITY, deviation_columns
 from photogram.formats.plain.shared import made

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
+from photogram.declared import dataclass
 from photogram.show.angles import degrees_minutes_seconds
 
 __all__ = ["VALUE", "Space", "attitude", "attitude_name", "dms", "exponential", "fixed"]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from photogram.declared import dataclass
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.printout.formats import Space, Values, attitude, attitude_name, dms, fixed
 from photogram.giant.printout.pages import Page, headed, paginate

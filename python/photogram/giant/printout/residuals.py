@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.giant.printout.formats import fixed
 from photogram.giant.printout.pages import Page, headed, paginate
 from photogram.results.result import SumsOfSquares

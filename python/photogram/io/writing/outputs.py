@@ -9,11 +9,11 @@ import stat
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO, Self
 
+from photogram.declared import dataclass
 from photogram.io.writing.guard import Guard
 from photogram.io.writing.interruption import deferred
 from photogram.io.writing.markers import clear_marks, mark, unmark

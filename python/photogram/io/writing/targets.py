@@ -8,9 +8,9 @@ import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 
 __all__ = ["Target", "follow", "naming"]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from numpy.typing import ArrayLike
 
+from photogram.declared import dataclass
 from photogram.network.observations.observation import ROTATIONS, Observation
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Boresight

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll

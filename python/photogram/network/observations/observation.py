@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.arrays import is_covariance, names, number, shaped, shown
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.network.timed import Moment
 from photogram.network.trajectories import Clock, Trajectory

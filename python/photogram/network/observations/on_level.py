@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from photogram.declared import dataclass
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Level
 

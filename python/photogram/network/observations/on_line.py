@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from numpy.typing import ArrayLike
 
+from photogram.declared import dataclass
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Line, PlumbLine
 

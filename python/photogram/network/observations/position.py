@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.network.observations.observation import AXES, Observation
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Drift, LeverArm, Shift, Unknown

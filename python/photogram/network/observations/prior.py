@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import shaped
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Unknown

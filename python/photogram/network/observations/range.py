@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from numpy.typing import ArrayLike
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.observations.observation import Observation
 from photogram.network.trajectories import Clock, Trajectory

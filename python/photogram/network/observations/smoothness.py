@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import shaped, shown
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.observations.observation import Observation, all_trajectories
 from photogram.network.trajectories import Coefficient, Trajectory

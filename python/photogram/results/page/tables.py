@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.messages import counted
 from photogram.results.axes import point_axes
 from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.network_tables import Terms, control, part, photos, points, stations, terms_of
+from photogram.results.observed import is_held
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observations, unheld
 from photogram.results.weakest import weakest_photos, weakest_points
@@ -42,8 +44,10 @@ RATIO_NOTE = (
 
 
 def control_section(result: AdjustedNetwork) -> Section:
-    """Return control: prior, posterior, difference, test."""
-    tables = _observed("Control points", control(result), result.control, result.point_sd)
+    """Return control: prior, posterior, difference, test; what is held has none."""
+    weighted = ~is_held(result.control)
+    own = replace(result.control, sd=np.where(weighted[:, np.newaxis], result.control.sd, np.nan))
+    tables = _observed("Control points", control(result), own, result.point_sd)
     if isinstance(result, Result):
         tables += _compared("Components of control that are not held", unheld(result))
     intro = (
@@ -52,6 +56,8 @@ def control_section(result: AdjustedNetwork) -> Section:
         " number near 0 is not checked by the rest of the network: an error of it goes into the result"
         " unseen."
     )
+    if held := int(np.count_nonzero(~weighted)):
+        intro += f" {counted(held, 'point')} held where given, which nothing tests, are not listed."
     return Section("control", "Control points", tables, intro)
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.arrays import names, number, numbers, shown, truth_value
+from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
 from photogram.messages import nearest
 from photogram.results.components import VarianceComponents

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances
 from photogram.results.group_sums import Left, Probing, observables

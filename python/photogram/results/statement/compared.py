@@ -9,13 +9,13 @@ d_i -> J_i d_i, C_ij -> J_i C_ij J_j'.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from photogram.arguments.naming import natural_order
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.messages import listed
 from photogram.network.block import Block

@@ -7,12 +7,12 @@ both plan coordinates, 3D figures those with all three.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.results.statement.compared import Compared
 from photogram.results.statement.honest import (
     Bias,

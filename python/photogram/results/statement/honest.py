@@ -9,12 +9,12 @@ given all others by y_i' (C^-1)_ii^-1 y_i, y = C^-1 d.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.results.statement.compared import PARTS, Compared
 from photogram.statistics.agreement import SINGULAR, quadratic, root_of, scale_of
 from photogram.statistics.distributions import critical_normal

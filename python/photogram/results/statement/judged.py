@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from photogram.declared import dataclass
 from photogram.results.result import Result
 from photogram.results.statement import words
 from photogram.results.statement.asked import Asked

@@ -7,13 +7,13 @@ FGDC-STD-007.3-1998); the rest is of section 4 of the specification of the state
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.network.hull import area, hull, outside
 from photogram.network.neighbours import nearest

@@ -9,12 +9,12 @@ has in common stays hidden.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network.observations import Control
 from photogram.results.result import Result
 from photogram.results.statement.compared import in_order, turned_to_east

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import frozen, indices, is_covariance, names, numbers, shaped
 from photogram.arguments.types import Bools, Floats
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest

@@ -7,12 +7,12 @@ beside, the radius stands that holds 95 % of errors with the matrix of mean prod
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.statistics.error_radii import circular_error
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Indices
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.messages import nearest
 from photogram.network.block import Block

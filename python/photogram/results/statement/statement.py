@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.messages import nearest
 from photogram.results.result import Result

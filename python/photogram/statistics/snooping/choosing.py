@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.statistics.distributions import LEVEL, critical_chi_square, critical_fisher
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial

@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass
 from photogram.statistics.groups import INVISIBLE, GroupTests, group_tests
 
 __all__ = ["Chosen", "Conditional", "UnitWeight"]

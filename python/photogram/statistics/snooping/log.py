@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+
+from photogram.declared import dataclass, replace
 
 __all__ = ["Removal", "Rival", "Round"]
 

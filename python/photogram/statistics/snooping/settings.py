@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from photogram.declared import dataclass
 from photogram.statistics.distributions import LEVEL
 
 __all__ = ["Settings"]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["Aside", "LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]

@@ -11,6 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.knots import KNOTTED
+from photogram.results.cameras import AdjustedCamera
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.corner_files import KEY
 from photogram.targets.mrcal_lenses import PREFIX
@@ -37,7 +38,8 @@ def mrcal_models(rig: Rig, valid: dict[int, Floats] | None = None) -> dict[str, 
     ----------
     rig
         The cameras; `optimization_inputs` go with them where the calibration is at hand and mrcal could have
-        made it: a board on a grid, its shape held or two parabolas, cameras of one model.
+        made it: a board on a grid, its shape held or two parabolas, cameras of one model, no single term of a
+        lens held.
     valid
         (n, 2) by the numbers of cameras: the closed outline of what is known well enough.
 
@@ -76,9 +78,11 @@ def _lens(rig: Rig, row: int) -> tuple[str, Floats]:
         return name, np.append(camera.values[:4], camera.knots)
     if camera.model == "stereographic" and not camera.values[4:].any():
         return "STEREOGRAPHIC", camera.values[:4]
+    if camera.model == "cahvor":
+        return "CAHVOR", camera.values
     lens = terms_of(camera)
     if lens is None or lens.fisheye:
-        raise rig.refusal(row, TITLE, ["opencv8", "opencv5", "opencv12", KNOTTED])
+        raise rig.refusal(row, TITLE, ["opencv8", "opencv5", "opencv12", "cahvor", KNOTTED])
     free = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     # Terms that were free are there, be they 0.
     count = next(each for each in COUNTS if not any(lens.terms.get(k) or free.get(k) for k in TERMS[each:]))
@@ -100,6 +104,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         and calibration.shape in ("held", "bend")
         and board.pitch[0] == board.pitch[1]
         and len({name for name, _ in lenses}) == 1
+        and all(map(_whole, calibrated.cameras, (values for _, values in lenses)))
         and calibration.sync != "offset"
         and (count == 1 or all(rig.tied(row) for row in range(1, count)))
     )
@@ -135,6 +140,12 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     file = io.BytesIO()
     np.savez_compressed(file, **arrays)
     return base64.b85encode(file.getvalue())
+
+
+def _whole(camera: AdjustedCamera, values: Floats) -> bool:
+    """Return whether all terms of a lens, behind fx, fy, cx, cy in its values, were free, or none."""
+    free = {camera.names[k] for k in camera.estimated} - CORE
+    return camera.given.knots is not None or len(free) in (0, len(values) - 4)
 
 
 def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.network.cameras import Camera
 
 __all__ = ["FISHEYE_TERMS", "TERMS", "Terms", "terms_of"]

@@ -92,6 +92,7 @@ cameras! { $
     plate::Plate;
     on_comparator::OnComparator;
     opencv_tilted::OpencvTilted;
+    cahvor::Cahvor;
     splined_stereographic::SplinedStereographic;
     [brown] {
         Brown;

@@ -1,0 +1,151 @@
+"""Lenses of certificates that images contradict: distortion with the other sign, another principal point.
+
+What is known of parameters of a camera beforehand, mu with the covariance C, is an observation: its residuals
+v = mu - x have the cofactors Q = C - Q_x. Were it mu + D a, and all else that is correlated with it moved
+along, the weighted sum of squares would be, to first order,
+
+    Omega + 2 a' g + a' M a,    g = D' C^-1 v,    M = D' C^-1 Q C^-1 D
+
+so that it falls by T = g' M^-1 g at a = -M^-1 g (covariance M^-1). Nothing is adjusted again.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats
+from photogram.messages import Message
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.result import Result
+
+__all__ = ["lens_hints"]
+
+RADIAL = re.compile(r"[AK]\d")
+POINT = ("xp", "yp")
+CHANCE = 1e-4
+"""Of any hint where nothing is wrong."""
+EXPLAINED = 0.8
+"""Of what the sum of squares would fall by if nothing were known of the camera."""
+NEAR, WITHIN = 0.3, 3.0
+"""How near images have the opposite of what is given: in parts of it, or in standard deviations."""
+TAKEN_UP = 1e-6
+"""Images say nothing of what they check by a smaller part."""
+
+
+@dataclass(frozen=True)
+class _Fall:
+    """What the sum of squares falls by where something else is known of a camera.
+
+    Attributes
+    ----------
+    value, freedom
+        T, in the unit weight that is left, and its degrees of freedom.
+    moved, sd
+        (k,) a, and its standard deviations.
+    """
+
+    value: float
+    freedom: int
+    moved: Floats
+    sd: Floats
+
+    @classmethod
+    def of(cls, result: Result, camera: AdjustedCamera, rows: list[int], columns: Floats) -> Self:
+        """Return it for some weighted parameters of a camera, (n,) rows, moved along (n, k) columns."""
+        own, given = np.ix_(rows, rows), camera.given
+        whole = np.diag(given.deviations**2)
+        if (correlated := given.prior_covariance) is not None:
+            whole[np.ix_(camera.weighted, camera.weighted)] = correlated
+        prior = whole[own]
+        weighted = np.linalg.solve(prior, columns)
+        # In standard deviations of a, were images to say all.
+        size = np.sqrt(np.einsum("nk,nm,mk->k", weighted, prior, weighted))
+        weighted = weighted / size
+        vector = weighted.T @ (given.values - camera.values)[rows]
+        values, axes = np.linalg.eigh(weighted.T @ (prior - camera.cofactors[own]) @ weighted)
+        axes = axes[:, values > TAKEN_UP] / np.sqrt(values[values > TAKEN_UP])
+        fall = float(((vector @ axes) ** 2).sum())
+        omega, freedom = result.sum_and_freedom
+        unit = max(1.0, (omega - fall) / max(freedom, 1.0))
+        sd = np.sqrt(unit * (axes**2).sum(axis=1))
+        return cls(fall / unit, axes.shape[1], -axes @ (axes.T @ vector) / size, sd / size)
+
+    def is_sure(self, whole: _Fall, level: float) -> bool:
+        """Whether it is none of chance, and nearly all that anything of the camera would explain."""
+        chance = _photocore.chi_square(self.value, float(self.freedom)) if self.freedom else 1.0
+        return chance < level and self.value > EXPLAINED * whole.value
+
+
+def lens_hints(result: Result) -> list[Message]:
+    """Name cameras of films whose lens, as it is known beforehand, images contradict for a reason.
+
+    Parameters
+    ----------
+    result
+        An adjustment with covariances.
+    """
+    of_photos = result.block.photo_cameras
+    if of_photos is None or result.loss is not None:
+        return []
+    rows = sorted({int(of_photos[row]) for row, _ in result.films})
+    said = (_said(result, result.cameras[row], CHANCE / (2 * len(rows))) for row in rows)
+    return [Message(each) for each in said if each]
+
+
+def _said(result: Result, camera: AdjustedCamera, level: float) -> str:
+    weighted = camera.weighted
+    if not weighted or not np.isfinite(camera.cofactors[np.ix_(weighted, weighted)]).all():
+        return ""
+    whole = _Fall.of(result, camera, weighted, np.eye(len(weighted)))
+    values = camera.given.values
+    radial = [k for k in weighted if RADIAL.fullmatch(camera.names[k]) and values[k]]
+    point = [k for k in weighted if camera.names[k] in POINT]
+    if radial:
+        turned = _Fall.of(result, camera, radial, -2.0 * values[radial, np.newaxis])
+        if turned.is_sure(whole, level):
+            return _of_sign(camera, 1.0 - 2.0 * float(turned.moved[0]), 2.0 * float(turned.sd[0]))
+    if len(point) == len(POINT):
+        shifted = _Fall.of(result, camera, point, np.eye(2))
+        if shifted.is_sure(whole, level) and shifted.freedom == len(point):
+            return _of_point(camera, values[point], shifted)
+    return ""
+
+
+def _of_sign(camera: AdjustedCamera, times: float, sd: float) -> str:
+    """Say it where images show the radial distortion about -1 times as it is given."""
+    if abs(times + 1.0) > max(NEAR, WITHIN * sd):
+        return ""
+    return (
+        f"images show {times:.2f} (sd {sd:.2g}) times the radial distortion that camera {camera.name} is"
+        " given: probably it has the wrong sign; a table counts it outwards, measured minus ideal: say"
+        " sign = -1 in [certificate.radial], or give the terms of the table cameras with the other sign"
+    )
+
+
+def _of_point(camera: AdjustedCamera, given: Floats, fall: _Fall) -> str:
+    """Say where images have the principal point, and what was perhaps given in its place."""
+    found = given + fall.moved
+    x, y = found.tolist()
+    where = (
+        f"images have the principal point of camera {camera.name} at ({x:.3f}, {y:.3f}) mm (sd"
+        f" {fall.sd[0]:.2g}, {fall.sd[1]:.2g}) in the frame of the marks, and not at ({given[0]:.3f},"
+        f" {given[1]:.3f})"
+    )
+    size = float(np.hypot(*given))
+    if (np.abs(found + given) < WITHIN * fall.sd).all() and size > WITHIN * float(fall.sd.max()):
+        return (
+            f"{where}: probably it is given with the wrong signs, as where the centre of the marks lies seen"
+            " from it: autocollimation and symmetry of a certificate, xp and yp are places in the frame of"
+            " the marks"
+        )
+    indicated = "the indicated one, where lines between marks cross, and not " if size < 1e-3 else ""
+    return (
+        f"{where}: is that {indicated}the calibrated one, of symmetry, about which radii of the distortion"
+        " count? Give autocollimation or symmetry of the certificate (xp, yp of the table cameras); a shift"
+        " of observed positions, as of an antenna, looks alike"
+    )

@@ -1,0 +1,136 @@
+"""Jitter of the lines of a scanner: residuals of images in nearly the same line are alike.
+
+With v the residuals of a photo's images in standard deviations, what is smooth over the scan taken out, r
+their redundancy numbers, and sums over all pairs of images that lie within some distance across the lines
+(n), or beyond it within four times as much (f: what is smooth is alike there, too),
+
+    S = sum_n v_i v_j - q sum_f v_i v_j,    q = sum_n r_i r_j / sum_f r_i r_j
+    z = S / sqrt(sum_n v_i^2 v_j^2 + q^2 sum_f v_i^2 v_j^2),    s^2 = S / sum_n r_i r_j
+
+z is normal where errors do not know each other, and s is what lines have in common: of two images in one line
+both have it, and v = R e, R about r on its diagonal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.diagnosis.robust import critical
+from photogram.messages import Message
+from photogram.results.result import Result
+
+__all__ = ["line_hints"]
+
+FEWEST = 20
+"""Images of a photo."""
+WINDOWS = tuple(0.001 * 2.0**k for k in range(7))
+"""How far apart lines are, in parts of the scan."""
+FAR = 2
+"""So many of these on are those that are far."""
+CHANCE = 1e-3
+"""Of a hint where nothing is wrong."""
+OTHERWISE = 2.0
+"""Times by which z is larger than that of lines across: what is alike in both is no matter of lines."""
+WORTH = 0.5
+"""Standard deviations of a reading that lines have in common at least."""
+TINY = 1e-9
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Lines of a scanner: rows (1) or columns (0), of x or y; z, s in pixels, and pixels between them."""
+
+    z: float
+    jitter: float
+    lines: int
+    axis: int
+    within: float
+
+
+def line_hints(result: Result) -> list[Message]:
+    """Name scanners whose lines jitter, with the standard deviations that count it.
+
+    Parameters
+    ----------
+    result
+        An adjustment with covariances.
+    """
+    scanners: dict[int, tuple[str, list[int]]] = {}
+    for row, film in result.films:
+        if film.readings.pitch != 1.0:
+            scanners.setdefault(id(film.scanner), (film.scanner.name, []))[1].append(row)
+    limit = critical(4 * (len(WINDOWS) - FAR) * max(len(scanners), 1), CHANCE)
+    said = []
+    for name, rows in scanners.values():
+        own = max(_of_scanner(result, rows), key=lambda each: each.z, default=None)
+        if own is not None and own.z > limit:
+            said.append(Message(_said(result, name, rows, own)))
+    return said
+
+
+def _said(result: Result, scanner: str, rows: list[int], own: _Found) -> str:
+    images = np.isin(result.block.image_photos, rows)
+    sd = float(np.median(result.block.image_sd[images]))
+    lines, axis = ("columns", "rows")[own.lines], "xy"[own.axis]
+    return (
+        f"residuals in {axis} of images in nearly the same {lines} of {scanner} (within"
+        f" {own.within:.0f} px) are alike by {own.jitter:.2g} px (z = {own.z:.1f}): its lines jitter, and"
+        f" marks and images on one line err together; --set sd.images={np.hypot(sd, own.jitter):.2g} counts"
+        " it in their standard deviations, and so does sd.fiducial_images"
+    )
+
+
+def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
+    """Yield what lines have in common, where it is more than what those across have."""
+    photos = [found for row in rows if (found := _residuals(result, row)) is not None]
+    if not photos:
+        return
+    extent = max(float(np.ptp(xy, axis=0).max()) for xy, *_ in photos)
+    sd = float(np.median(np.concatenate([each for *_, each in photos])))
+    for axis in (0, 1):
+        near = np.zeros((2, len(WINDOWS), 3))
+        for xy, values, redundancy, _ in photos:
+            for lines in (0, 1):
+                near[lines] += [
+                    _pairs(xy[:, lines], values[:, axis], redundancy[:, axis], window * extent)
+                    for window in WINDOWS
+                ]
+        near, far = near[:, :-FAR], near[:, FAR:] - near[:, :-FAR]
+        ratio = near[..., 2] / np.maximum(far[..., 2], TINY)
+        total = near[..., 0] - ratio * far[..., 0]
+        z = total / np.sqrt(np.maximum(near[..., 1] + ratio**2 * far[..., 1], TINY))
+        for lines in (0, 1):
+            # The narrower the distance, the less is in it that lines have not in common.
+            k = int((z[lines] >= z[lines].max() / 2).argmax())
+            jitter = float(np.sqrt(max(total[lines, k], 0.0) / max(near[lines, k, 2], TINY)))
+            if z[lines].max() > OTHERWISE * z[1 - lines].max() and jitter > WORTH:
+                yield _Found(float(z[lines].max()), sd * jitter, lines, axis, WINDOWS[k] * extent)
+
+
+def _residuals(result: Result, row: int) -> tuple[Floats, Floats, Floats, Floats] | None:
+    """Return readings, residuals in sd that are free of what is smooth, redundancy, and sd of a photo."""
+    block = result.block
+    own = (block.image_photos == row) & np.isfinite(result.residuals).all(axis=1)
+    redundancy = result.redundancy[own]
+    if np.count_nonzero(own) < FEWEST or not np.isfinite(redundancy).all():
+        return None
+    xy, sd = block.image_xy[own], block.image_sd[own]
+    x, y = ((xy - xy.mean(axis=0)) / np.ptp(xy, axis=0).max()).T
+    smooth = np.column_stack([np.ones(len(xy)), x, y, x * x, x * y, y * y, x**3, y**3])
+    values = result.residuals[own] / sd
+    return xy, values - smooth @ np.linalg.lstsq(smooth, values, rcond=None)[0], redundancy, sd
+
+
+def _pairs(at: Floats, values: Floats, redundancy: Floats, within: float) -> Floats:
+    """Return (3,) sums over pairs within a distance: of v_i v_j, of their squares, of r_i r_j."""
+    order = np.argsort(at)
+    at = at[order]
+    first, last = np.searchsorted(at, at - within), np.searchsorted(at, at + within, "right")
+    columns = np.column_stack([values, values**2, redundancy])[order]
+    behind = np.concatenate([np.zeros((1, 3)), np.cumsum(columns, axis=0)])
+    found: Floats = (columns * (behind[last] - behind[first] - columns)).sum(axis=0) / 2
+    return found

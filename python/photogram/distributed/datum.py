@@ -1,0 +1,148 @@
+"""The datum that a block in parts is taken to: found of the whole, by what its nodes have come to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.network.block import Block
+from photogram.network.core import CoreOptions, block_network
+from photogram.network.datum import DatumRow
+from photogram.results.datum import refused
+
+__all__ = ["InDatum", "Mover", "local_row", "rights_of", "with_columns"]
+
+LANES = 8
+"""Right-hand sides that the core reduces at a time, of points."""
+
+
+@dataclass(frozen=True)
+class InDatum:
+    """What nodes are told that are inverted where the block was moved to its datum.
+
+    Attributes
+    ----------
+    common
+        (d, d) the sum B^T Q B of the whole.
+    last
+        The states before and after the last step, which was taken before the block was moved.
+    """
+
+    common: Floats
+    last: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Mover:
+    """Takes a block, as its nodes have adjusted it, to a datum.
+
+    Attributes
+    ----------
+    block, options
+        The block, and how the core adjusts it.
+    row
+        The datum, inner constraints.
+    held
+        Photos with the numbers of their unknowns that are held.
+    middle
+        That all nodes are given.
+    """
+
+    block: Block
+    options: CoreOptions
+    row: DatumRow
+    held: list[tuple[int, int]]
+    middle: tuple[float, float, float]
+
+    def __call__(self, nodes: Sequence[tuple[Indices, Floats]]) -> list[dict[str, np.ndarray]]:
+        """Move it.
+
+        Parameters
+        ----------
+        nodes
+            Of each node (N, 3) what its unknowns belong to in the whole block, and (N,) their values.
+
+        Returns
+        -------
+        Of each node its `values` there, (N,), the columns `b` and `t`, (d, N), and what tells of rounding:
+        the `condition`. `staying` are the unknowns that do not move in the datum.
+
+        Raises
+        ------
+        InputError
+            The points and photos of the datum do not carry it.
+        AdjustmentError, OutOfMemoryError
+            As of :func:`photogram.adjust`.
+        """
+        names, values = (np.concatenate(each) for each in zip(*nodes, strict=True))
+        network = block_network(self.block, self.options)
+        try:
+            moved, *columns, condition, exact = network.parts_in_datum(
+                self.row, self.held, middle=self.middle, names=names.ravel(), values=values, threads=0
+            )
+        except _photocore.BlockError as error:
+            raise refused(self.block, network, None, error) from None
+        b, t = (each.reshape(-1, len(values)) for each in columns)
+        found, start = [], 0
+        for _, own in nodes:
+            rows = slice(start, start + len(own))
+            start += len(own)
+            staying = np.flatnonzero(b[:, rows].any(axis=0)) if exact else np.zeros(0, dtype=np.int64)
+            arrays = {"values": moved[rows], "b": b[:, rows], "t": t[:, rows]}
+            found.append({**arrays, "condition": np.array(condition), "staying": staying})
+        return found
+
+
+def rights_of(b: Floats, outer: Indices, children: Sequence[Indices], left: Sequence[Floats]) -> Floats:
+    """Return (d, N) right-hand sides of a node: B of what is at home there, and what its children have left.
+
+    Parameters
+    ----------
+    b
+        (d, N) of all unknowns.
+    outer, children
+        Where outer unknowns stand, and those of each child.
+    left
+        (d, S) of each child.
+    """
+    rights = b.copy()
+    rights[:, outer] = 0.0
+    for rows, each in zip(children, left, strict=True):
+        rights[:, rows] += each
+    return rights
+
+
+def with_columns(prediction: Mapping[str, float], size: int, outer: int, columns: int) -> dict[str, float]:
+    """Return what work and memory a node takes that also has columns for a datum.
+
+    Parameters
+    ----------
+    prediction
+        What it takes without.
+    size, outer
+        Unknowns of a state, and outer ones.
+    columns
+        How many; none where there is no datum to choose.
+    """
+    if not columns:
+        return dict(prediction)
+    kept, sent = 8.0 * size * (columns + LANES), 8.0 * columns * outer
+    # B, T, W and copies of them in the order of the core.
+    more = {"factor_bytes": kept, "memory_bytes": kept + 6.0 * 8.0 * columns * size}
+    more |= {"contribution_bytes": sent, "cofactor_bytes": sent}
+    return {name: value + more.get(name, 0.0) for name, value in prediction.items()}
+
+
+def local_row(row: DatumRow, photos: Indices, points: Indices) -> DatumRow:
+    """Return a datum as a node knows it, with its photos and points alone."""
+    name, of_points, of_photos, scale, attitudes, radius = row
+
+    def own(rows: Indices, chosen: list[int]) -> list[int]:
+        found: list[int] = np.flatnonzero(np.isin(rows, chosen)).tolist()
+        return found
+
+    return name, own(points, of_points), own(photos, of_photos), scale, own(photos, attitudes), radius

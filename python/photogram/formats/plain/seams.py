@@ -1,0 +1,138 @@
+"""Scans that were joined of two parts: each part is a film of its own, and both have one pose.
+
+`seam_column` or `seam_row` of a photo is the line between them. What is read beyond it, images and marks, is
+of a second photo, `NAME half 2`, which is mounted on the first where that is; nothing else knows of seams.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+
+from photogram.formats.plain.tables import Tables
+from photogram.io.delimited import ColumnTable, Names
+from photogram.network.rigs import Mount
+from photogram.network.timed import Timed
+from photogram.network.unknowns import Sensor
+
+__all__ = ["Seam", "mounted_halves", "with_seams"]
+
+_LINES = ("column", "row")
+
+
+@dataclass(frozen=True)
+class Seam:
+    """The line at which a scan was joined.
+
+    Attributes
+    ----------
+    half
+        What the photo of the second half is called.
+    line, at
+        `column` or `row`, and that from which readings are of the second half.
+    """
+
+    half: str
+    line: str
+    at: float
+
+
+Seams = Mapping[str, Seam]
+"""By the names of photos."""
+
+
+def with_seams(tables: Tables) -> tuple[Tables, Seams]:
+    """Return tables whose joined scans are divided, and the seams.
+
+    Raises
+    ------
+    InputError
+        A seam of a photo that has no film, or along both columns and rows.
+    """
+    table = tables.read("photos")
+    found: dict[str, Seam] = {}
+    if table is None or not any(f"seam_{line}" in table for line in _LINES):
+        return tables, found
+    places = table.vectors([f"seam_{line}" for line in _LINES])
+    names, films = table.texts("photo"), table.texts("film")
+    for row in np.flatnonzero(np.isfinite(places).any(axis=1)).tolist():
+        if np.isfinite(places[row]).all():
+            raise table.error(row, "columns seam_column, seam_row: a scan is joined along one of them")
+        if not films[row]:
+            raise table.error(row, f"the photo {names[row]} has a seam, and no film (column film)")
+        axis = int(np.isnan(places[row, 0]))
+        found[names[row]] = Seam(f"{names[row]} half 2", _LINES[axis], float(places[row, axis]))
+    own = {each.name: getattr(tables, each.name) for each in fields(tables)}
+    return _Divided(**own, seams=found), found
+
+
+@dataclass(frozen=True)
+class _Divided(Tables):
+    """Tables in which what is beyond a seam is of the second half."""
+
+    seams: Seams = field(default_factory=dict)
+
+    def read(self, name: str) -> ColumnTable | None:
+        """Return a table that is there, divided; errors as of the others."""
+        table = super().read(name)
+        if table is None or name not in ("photos", "images", "fiducial_images"):
+            return table
+        return _with_halves(table, self.seams) if name == "photos" else _parted(table, self.seams)
+
+
+def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
+    """Return readings, those beyond a seam of its second half."""
+    texts = table.texts("photo")
+    lines = {line: table.numbers(line) for line in _LINES}
+    for row, photo in enumerate(texts):
+        if (seam := seams.get(photo)) is None:
+            continue
+        place = lines[seam.line][row]
+        if np.isnan(place):
+            raise table.error(row, f"the photo {photo} has a seam, and this reading no {seam.line}")
+        texts[row] = seam.half if place >= seam.at else photo
+    return _with_texts(table, "photo", texts)
+
+
+def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
+    """Return the table of photos with a row for each second half, of whose pose nothing is known."""
+    texts = table.texts("photo")
+    more = [row for row, name in enumerate(texts) if name in seams]
+    rows = [*range(table.count), *more]
+    cells = {name: [own[row] for row in rows] for name, own in table.cells.items()}
+    ready = {
+        name: own[rows] if isinstance(own, np.ndarray) else Names(own.names, own.rows[rows])
+        for name, own in table.ready.items()
+    }
+    for name in (each for each in table.columns if each.startswith("sd_")):
+        if name in cells:
+            cells[name][table.count :] = [""] * len(more)
+        else:
+            ready[name][table.count :] = np.nan  # type: ignore[index]
+    records = [table.records[row] for row in rows]
+    found = replace(table, count=len(rows), cells=cells, ready=ready, records=records)
+    return _with_texts(found, "photo", [*texts, *(seams[texts[row]].half for row in more)])
+
+
+def _with_texts(table: ColumnTable, column: str, texts: Sequence[str]) -> ColumnTable:
+    ready = {name: own for name, own in table.ready.items() if name != column}
+    return replace(table, cells={**table.cells, column: texts}, ready=ready)
+
+
+def mounted_halves(
+    seams: Seams, mounts: Sequence[Mount], timed: Sequence[Timed], photos: Sequence[str]
+) -> list[Mount]:
+    """Return mounts with those of second halves; on a trajectory both halves are where it is."""
+    if not seams:
+        return [*mounts]
+    on_frames = {each.photo: each for each in mounts}
+    placed = {each.photo for each in timed}
+    joined = Sensor("joined scans", np.zeros(3), np.eye(3), 0.0)
+    found = [*mounts]
+    for photo, seam in seams.items():
+        if seam.half in photos and photo not in placed:
+            own = on_frames.get(photo)
+            found.append(Mount(seam.half, photo, joined) if own is None else replace(own, photo=seam.half))
+    return found
