@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import photogram
+from photogram import InnerConstraints
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.tasks import Shelf
 from photogram.memory import give_back, resident_memory
@@ -30,7 +31,7 @@ def most():
     lines = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
     return 1024 * int(lines["VmHWM"].split()[0])
 
-engine, folder, number = CoreEngine(), Path(sys.argv[1]), int(sys.argv[2])
+engine, folder, number, columns = CoreEngine(), Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
 # Once, so that what libraries keep for themselves is there before anything is measured.
 engine.node(folder, number)
 before = held()
@@ -38,18 +39,25 @@ node = engine.node(folder, number)
 print(held() - before)
 Path("/proc/self/clear_refs").write_text("5")
 formed = node.form(node.initial, [], damping=0.0, curved=False, threads=1)
+outer, datum = len(node.outer), None
+if columns:
+    b, t = np.ones((2, columns, len(node.initial)))
+    formed.reduce(b.copy(), threads=1)
 print(held() - before)
-outer = len(node.outer)
-found, _ = formed.invert(np.zeros(outer * (outer + 1) // 2), node.initial, threads=1)
+if columns:
+    w = formed.complete(np.zeros(columns * outer), threads=1)
+    datum = t, w, np.eye(columns), node.initial, 1.0, []
+found, _ = formed.invert(np.zeros(outer * (outer + 1) // 2), node.initial, datum=datum, threads=1)
 engine.keep(folder, number, found, 1.0)
 print(most() - before)
 """
 
 
 @pytest.mark.skipif(not STATUS.exists(), reason="only Linux tells what a process holds")
-def test_a_node_takes_what_the_plan_says(tmp_path):
-    block = photogram.simulate(strips=32, photos_per_strip=80, seed=3).block
-    plan = plan_in_parts(block, Division(parts=2, folder=tmp_path))
+@pytest.mark.parametrize("datum", [None, InnerConstraints()])
+def test_a_node_takes_what_the_plan_says(tmp_path, datum):
+    block = photogram.simulate(strips=32, photos_per_strip=80, control="none", seed=3).block
+    plan = plan_in_parts(block, Division(parts=2, folder=tmp_path), datum=datum)
     largest = int(np.argmax(plan.of("memory_bytes")))
     said = plan.predictions[largest]
     # What allocators keep for themselves is not that of the node.
@@ -58,15 +66,18 @@ def test_a_node_takes_what_the_plan_says(tmp_path):
         "MALLOC_ARENA_MAX": "1",
         "MALLOC_TRIM_THRESHOLD_": "65536",
     }
-    node, formed, most = _measured(tmp_path, largest, plain)
+    node, formed, most = _measured(tmp_path, largest, 0 if datum is None else 7, plain)
+    if datum is not None:
+        # B and T lie on disk between.
+        formed -= 2 * 8 * 7 * plan.of("points")[largest]
     # A part of it does not grow with the node.
     assert node == pytest.approx(said["node_bytes"], abs=BASE)
     assert formed == pytest.approx(said["node_bytes"] + said["factor_bytes"], rel=0.2)
     assert most == pytest.approx(said["memory_bytes"], rel=0.2)
 
 
-def _measured(run, number, environment):
-    command = [sys.executable, "-c", MEASURE, str(run), str(number)]
+def _measured(run, number, columns, environment):
+    command = [sys.executable, "-c", MEASURE, str(run), str(number), str(columns)]
     everything = {**os.environ, **environment}
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=everything)
     return [int(line) for line in done.stdout.split()]

@@ -14,11 +14,11 @@ both have it, and v = R e, R about r on its diagonal.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.diagnosis.robust import critical
 from photogram.messages import Message
 from photogram.results.result import Result

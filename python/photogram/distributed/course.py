@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from photogram.declared import asdict, dataclass, field
 from photogram.distributed.files import read_json, write_json
 from photogram.distributed.tasks import Job
 from photogram.errors import InputError

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
 from photogram.network.datum import DatumRow

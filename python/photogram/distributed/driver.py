@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.distributed.course import Course
 from photogram.distributed.cut import Tree
 from photogram.distributed.datum import InDatum, Mover

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, field
 from photogram.distributed.cut import Incidence, homes, joined
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.errors import InputError

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import asdict, dataclass
 from photogram.distributed.cut import Tree, cut, tree_of
 from photogram.distributed.files import read_json, write_json
 from photogram.distributed.parts import (

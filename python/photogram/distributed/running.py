@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
+from photogram.declared import dataclass
 from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts
 from photogram.distributed.datum import Mover

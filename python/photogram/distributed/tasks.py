@@ -13,7 +13,6 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.distributed.datum import InDatum, rights_of, with_columns
 from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
 from photogram.distributed.files import read_arrays, write_arrays
