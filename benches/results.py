@@ -1,4 +1,4 @@
-"""How long the result of a simulated block takes to be written as Parquet, and to be read again.
+"""How long the result of a simulated block takes to be judged, written as Parquet, and read again.
 
 python benches/results.py [STRIPSxPHOTOS]
 """
@@ -32,7 +32,7 @@ def main(size: str) -> None:
     strips, photos = (int(number) for number in size.split("x"))
     block = timed("simulated", lambda: simulate(strips=strips, photos_per_strip=photos).block)
     print(f"{len(block.photo_ids)} photos, {len(block.point_ids)} points, {len(block.image_xy)} image points")
-    result = timed("adjusted", lambda: adjust(block))
+    result = timed("adjusted", lambda: adjust(block, covariance="verdict"))
     timed("verdict", lambda: result.verdict)
     with tempfile.TemporaryDirectory() as folder:
         timed("written as Parquet", lambda: result.to_parquet(folder))

@@ -67,7 +67,7 @@ def test_check_points_have_the_cofactors_that_were_kept():
     copied = own_formation(result)
     assert copied.state.joint(rows) is None
     kept, formed = (each.check_points.agreement.together for each in (result, copied))
-    assert kept.value == pytest.approx(formed.value, rel=1e-6)
+    assert kept.weighted_sum_of_squares == pytest.approx(formed.weighted_sum_of_squares, rel=1e-6)
 
 
 @pytest.mark.parametrize("options", [{"loss": "huber"}, {"max_iterations": 2}, {"tolerance": 100.0}])

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_blocks import agrees, freed
+from test_blocks import agrees
+from test_datum_in_parts import in_both
 
 import photogram
-from photogram import InnerConstraints, _photocore, adjust, adjust_in_parts
+from photogram import _photocore, adjust, adjust_in_parts
 from photogram.distributed import Division
 from photogram.distributed.parts import films_of
 from photogram.errors import InputError
@@ -125,13 +126,18 @@ def test_a_node_hands_up_no_film_that_is_not_its_photos(block):
     assert id(shared) not in films
 
 
-@pytest.mark.parametrize("datum", [None, InnerConstraints()])
-def test_free_films_in_parts(block, datum):
-    """Without control the datum is that of the same photos, or points."""
-    free = freed(block)
-    one, other = adjust(free, datum=datum), adjust_in_parts(free, Division(parts=3), datum=datum)
-    assert replace(other.datum, lost=0.0) == replace(one.datum, lost=0.0)
+def test_free_films_in_parts(block):
+    """Without control the datum is that of the same photos."""
+    free = block.replace(point_sd=np.full_like(block.point_sd, np.inf))
+    one, other = adjust(free), adjust_in_parts(free, Division(parts=3))
+    assert other.datum == one.datum
     agrees(other, one, 1e-5, tied=True)
+
+
+def test_inner_constraints_of_films_in_parts(block):
+    free = block.replace(point_sd=np.full_like(block.point_sd, np.inf))
+    found, one = in_both(free, 3, 1e-6, datum=photogram.InnerConstraints())
+    assert np.nanmax(np.abs(found.film - one.film) / one.film_sd) < 1e-6
 
 
 def test_what_parts_do_not_take_is_refused(block):

@@ -414,13 +414,15 @@ def _call(
     name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
 ) -> Callable[..., Result]:
     """Return the call that adjusts: in one process, or in parts, whose photos have an order of their own."""
-    from photogram import adjust, adjust_in_parts
-
     datum = _datum(name)
     if division is None:
+        from photogram import adjust
+
         return partial(adjust, datum=datum, loss=loss, ordering=ordering.value, covariance="verdict")
     if ordering is not OrderingName.AUTO:
         raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--ordering")
+    from photogram import adjust_in_parts
+
     return partial(adjust_in_parts, division=division, datum=datum, loss=loss)
 
 

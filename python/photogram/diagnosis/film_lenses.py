@@ -12,13 +12,13 @@ so that it falls by T = g' M^-1 g at a = -M^-1 g (covariance M^-1). Nothing is a
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass
 from photogram.messages import Message
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result

@@ -14,11 +14,11 @@ both have it, and v = R e, R about r on its diagonal.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
+from photogram.declared import dataclass
 from photogram.diagnosis.robust import critical
 from photogram.messages import Message
 from photogram.results.result import Result
@@ -86,19 +86,17 @@ def _said(result: Result, scanner: str, rows: list[int], own: _Found) -> str:
 
 def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
     """Yield what lines have in common, where it is more than what those across have."""
-    photos = [found for row in rows if (found := _residuals(result, row)) is not None]
-    if not photos:
+    images = _of_photos(result, rows)
+    if images is None:
         return
-    extent = max(float(np.ptp(xy, axis=0).max()) for xy, *_ in photos)
-    sd = float(np.median(np.concatenate([each for *_, each in photos])))
+    extent = float(np.ptp(images.xy, axis=0).max())
+    # Photos lie apart: no distance reaches from one to another.
+    at = images.xy + 2.0 * extent * images.photos[:, np.newaxis]
     for axis in (0, 1):
-        near = np.zeros((2, len(WINDOWS), 3))
-        for xy, values, redundancy, _ in photos:
-            for lines in (0, 1):
-                near[lines] += [
-                    _pairs(xy[:, lines], values[:, axis], redundancy[:, axis], window * extent)
-                    for window in WINDOWS
-                ]
+        own = images.values[:, axis], images.redundancy[:, axis]
+        near = np.array(
+            [[_pairs(at[:, lines], *own, window * extent) for window in WINDOWS] for lines in (0, 1)]
+        )
         near, far = near[:, :-FAR], near[:, FAR:] - near[:, :-FAR]
         ratio = near[..., 2] / np.maximum(far[..., 2], TINY)
         total = near[..., 0] - ratio * far[..., 0]
@@ -108,21 +106,47 @@ def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
             k = int((z[lines] >= z[lines].max() / 2).argmax())
             jitter = float(np.sqrt(max(total[lines, k], 0.0) / max(near[lines, k, 2], TINY)))
             if z[lines].max() > OTHERWISE * z[1 - lines].max() and jitter > WORTH:
-                yield _Found(float(z[lines].max()), sd * jitter, lines, axis, WINDOWS[k] * extent)
+                yield _Found(float(z[lines].max()), images.sd * jitter, lines, axis, WINDOWS[k] * extent)
 
 
-def _residuals(result: Result, row: int) -> tuple[Floats, Floats, Floats, Floats] | None:
-    """Return readings, residuals in sd that are free of what is smooth, redundancy, and sd of a photo."""
-    block = result.block
-    own = (block.image_photos == row) & np.isfinite(result.residuals).all(axis=1)
-    redundancy = result.redundancy[own]
-    if np.count_nonzero(own) < FEWEST or not np.isfinite(redundancy).all():
+@dataclass(frozen=True, eq=False)
+class _Images:
+    """Images of a scanner, photo by photo.
+
+    Attributes
+    ----------
+    photos, xy
+        (m,) and (m, 2): their photos and readings.
+    values, redundancy
+        (m, 2) residuals in standard deviations, free of what is smooth, and redundancy numbers.
+    sd
+        The median standard deviation of a reading.
+    """
+
+    photos: Indices
+    xy: Floats
+    values: Floats
+    redundancy: Floats
+    sd: float
+
+
+def _of_photos(result: Result, rows: list[int]) -> _Images | None:
+    """Return the images of those photos that have enough; None without."""
+    block, residuals = result.block, result.residuals
+    photos, redundancy = block.image_photos, result.redundancy
+    used = np.isfinite(residuals).all(axis=1) & np.isfinite(redundancy).all(axis=1) & np.isin(photos, rows)
+    used &= np.bincount(photos[used], minlength=len(block.photo_ids))[photos] >= FEWEST
+    order = np.flatnonzero(used)
+    order = order[np.argsort(photos[order], kind="stable")]
+    if not len(order):
         return None
-    xy, sd = block.image_xy[own], block.image_sd[own]
-    x, y = ((xy - xy.mean(axis=0)) / np.ptp(xy, axis=0).max()).T
-    smooth = np.column_stack([np.ones(len(xy)), x, y, x * x, x * y, y * y, x**3, y**3])
-    values = result.residuals[own] / sd
-    return xy, values - smooth @ np.linalg.lstsq(smooth, values, rcond=None)[0], redundancy, sd
+    xy, sd = block.image_xy[order], block.image_sd[order]
+    values = residuals[order] / sd
+    for own in np.split(np.arange(len(order)), np.flatnonzero(np.diff(photos[order])) + 1):
+        x, y = ((xy[own] - xy[own].mean(axis=0)) / np.ptp(xy[own], axis=0).max()).T
+        smooth = np.column_stack([np.ones(len(own)), x, y, x * x, x * y, y * y, x**3, y**3])
+        values[own] -= smooth @ np.linalg.lstsq(smooth, values[own], rcond=None)[0]
+    return _Images(photos[order], xy, values, redundancy[order], float(np.median(sd)))
 
 
 def _pairs(at: Floats, values: Floats, redundancy: Floats, within: float) -> Floats:

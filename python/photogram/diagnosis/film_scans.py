@@ -25,9 +25,10 @@ def seam_hints(result: Result) -> list[Message]:
     Marks say little of it: a film of its own takes theirs up. Photos that overlap it show a part of it.
     """
     block, forms, found = result.block, result.film_forms, []
+    used = np.isfinite(result.residuals).all(axis=1)
     for row, film in result.films:
-        own = (block.image_photos == row) & np.isfinite(result.residuals).all(axis=1)
-        if np.count_nonzero(own) >= FEWEST:
+        own = np.flatnonzero((block.image_photos == row) & used)
+        if len(own) >= FEWEST:
             # Both parts meet where the middle of the photo is read.
             given = block.image_xy[own] - forms[block.photo_ids[row]].matrix[:, 0], result.residuals[own]
             found += [

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.statistics.fits import Fit
 

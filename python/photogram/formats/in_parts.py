@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.adjustment.adjustment import Progress, UnitVariance, core_options
+from photogram.declared import dataclass
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone

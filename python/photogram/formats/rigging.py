@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.declared import dataclass, field
 from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor

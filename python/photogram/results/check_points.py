@@ -147,7 +147,8 @@ def together(count: int) -> slice:
 def tested_together(block: Block) -> list[int]:
     """Return the points of a block whose cofactors with each other that test needs, where all take part."""
     rows = np.flatnonzero(point_kinds(block) == "check")
-    return rows[together(len(rows))].tolist()
+    chosen: list[int] = rows[together(len(rows))].tolist()
+    return chosen
 
 
 def point_kinds(block: Block) -> NDArray[np.str_]:

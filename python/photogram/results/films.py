@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 
@@ -27,6 +28,10 @@ class OnFilm:
     unknowns: tuple[AdjustedUnknown, ...]
     covariance_scale: float
 
+    @cached_property
+    def _by_given(self) -> dict[int, AdjustedUnknown]:
+        return {id(each.given): each for each in self.unknowns}
+
     @property
     def films(self) -> list[tuple[int, Film]]:
         """The films of scanned photos, with the rows of these."""
@@ -36,7 +41,7 @@ class OnFilm:
     @property
     def film(self) -> Floats:
         """(P, 6) t1, t2 (mm), theta (radians), m, b1, b2 of the photos; NaN of those that are no films."""
-        own = {id(each.given): each for each in self.unknowns}
+        own = self._by_given
         found = np.full((len(self.block.photo_ids), 6), np.nan)
         for row, film in self.films:
             found[row] = [*own[id(film.placement)].position, *own[id(film.size)].position]
@@ -47,7 +52,7 @@ class OnFilm:
     @property
     def film_cofactors(self) -> Floats:
         """(P, 6, 6) cofactors of the same; of an m that is its roll's, with the others, NaN."""
-        own = {id(each.given): each for each in self.unknowns}
+        own = self._by_given
         found = np.full((len(self.block.photo_ids), 6, 6), np.nan)
         for row, film in self.films:
             placement, size = own[id(film.placement)], own[id(film.size)]
@@ -125,5 +130,5 @@ class OnFilm:
 
 def numbers_of_film(result: OnFilm, film: Film) -> list[Floats]:
     """Return (3,) the adjusted numbers of each of the unknowns of a film."""
-    own = {id(each.given): each for each in result.unknowns}
+    own = result._by_given
     return [own[id(each)].position for each in film.unknowns]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import indices, one_of, shaped, shown
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.messages import Message, listed
 from photogram.network.block import Block

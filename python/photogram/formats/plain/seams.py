@@ -7,10 +7,10 @@ of a second photo, `NAME half 2`, which is mounted on the first where that is; n
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from photogram.declared import dataclass, field, fields, replace
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable, Names
 from photogram.network.rigs import Mount

@@ -120,8 +120,7 @@ impl CameraModel for Cahvor {
             let moved = ray.dot(turn);
             across * (slope * by_along * moved) - (axis * moved + turn * along) * factor
         };
-        let columns =
-            [by_axis(&by_a), by_axis(&by_b), across, across * square, across * (square * square)];
+        let columns = [by_axis(&by_a), by_axis(&by_b), across, across * square, across * (square * square)];
         let (xy, by_bent) = self.seen(&bent);
         let [fx, fy, cx, cy, ..] = self.parameters;
         let plain = [(xy[0] - cx) / fx, (xy[1] - cy) / fy];
