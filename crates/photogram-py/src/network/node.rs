@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
-use photocore::adjustment::DatumOfPart;
+use photocore::Threads;
+use photocore::adjustment::{DatumOfPart, Watch};
 use photocore::network::{
     BlockOf, FormedNode as Formed, Network, NetworkError as Failure, Node as Core, NodePrediction, Options,
     Surroundings,
@@ -285,6 +286,23 @@ fn used_up(what: &str) -> PyErr {
     PyValueError::new_err(format!("{what} of this node was taken before"))
 }
 
+impl FormedNode {
+    /// Asks the factor, which an inversion uses up.
+    fn asked<T: Send>(
+        &self,
+        py: Python<'_>,
+        (threads, progress): (usize, Option<Py<PyAny>>),
+        ask: impl FnOnce(&mut Formed, &Threads, Watch<'_>) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        let workers = Workers::of(threads, self.node.images());
+        let found = watched(py, workers, progress, |pool, watch| match &mut *lock(&self.formed) {
+            Some(formed) => ask(formed, pool, watch).map(Some),
+            None => Ok(None),
+        })?;
+        found.map_err(|error| failed(&error))?.ok_or_else(|| used_up("the factor"))
+    }
+}
+
 #[pymethods]
 impl FormedNode {
     #[getter]
@@ -319,12 +337,9 @@ impl FormedNode {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Vector<'py>> {
         let outer = numbers("outer", &outer)?;
-        let workers = Workers::of(threads, self.node.images());
-        let step = watched(py, workers, progress, |pool, watch| match &*lock(&self.formed) {
-            Some(formed) => self.node.solve(formed, &outer, pool, watch).map(Some),
-            None => Ok(None),
+        let step = self.asked(py, (threads, progress), |formed, pool, watch| {
+            self.node.solve(formed, &outer, pool, watch)
         })?;
-        let step = step.map_err(|error: Failure| failed(&error))?.ok_or_else(|| used_up("the factor"))?;
         Ok(PyArray1::from_vec(py, step))
     }
 
@@ -337,13 +352,9 @@ impl FormedNode {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Vector<'py>, Vector<'py>)> {
         let rights = slice("rights", &rights)?.to_vec();
-        let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, progress, |pool, watch| match &mut *lock(&self.formed) {
-            Some(formed) => self.node.reduce_rights(formed, rights, pool, watch).map(Some),
-            None => Ok(None),
+        let (left, products) = self.asked(py, (threads, progress), |formed, pool, watch| {
+            self.node.reduce_rights(formed, rights, pool, watch)
         })?;
-        let found = found.map_err(|error: Failure| failed(&error))?;
-        let (left, products) = found.ok_or_else(|| used_up("the factor"))?;
         Ok((PyArray1::from_vec(py, left), PyArray1::from_vec(py, products)))
     }
 
@@ -356,13 +367,10 @@ impl FormedNode {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Vector<'py>> {
         let outer = slice("outer", &outer)?;
-        let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, progress, |pool, watch| match &mut *lock(&self.formed) {
-            Some(formed) => self.node.solve_reduced_rights(formed, outer, pool, watch).map(Some),
-            None => Ok(None),
+        let found = self.asked(py, (threads, progress), |formed, pool, watch| {
+            self.node.solve_reduced_rights(formed, outer, pool, watch)
         })?;
-        let found = found.map_err(|error: Failure| failed(&error))?;
-        Ok(PyArray1::from_vec(py, found.ok_or_else(|| used_up("the factor"))?))
+        Ok(PyArray1::from_vec(py, found))
     }
 
     #[pyo3(signature = (outer, state, *, threads, datum = None, progress = None))]
