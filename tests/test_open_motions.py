@@ -297,7 +297,7 @@ def test_a_line_far_from_where_it_started_has_the_covariance_of_one_that_starts_
 @pytest.mark.parametrize(("seed", "number"), [(3, 148), (2, 652), (115, 40), (166, 76)])
 def test_verticals_of_an_ellipsoid_do_not_say_where_a_network_is(seed, number):
     """Attitudes and differences together tell its place to kilometres: rounding takes that."""
-    network = random_network(seed, number)
+    network = random_network(seed, number, "brown_forward")
     assert network.block.geographic
     assert {"attitude", "difference"} <= set(network.kinds)
     result = adjust(network.block)
@@ -309,7 +309,7 @@ def test_verticals_of_an_ellipsoid_do_not_say_where_a_network_is(seed, number):
 @pytest.mark.parametrize("point", [0, 5])
 def test_a_network_is_held_by_what_moves_well(point, given, open_still):
     """Up at a plumb line is north or east, too, by a millionth, at photos that are metres away."""
-    block = random_network(3, 148).block
+    block = random_network(3, 148, "brown_forward").block
     line = PlumbLine("edge", block.point_positions[point], sd=given)
     result = adjust(
         block.replace(observations=[*block.observations, OnPlumbLine(f"point {point}", line, SD)])

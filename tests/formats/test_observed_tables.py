@@ -10,7 +10,7 @@ from photogram import InputError, adjust, formats
 from photogram.network.observations import OnLevel, OnPlane, Relative
 from photogram.network.unknowns import Level, Plane
 
-NETWORKS = (0, 1, 2, 4, 5, 8, 9, 11, 14, 16, 29, 32, 33, 40, 7, 18, 22)
+NETWORKS = (0, 1, 2, 4, 5, 8, 9, 11, 14, 17, 29, 32, 33, 40, 7, 18, 22)
 """With every kind of observation; the last three lie in geographic space."""
 
 
