@@ -28,7 +28,7 @@ pub(super) struct Transformation {
     pub staying: Vec<usize>,
 }
 
-/// What takes the cofactors of a part to a datum of the whole (see [`super::datum`]): columns over the unknowns of the part, outer ones
+/// What takes the cofactors of a part to a datum of the whole (see `datum.rs`): columns over the unknowns of the part, outer ones
 /// too, one after the other.
 #[derive(Debug, Clone, Copy)]
 pub struct DatumOfPart<'a> {
