@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use photocore::geometry::Matrix3;
 use pyo3::import_exception;
@@ -142,4 +143,11 @@ fn chunks<T: Copy, const N: usize>(values: Vec<T>) -> Vec<[T; N]> {
 fn wrong_shape(name: &str, expected: &str, shape: &[usize]) -> PyErr {
     let shape = shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     InputError::new_err(format!("{name} has the shape ({shape}), not {expected}"))
+}
+
+/// As an array, (rows, columns); what is symmetric may be large, and is not copied.
+pub fn matrix(py: Python<'_>, found: DMatrix<f64>, symmetric: bool) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let shape = [found.nrows(), found.ncols()];
+    let rows = if symmetric { found } else { found.transpose() };
+    PyArray1::from_vec(py, rows.data.into()).reshape(shape)
 }

@@ -49,6 +49,7 @@ __all__ = [
     "adjusted_again",
     "core_options",
     "teller",
+    "with_datum",
 ]
 
 UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
@@ -191,10 +192,17 @@ def adjust(
     if datum is not None:
         refuse_datum(block, "datum")
     block = started(block)
-    inner = datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
+    options, inner = with_datum(block, options, datum)
+    return _adjusted(block, options, processors, progress, inner, keep=keep)
+
+
+def with_datum(
+    block: Block, options: CoreOptions, datum: InnerConstraints | MinimumConstraints | None
+) -> tuple[CoreOptions, DatumRow | None]:
+    """Return options with what is to be held of a block, and inner constraints as the core knows them."""
     if isinstance(datum, MinimumConstraints):
         options = replace(options, minimum=minimum_row(block, datum))
-    return _adjusted(block, options, processors, progress, inner, keep=keep)
+    return options, datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
 
 
 def core_options(

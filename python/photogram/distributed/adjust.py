@@ -18,11 +18,11 @@ from photogram.adjustment.adjustment import (
     adjust,
     core_options,
     core_threads,
+    with_datum,
 )
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.started import started
 from photogram.arguments.annotations import check_arguments
-from photogram.declared import replace
 from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
@@ -39,8 +39,6 @@ from photogram.network.datum import (
     InnerConstraints,
     MinimumConstraints,
     check_datum,
-    datum_row,
-    minimum_row,
 )
 from photogram.network.films import Reseau, Scan
 from photogram.network.refracted import check_cameras
@@ -162,9 +160,7 @@ def _ready(
     refuse_passages(block, "blocks in parts", but=Scan)
     _check_films(block)
     block = started(block)
-    if isinstance(datum, MinimumConstraints):
-        options = replace(options, minimum=minimum_row(block, datum))
-    return block, options, datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
+    return block, *with_datum(block, options, datum)
 
 
 def _check_films(block: Block) -> None:

@@ -258,12 +258,13 @@ impl Linearized {
         &self,
         problem: &AnyProblem<'_>,
         unknowns: &[usize],
+        memory: Option<usize>,
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Option<Vec<f64>>, AdjustError> {
         let rows: Vec<Function> =
             unknowns.iter().map(|&unknown| std::iter::once((unknown, 1.0)).collect()).collect();
-        match self.cofactors(problem, &rows, None, None, threads, between) {
+        match self.cofactors(problem, &rows, None, memory, threads, between) {
             Ok(found) => Ok(Some(found)),
             Err(CofactorError::Memory { .. }) => Ok(None),
             Err(CofactorError::Adjust(error)) => Err(error),

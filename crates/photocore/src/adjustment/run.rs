@@ -68,7 +68,8 @@ pub fn adjust_in_datum(
 
 /// Adjusts, and keeps what tests of groups of observations need: [`Leverages::of`] takes it over.
 ///
-/// * `joint`: unknowns whose cofactors with each other are kept too ([`Adjustment::joint`]), from the last factor.
+/// * `joint`: unknowns whose cofactors with each other are kept too ([`Adjustment::joint`]), from the last factor;
+/// * `memory`: where they take no more bytes than these (None: any number).
 ///
 /// # Errors
 /// Those of [`adjust`].
@@ -77,11 +78,11 @@ pub fn adjust_in_datum(
 pub fn adjust_by_groups(
     problem: &AnyProblem<'_>,
     options: &Options,
-    joint: &[usize],
+    (joint, memory): (&[usize], Option<usize>),
     threads: &Threads,
     watch: Watch<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjusted(problem, options, None, threads, watch, Some(joint))
+    adjusted(problem, options, None, threads, watch, Some((joint, memory)))
 }
 
 fn adjusted(
@@ -90,7 +91,7 @@ fn adjusted(
     target: Option<Target<'_>>,
     threads: &Threads,
     watch: Watch<'_>,
-    by_groups: Option<&[usize]>,
+    by_groups: Option<(&[usize], Option<usize>)>,
 ) -> Result<Adjustment, AdjustError> {
     let mut run = Run {
         problem,
@@ -199,8 +200,8 @@ impl<'a> End<'a> {
 pub(super) struct Run<'a, 'w> {
     pub problem: &'a AnyProblem<'a>,
     pub options: &'a Options,
-    /// Where what tests of groups need is kept: unknowns whose cofactors with each other are kept too.
-    by_groups: Option<&'a [usize]>,
+    /// Where what tests of groups need is kept: unknowns whose cofactors with each other are kept too, and the bytes that these may take.
+    by_groups: Option<(&'a [usize], Option<usize>)>,
     /// The datum to end in.
     target: Option<Target<'a>>,
     /// Whether the next formation will be the last one, there being a datum to end in.
@@ -356,9 +357,9 @@ impl<'a> Run<'a, '_> {
                 let mut between = between(&mut *self.watch, Phase::Solve, locals);
                 linearized.take_to_datum(&equations, self.threads, &mut between)?;
             }
-            if let Some(joint) = self.by_groups.filter(|joint| !joint.is_empty()) {
+            if let Some((joint, memory)) = self.by_groups.filter(|(joint, _)| !joint.is_empty()) {
                 let mut between = between(&mut *self.watch, Phase::Invert, locals);
-                adjustment.joint = linearized.joint(problem, joint, self.threads, &mut between)?;
+                adjustment.joint = linearized.joint(problem, joint, memory, self.threads, &mut between)?;
             }
             let what = InvertOptions { by_groups: self.by_groups.is_some(), ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);

@@ -139,7 +139,8 @@ impl Network {
             }
             goal.datum.map_or(Ok(()), |inner| self.check_carriers(inner, &assembled))?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
-            let ended = iterated(&assembled, options, goal, done, threads, watch);
+            let joint = goal.keep.map(|points| assembled.taking_part(points));
+            let ended = iterated(&assembled, options, goal.datum, joint.as_deref(), done, threads, watch);
             let reopened = ended.as_ref().ok().and_then(|ended| reopened(&assembled, ended));
             let look = || screening.look(&Ended { adjusted: &ended, assembled: &assembled, options });
             let begin = reopened.or_else(look);
@@ -153,7 +154,8 @@ impl Network {
                 }
                 (None, Ok(mut ended)) => {
                     ended.go_on_from(before.map(|(earlier, _)| earlier));
-                    return self.solved(options, goal, assembled, ended, screening, threads, watch);
+                    return self
+                        .solved(options, goal.datum, joint, assembled, ended, screening, threads, watch);
                 }
                 (_, Err(error)) => {
                     let error = NetworkError::new(error, &assembled);
@@ -167,7 +169,8 @@ impl Network {
     fn solved(
         &self,
         options: &Options,
-        Goal { datum, keep }: Goal<'_>,
+        datum: Option<&InnerConstraints>,
+        joint: Option<Vec<(usize, usize)>>,
         assembled: Assembled,
         mut ended: Adjustment,
         Screening { leaving, .. }: Screening,
@@ -180,10 +183,8 @@ impl Network {
             }
             (lost, _) => lost.unwrap_or(0.0),
         };
-        let joint = ended.joint.take().map(|found| {
-            let points = assembled.taking_part(keep.unwrap_or_default());
-            let points = points.into_iter().map(|(point, _)| point).collect();
-            let size = found.len().isqrt();
+        let joint = joint.zip(ended.joint.take()).map(|(points, found)| {
+            let (points, size) = (points.into_iter().map(|(point, _)| point).collect(), found.len().isqrt());
             Joint { points, cofactors: DMatrix::from_vec(size, size, found) }
         });
         let left_out = &leaving.left_out.points;
@@ -215,7 +216,8 @@ fn reopened(assembled: &Assembled, ended: &Adjustment) -> Option<Begin> {
 fn iterated(
     assembled: &Assembled,
     options: &Options,
-    Goal { datum, keep }: Goal<'_>,
+    datum: Option<&InnerConstraints>,
+    joint: Option<&[(usize, usize)]>,
     done: usize,
     threads: &Threads,
     watch: Watch<'_>,
@@ -233,11 +235,11 @@ fn iterated(
         None => {}
     }
     let by_groups = datum.is_none() && plain && !matches!(own.method, Method::Full(_));
-    match keep.filter(|_| by_groups && assembled.may_keep(options)) {
+    match joint.filter(|_| by_groups && assembled.may_keep(options)) {
         Some(points) => {
-            let unknowns = |(_, place)| problem.model.of_point(place);
-            let joint: Vec<usize> = assembled.taking_part(points).into_iter().flat_map(unknowns).collect();
-            adjustment::adjust_by_groups(problem, &own, &joint, threads, watch)
+            let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
+            let joint: Vec<usize> = points.iter().flat_map(unknowns).collect();
+            adjustment::adjust_by_groups(problem, &own, (&joint, options.memory), threads, watch)
         }
         None => adjustment::adjust(problem, &own, threads, watch),
     }

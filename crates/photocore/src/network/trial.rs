@@ -199,7 +199,8 @@ impl Trial {
         let method = self.method(tolerance);
         let options = adjustment::Options { method, covariance: true, loss: None, ..self.options };
         let failed = |error| NetworkError::new(error, &self.assembled);
-        let adjusted = adjustment::adjust_by_groups(&self.assembled.problem, &options, &[], threads, watch);
+        let adjusted =
+            adjustment::adjust_by_groups(&self.assembled.problem, &options, (&[], None), threads, watch);
         let mut adjusted = adjusted.map_err(failed)?;
         let values = std::mem::take(&mut adjusted.unknowns);
         let Some(found) = Leverages::of(&mut adjusted, &values) else {

@@ -1,6 +1,5 @@
 //! Covariances of an adjusted network.
 
-use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn};
 use photocore::adjustment::{GroupSquares, Probing};
 use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, Of, Options};
@@ -9,7 +8,7 @@ use pyo3::prelude::*;
 use super::state::BlockState;
 use super::suspects::NetworkSuspects;
 use super::{BlockError, failure};
-use crate::arrays::group_rows;
+use crate::arrays::{group_rows, matrix};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
 
@@ -60,17 +59,6 @@ pub fn factored(
 /// A failure of a block as Python sees it.
 pub fn refused(error: &Failure) -> PyErr {
     BlockError::new_err(failure(error, "block"))
-}
-
-/// As an array, (rows, columns); what is symmetric may be large, and is not copied.
-pub(super) fn matrix(
-    py: Python<'_>,
-    found: DMatrix<f64>,
-    symmetric: bool,
-) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    let shape = [found.nrows(), found.ncols()];
-    let rows = if symmetric { found } else { found.transpose() };
-    PyArray1::from_vec(py, rows.data.into()).reshape(shape)
 }
 
 #[pymethods]

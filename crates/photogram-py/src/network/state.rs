@@ -6,7 +6,7 @@ use numpy::PyArray2;
 use photocore::network::{Converged, InnerConstraints, Joint, NetworkDatum, Solution, State};
 use pyo3::prelude::*;
 
-use super::covariances::matrix;
+use crate::arrays::matrix;
 use crate::options::{named_ordering, unknown};
 
 /// What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, and what makes these lengths.
