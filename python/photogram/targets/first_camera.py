@@ -18,7 +18,7 @@ from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
 from photogram.targets.sightings import Sightings
 from photogram.targets.small_block import Adjusted, adjusted_views
 
-__all__ = ["first_camera", "picture_size"]
+__all__ = ["NARROW", "first_camera", "picture_size", "usual_models"]
 
 MANY = 62
 """Pictures that first values of a camera are adjusted by, at the most: the others would say the same."""
@@ -118,16 +118,28 @@ def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str |
     farthest = _from_axis(family, seen.xy.reshape(-1, 2))
     if model is None:
         ends = np.array([[0.0, (size[1] - 1) / 2], [size[0] - 1.0, (size[1] - 1) / 2]])
-        field = float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1)))
-        if farthest >= WIDEST:
-            return ["opencv_fisheye"]
-        return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]
+        return usual_models(
+            float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1))), farthest
+        )
     if farthest >= math.pi / 2 and is_perspective(lens_of(model, family, size)):
         raise InputError(
             f"camera {family.name}: it sees corners {math.degrees(farthest):.0f} degrees off its axis, which"
             f" {model} cannot show; opencv_fisheye can"
         )
     return [model]
+
+
+def usual_models(field: float, farthest: float) -> list[str]:
+    """Return the models that are usual at a horizontal field of view, in order.
+
+    Parameters
+    ----------
+    field, farthest
+        Radians; the latter is how far from the axis anything is seen.
+    """
+    if farthest >= WIDEST:
+        return ["opencv_fisheye"]
+    return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]
 
 
 def _from_axis(camera: Camera, xy: Floats) -> float:
