@@ -114,8 +114,8 @@ class Planned:
 UNPLANNED = Planned()
 """There are pictures."""
 TAKEN = (
-    "--plan --field --focal --away --board --spacing --unit --shape --size --model --knots --sd --distance --need"
-    " --out --json --html --no-html --plots --plot-format --quiet"
+    "--plan --field --focal --away --board --spacing --unit --shape --size --model --knots --sd --distance"
+    " --need --out --json --html --no-html --plots --plot-format --quiet"
 )
 """Options that go with `--plan`."""
 

@@ -29,6 +29,8 @@ FEWEST = 12
 """Corners that a picture must have to count."""
 MARGIN = 5.0
 """Pixels about a corner that must be in the picture for a detector to find it."""
+EXACTLY = 24
+"""Views that are tried to the last digit: those that are likely the best."""
 STRAIGHT = 1e-6
 """By how much the ray of an image may miss the point that it is of: more, and the lens has folded."""
 
@@ -83,6 +85,18 @@ class Added:
         lost = found[own.shape[1] :]
         gained = found[: own.shape[1]] - lost.T @ np.linalg.solve(self.by_pose.T @ by_pose, lost)
         return np.asarray((gained + gained.T) / 2)
+
+    def likely_gain(self, cofactors: Floats, rows: Indices) -> Floats:
+        """Return about the same, in a tenth of the time: each point known for itself, Q M (I + Q M)^-1 Q."""
+        of_points = cofactors[self.places[:, :, np.newaxis], self.places[:, np.newaxis]]
+        noise = np.eye(2) + self.by_place @ of_points @ self.by_place.transpose(0, 2, 1)
+        both, count = np.hstack([self.by_cameras, self.by_pose]), len(self.touched)
+        weighted = np.linalg.solve(noise, both.reshape(len(noise), 2, -1)).reshape(both.shape)
+        normal = both.T @ weighted
+        mixed = normal[count:, :count]
+        normal = normal[:count, :count] - mixed.T @ np.linalg.solve(normal[count:, count:], mixed)
+        own, across = cofactors[np.ix_(self.touched, self.touched)], cofactors[np.ix_(self.touched, rows)]
+        return np.asarray(across.T @ normal @ np.linalg.solve(np.eye(count) + own @ normal, across))
 
     def _times(self, cofactors: Floats) -> Floats:
         """Return (2 m, k) A_c Q."""
@@ -235,13 +249,27 @@ def best_views(
     rows = np.flatnonzero(functions.any(axis=(0, 1)))
     partials, cofactors = functions[:, :, rows], placed_cofactors(housing)
     knots = any(each.knots is not None for each in housing.cameras)
+
+    def badness(own: Floats) -> tuple[float, float]:
+        return 0.0 if knots else _rounded(own.max()), _rounded(np.mean(own**2))
+
     found: list[NewView] = []
     while left and len(found) < count:
         own = cofactors[np.ix_(rows, rows)]
-        tried = [worst(of_functions(partials, own - added.gain(cofactors, rows))) for _, added in left]
-        largest = [0.0 if knots else float(own.max()) for own in tried]
-        best = min(range(len(left)), key=lambda row: (largest[row], np.mean(tried[row] ** 2)))
+
+        def after(gain: Floats, own: Floats = own) -> Floats:
+            return worst(of_functions(partials, own - gain))
+
+        likely = [badness(after(added.likely_gain(cofactors, rows))) for _, added in left]
+        few = sorted(range(len(left)), key=likely.__getitem__)[:EXACTLY]
+        tried = {row: after(left[row][1].gain(cofactors, rows)) for row in sorted(few)}
+        best = min(tried, key=lambda row: badness(tried[row]))
         candidate, added = left.pop(best)
         found.append(NewView(candidate, added.corners, np.sqrt(housing.variance) * tried[best]))
         cofactors = cofactors - added.gain(cofactors, slice(None))
     return found
+
+
+def _rounded(value: float) -> float:
+    """Return a number in six figures: of views that are mirrored images, as good, the first is taken."""
+    return float(f"{value:.6g}")

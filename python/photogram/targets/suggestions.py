@@ -115,16 +115,16 @@ def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board:
     places = (to_camera @ housing.poses[own] @ [*middle_of(housing.points), 1.0])[:, :3]
     away = np.quantile(np.linalg.norm(places, axis=1), DISTANCES).tolist()
     to_first = inverted(to_camera)
-    found = views_over_picture(housing.cameras[camera], size, board, away)
+    counts = np.unique(housing.seen.views[housing.seen.cameras == camera], return_counts=True)[1]
+    whole = board.found_whole and np.median(counts) == len(housing.points)
+    found = views_over_picture(housing.cameras[camera], size, board, away, whole=bool(whole))
     return [Candidate(each.name, to_first @ each.pose) for each in found]
 
 
 def views_over_picture(
-    camera: Camera, size: tuple[int, int], board: Board, distances: Sequence[float]
+    camera: Camera, size: tuple[int, int], board: Board, distances: Sequence[float], *, whole: bool
 ) -> list[Candidate]:
     """Return views, board -> camera, with the middle of the board in each part of the picture.
-
-    A board that is found as a whole, or not at all, is held as near there as the picture shows all of it.
 
     Parameters
     ----------
@@ -132,25 +132,29 @@ def views_over_picture(
         The camera, and width and height of its pictures.
     board, distances
         The board, and how far its middle is from the camera.
+    whole
+        Whether it is found as a whole, or not at all: it is held as near there as all of it is shown.
     """
     found = []
-    steps = INWARDS if board.found_whole else INWARDS[:1]
+    steps = INWARDS if whole else INWARDS[:1]
     centre = (np.array(size) - 1) / 2
     for part in parts_of(size):
         tried = rays(camera, np.array([part.middle + step * (centre - part.middle) for step in steps]))
         tried = tried[np.isfinite(tried).all(axis=1)]
         held = zip(*(views_towards(each, part.name, board, distances) for each in tried), strict=True)
-        found += [own for way in held if (own := _first_whole(camera, size, board, way)) is not None]
+        if whole:
+            found += [
+                own for way in held if (own := _first_whole(camera, size, board.places, way)) is not None
+            ]
+        else:
+            found += [way[0] for way in held]
     return found
 
 
 def _first_whole(
-    camera: Camera, size: tuple[int, int], board: Board, ways: Sequence[Candidate]
+    camera: Camera, size: tuple[int, int], points: Floats, ways: Sequence[Candidate]
 ) -> Candidate | None:
-    """Return the first of some views in which a picture shows all of a board that must be seen as a whole."""
-    if not board.found_whole:
-        return ways[0]
-    points = board.places
+    """Return the first of some views in which a picture shows all of (n, 3) points; None where none does."""
     for each in ways:
         if len(shown_of(camera, np.array(size), transformed(each.pose, points))[0]) == len(points):
             return each

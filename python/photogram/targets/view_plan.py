@@ -92,7 +92,7 @@ def plan_views(
     middle = rays(camera, (np.array([size]) - 1) / 2)[0]
     first = [held[len(held) // 2]]
     taken = views_towards(middle, "middle of the picture", board, first, TILTED, [""])
-    candidates = views_over_picture(camera, size, board, held)
+    candidates = views_over_picture(camera, size, board, held, whole=board.found_whole)
     worst, largest = (distances or (math.inf,))[0], [math.nan] * (len(TILTED) - 1)
     known = weakly_known(camera, size)
     while True:
