@@ -199,7 +199,9 @@ class Seen:
         found = calibration_of(formats.read(path))
         if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets):
             raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
-        changes: dict[str, Any] = {"regularise": self.regularise and self.regularise.value}
+        changes: dict[str, Any] = {}
+        if self.regularise is not None:
+            changes["regularise"] = self.regularise.value
         if self.shape is not None:
             changes["board"] = found.board.replace(shape=self.shape.value)
         if self.sd is not None:

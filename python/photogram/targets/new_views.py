@@ -251,7 +251,7 @@ def best_views(
     knots = any(each.knots is not None for each in housing.cameras)
 
     def badness(own: Floats) -> tuple[float, float]:
-        return 0.0 if knots else _rounded(own.max()), _rounded(np.mean(own**2))
+        return 0.0 if knots else _rounded(own.max()), _rounded(float(np.mean(own**2)))
 
     found: list[NewView] = []
     while left and len(found) < count:

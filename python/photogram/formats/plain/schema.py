@@ -479,7 +479,7 @@ TABLES: Mapping[str, Schema] = {
     ),
     "boards": Schema(
         ("board", "kind"),
-        ("board", "kind", "shape"),
+        ("board", "kind", "shape", "regularise"),
         (
             *("columns", "rows", "spacing_x", "spacing_y", "tag_size", "tag_spacing"),
             *("bend_x", "bend_y", "sd_bend_x", "sd_bend_y"),
@@ -487,7 +487,8 @@ TABLES: Mapping[str, Schema] = {
         "`board`, `kind` (`chessboard`, `charuco`, `aprilgrid`, `circles`, `asymmetric_circles`, `points`):"
         " what the control is the points of ([targets](targets.md)); `columns`, `rows`, `spacing_x`,"
         " `spacing_y`, or `tag_size`, `tag_spacing`; `shape` (`held`, `bend`, `points`);"
-        " of a `bend` the deflections `bend_x`, `bend_y` (0), `sd_bend_x`, `sd_bend_y` (`inf`)",
+        " of a `bend` the deflections `bend_x`, `bend_y` (0), `sd_bend_x`, `sd_bend_y` (`inf`); `regularise`"
+        " (`mrcal`): the weak priors that `photogram calibrate` adds to its cameras",
     ),
     "knots": Schema(
         ("camera", "i", "j", "dx", "dy"),
