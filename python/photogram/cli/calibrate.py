@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.adjust import LossName
+from photogram.cli.components import COMPONENTS
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
@@ -18,8 +20,11 @@ from photogram.cli.progress import shown
 from photogram.cli.projects import with_options
 from photogram.cli.seen import AS_FOUND, PriorName, Seen
 from photogram.cli.uncertainty import AS_USUAL, Uncertainty
+from photogram.declared import replace
 
 if TYPE_CHECKING:
+    from photogram.results.components import VarianceComponents
+    from photogram.show.page import Page
     from photogram.targets import Calibrated, Calibration
 
 __all__ = ["calibrate"]
@@ -27,6 +32,17 @@ __all__ = ["calibrate"]
 
 EXAMPLE = ("board",)
 """The packaged example, a directory of photogram.examples."""
+
+
+class CornerBasisName(StrEnum):
+    """What groups of corners are made by."""
+
+    KIND = "kind"
+    CAMERA = "camera"
+    LEVEL = "level"
+    PHOTO = "photo"
+    COMPONENT = "component"
+    RAYS = "rays"
 
 
 @with_job
@@ -72,6 +88,14 @@ def calibrate(
             show_default=False,
         ),
     ] = None,
+    components: Annotated[
+        list[CornerBasisName] | None,
+        typer.Option(
+            help="Estimate variance components of corners: by which factors their standard deviations are"
+            " wrong. Given more than once: of all combinations; level goes with camera alone.",
+            show_default=False,
+        ),
+    ] = None,
     uncertainty: Uncertainty = AS_USUAL,
     planned: Planned = UNPLANNED,
     threads: Threads = None,
@@ -108,13 +132,15 @@ def calibrate(
             _adjusted(job, calibration, how, threads, snooping),
             lambda other: seen.read(other).adjust(**how, threads=threads),
         )
+        weights = _weights(job, found, components or [], threads)
         files = _files(found) | _cameras(found, to or [], uncertainty.need)
-        page = documents.page(job, "calibrate", target, partial(_page, found))
+        files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
+        page = documents.page(job, "calibrate", target, partial(_page, found, weights))
         drawn = pictures.of(found.result) | pictures.of_worth(found.worth)
         job.finish(
             {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
-            summary=lambda: _summarise(found),
+            summary=lambda: _summarise(found, weights),
             code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
         )
 
@@ -166,13 +192,37 @@ def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[
     return made | {FILE: cameras_covariance(found)}
 
 
-def _page(found: Calibrated) -> Any:
+def _weights(
+    job: Job, found: Calibrated, bases: list[CornerBasisName], threads: int | None
+) -> VarianceComponents | None:
+    """Estimate the variance components that are asked for."""
+    if not bases:
+        return None
+    from photogram.targets import corner_components
+
+    by: list[Any] = [each.value for each in bases]
+    with job.status("variance components") as status:
+
+        def tell(number: int, _: object) -> None:
+            if status is not None:
+                status.update(f"variance components, adjustment {number + 1}")
+
+        return corner_components(found, by, threads=threads, progress=tell)
+
+
+def _page(found: Calibrated, weights: VarianceComponents | None) -> Page:
+    from photogram.results.page.weights import components_section
     from photogram.show.ways import page_of
 
-    return page_of(found)
+    page = page_of(found)
+    more = [] if weights is None else [components_section(weights)]
+    return replace(page, sections=[*page.sections[:1], *more, *page.sections[1:]])
 
 
-def _summarise(found: Calibrated) -> None:
+def _summarise(found: Calibrated, weights: VarianceComponents | None) -> None:
+    from photogram.results.components import statement_lines
     from photogram.targets.report import calibration_summary
 
-    print_sections(calibration_summary(found), "report.txt")
+    sections = calibration_summary(found)
+    more = [] if weights is None else [("Variance components", statement_lines(weights))]
+    print_sections([*sections[:1], *more, *sections[1:]], "report.txt")

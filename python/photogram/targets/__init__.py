@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         uncertainty_map,
     )
     from photogram.targets.view_plan import plan_views
+    from photogram.targets.weighing import corner_components
     from photogram.targets.worth import Worth, WorthOptions
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "appraise",
     "camera_files",
     "convert_lens",
+    "corner_components",
     "cross_validate",
     "difference",
     "distance_uncertainty",
@@ -103,6 +105,7 @@ _HOMES = {
     "Candidate": "new_views",
     "Conversion": "conversion",
     "convert_lens": "conversion",
+    "corner_components": "weighing",
     "Corners": "corners",
     "cross_validate": "cross_validated",
     "CrossValidation": "cross_validation",
