@@ -49,7 +49,7 @@ class PriorName(StrEnum):
     MRCAL = "mrcal"
 
 
-PLAIN_GOES = "--shape, --sd, --regularise, --offset alone"
+PLAIN_GOES = "--shape, --sd, --regularise, --sync offset, --offset alone"
 """Options that go with a plain project."""
 
 
@@ -197,9 +197,14 @@ class Seen:
         from photogram.formats.targets.calibrations import calibration_of
 
         found = calibration_of(formats.read(path))
-        if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets):
+        said = Seen(
+            shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets, sync=self.sync
+        )
+        if self != said or self.sync is SyncName.NONE:
             raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
         changes: dict[str, Any] = {}
+        if self.sync is SyncName.OFFSET:
+            changes["sync"] = self.sync.value
         if self.regularise is not None:
             changes["regularise"] = self.regularise.value
         if self.shape is not None:

@@ -19,6 +19,7 @@ from photogram.targets.start import Regularisation
 __all__ = [
     "ASSUMED",
     "REGULARISED",
+    "TIMES",
     "boards_table",
     "levels",
     "read_bends",
@@ -30,6 +31,8 @@ ASSUMED = "sd of corners assumed"
 """The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
 REGULARISED = "regularise"
 """The detail, and the column of boards, of the weak priors that a calibration adds to its cameras."""
+TIMES = "times of photos on frames"
+"""The detail: seconds by the clocks of cameras, by the names of photos of a board."""
 BENDS = ("bend_x", "bend_y")
 _LENGTHS = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
 

@@ -15,7 +15,14 @@ from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
-from photogram.formats.plain.boards import ASSUMED, REGULARISED, read_bends, read_boards, read_regularised
+from photogram.formats.plain.boards import (
+    ASSUMED,
+    REGULARISED,
+    TIMES,
+    read_bends,
+    read_boards,
+    read_regularised,
+)
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.film_sides import Seen
@@ -24,7 +31,7 @@ from photogram.formats.plain.images import Images, image_coordinates, read_image
 from photogram.formats.plain.moving import placed, read_timed
 from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.photos import Photos, read_photos
-from photogram.formats.plain.rigs import read_frames, read_rigs
+from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
@@ -147,6 +154,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
             "settings": settings,
             ASSUMED: assumed,
             REGULARISED: read_regularised(tables),
+            TIMES: times_of_frames(tables) | _times(photos),
             **scanned.details(),
         },
     ).replace(
@@ -164,6 +172,12 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         rows = np.array([places[name] for name in given.names], dtype=np.int64)
         check_systems(project, settings, control, rows, control.vectors(AXES), free=False)
     return project
+
+
+def _times(photos: Photos) -> dict[str, float]:
+    """Return when photos were taken, of those that say it."""
+    pairs = zip(photos.names, photos.times.tolist(), strict=True)
+    return {photo: time for photo, time in pairs if not math.isnan(time)}
 
 
 def _unused(

@@ -465,17 +465,19 @@ TABLES: Mapping[str, Schema] = {
     ),
     "rigs": Schema(
         ("rig",),
-        ("rig", "camera", "sensor"),
+        ("rig", "camera", "sensor", "clock"),
         (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS, *_CLOCK),
         "`rig`, `camera` or `sensor`; `x`, `y`, `z`, angles, `sd_x` .., `sd_rotation_x` ..; the first row of"
         " a rig is its reference, a row with no numbers an unknown sensor; of sensors whose photos are on"
-        " trajectories and say none of their own `time_offset` (0; s), `sd_time_offset` (s; 0: known)",
+        " trajectories and say none of their own `time_offset` (0; s), `sd_time_offset` (s; 0: known),"
+        " `clock` (its name)",
     ),
     "frames": Schema(
         ("frame", "rig", "photo"),
         ("frame", "rig", "photo", "sensor"),
-        (),
-        "`frame`, `rig`, `photo`; `sensor`, where the photo's camera does not tell it",
+        ("time",),
+        "`frame`, `rig`, `photo`; `sensor`, where the photo's camera does not tell it; `time` (s) of the"
+        " photos of a board, where `photos` say none",
     ),
     "boards": Schema(
         ("board", "kind"),

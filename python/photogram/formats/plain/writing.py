@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
-from photogram.formats.plain.boards import ASSUMED, REGULARISED, boards_table, levels
+from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.image_axes import to_tables
@@ -48,7 +48,7 @@ def cannot_hold(project: Project) -> list[str]:
     if sums := lost_smoothness(block):
         found.append(f"{sums} sums of coefficients that are no neighbours, or too many")
     cameras, which = known_cameras(block)
-    lost = Rigs(block, [cameras[row].name for row in which]).lost
+    lost = Rigs(block, [cameras[row].name for row in which], {}).lost
     if lost:
         found.append(f"{lost} bases of sensors that took no photo")
     again = _second_positions(block)
@@ -100,7 +100,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     """
     block = project.block
     cameras, photo_cameras = known_cameras(block)
-    rigs = Rigs(block, [cameras[row].name for row in photo_cameras])
+    rigs = Rigs(block, [cameras[row].name for row in photo_cameras], _times_of(project))
     exposures = of_cameras(block, cameras, photo_cameras)
     films = WrittenFilms(project, [cameras[row].name for row in photo_cameras])
     lines = np.array([isinstance(each, LineSensor) for each in exposures])[photo_cameras]
@@ -114,7 +114,8 @@ def write(project: Project) -> Mapping[str, bytes]:
         "cameras": _with_exposures(
             camera_table(project, cameras), exposure_columns(cameras, exposures, *pictures, image_y)
         ),
-        "photos": _photos(block, [cameras[row].name for row in photo_cameras], rigs) | films.photo_columns(),
+        "photos": _photos(project, [cameras[row].name for row in photo_cameras], rigs)
+        | films.photo_columns(),
         "images": _images(project, names, cameras, photo_cameras, plain, image_y),
         "points": _points(project),
         "control": control_table(project),
@@ -266,7 +267,8 @@ def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     return columns
 
 
-def _photos(block: Block, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
+def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
+    block = project.block
     positions, sd = _given(block, "position")
     if block.geographic:
         positions = np.column_stack([np.degrees(positions[:, :2]), positions[:, 2]])
@@ -278,10 +280,17 @@ def _photos(block: Block, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
         if np.isfinite(values).any():
             columns |= {f"sd_{name}": column for name, column in zip(names, values.T, strict=True)}
     drifts = any(isinstance(each, Position) and each.drift is not None for each in block.observations)
-    if drifts and not block.timed:
+    times = _times_of(project)
+    if drifts:
         times = {each.photo: each.time for each in block.observations if isinstance(each, Position)}
+    if times and not block.timed:
         columns["time"] = [times.get(photo) for photo in block.photo_ids]
     return columns | moving_columns(block, rigs)
+
+
+def _times_of(project: Project) -> Mapping[str, float]:
+    """Return when photos of a board were taken; others say it where it counts."""
+    return project.details.get(TIMES, {}) if project.boards else {}
 
 
 def _given(block: Block, what: str) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
-from photogram.formats.plain.boards import ASSUMED, REGULARISED
+from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES
 from photogram.formats.project import Project, Unused
 from photogram.formats.targets import TITLE
 from photogram.messages import listed
@@ -68,8 +68,20 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
         messages=tuple(calibration.messages),
         boards={"board": calibration.board.replace(shape=calibration.shape)},
         unused=_unused(calibration),
-        details={ASSUMED: calibration.sd0 is None, REGULARISED: calibration.regularise},
+        details={
+            ASSUMED: calibration.sd0 is None,
+            REGULARISED: calibration.regularise,
+            TIMES: _times(calibration),
+        },
     )
+
+
+def _times(calibration: Start) -> dict[str, float]:
+    """Return when pictures of frames were taken; those on trajectories say it themselves."""
+    corners = calibration.corners
+    if corners.times is None or calibration.sync == "offset":
+        return {}
+    return dict(zip(corners.pictures, corners.times.tolist(), strict=True))
 
 
 def _unused(calibration: Start) -> Unused:
@@ -113,6 +125,8 @@ def calibration_of(project: Project) -> Calibration:
     clocks = _in_motion(project, seen) if block.timed else None
     if clocks is not None:
         corners = corners.replace(times=clocks.pop("times")[np.unique(block.image_photos)])
+    elif all(name in (times := project.details.get(TIMES, {})) for name in corners.pictures):
+        corners = corners.replace(times=[times[name] for name in corners.pictures])
     return Calibration(
         board=_with_places(board, block, number),
         corners=corners,
