@@ -280,7 +280,7 @@ def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
         if np.isfinite(values).any():
             columns |= {f"sd_{name}": column for name, column in zip(names, values.T, strict=True)}
     drifts = any(isinstance(each, Position) and each.drift is not None for each in block.observations)
-    times = _times_of(project)
+    times: Mapping[Any, float | None] = _times_of(project)
     if drifts:
         times = {each.photo: each.time for each in block.observations if isinstance(each, Position)}
     if times and not block.timed:
