@@ -18,7 +18,7 @@ from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
 from photogram.targets.sightings import Sightings
 from photogram.targets.small_block import Adjusted, adjusted_views
 
-__all__ = ["NARROW", "first_camera", "picture_size", "usual_models"]
+__all__ = ["NARROW", "WIDEST", "first_camera", "from_axis", "picture_size", "usual_models"]
 
 MANY = 62
 """Pictures that first values of a camera are adjusted by, at the most: the others would say the same."""
@@ -115,7 +115,7 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
 
 def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str | None) -> Sequence[str]:
     """Return the model that was asked for, if it can show all corners; else the usual ones, in order."""
-    farthest = _from_axis(family, seen.xy.reshape(-1, 2))
+    farthest = from_axis(family, seen.xy.reshape(-1, 2))
     if model is None:
         ends = np.array([[0.0, (size[1] - 1) / 2], [size[0] - 1.0, (size[1] - 1) / 2]])
         return usual_models(
@@ -142,7 +142,7 @@ def usual_models(field: float, farthest: float) -> list[str]:
     return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]
 
 
-def _from_axis(camera: Camera, xy: Floats) -> float:
+def from_axis(camera: Camera, xy: Floats) -> float:
     """Return the largest angle (rad) of pixels from the axis of a camera; NaN are left out."""
     rays = camera.rays(xy)
     return float(np.nanmax(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), -rays[:, 2])))
