@@ -18,8 +18,9 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.declared import dataclass
 from photogram.messages import Message, listed
-from photogram.network.films import Film, Mark
+from photogram.network.films import Film
 from photogram.network.observations import Fiducial, KnownTogether
+from photogram.network.unknowns import Unknown
 from photogram.results.films_drawn import mark_residuals
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
@@ -97,7 +98,7 @@ def _deviations(read: object) -> Floats:
     return np.broadcast_to(np.asarray(own, dtype=float), (2,))
 
 
-def _certificate(result: Result, marks: list[Mark]) -> Floats:
+def _certificate(result: Result, marks: list[Unknown]) -> Floats:
     """Return (2 n, 2 n) what is known of marks together; 0 of marks that are errorless."""
     first = {id(mark): 2 * k for k, mark in enumerate(marks)}
     found = np.zeros((2 * len(marks),) * 2)
