@@ -88,8 +88,8 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "certificate.certificate",
     ),
     "film": (
-        "Adjust a block on film in one step and in two: what films that are fitted before leave out.",
-        "film.film",
+        "Adjust a block on film in one step and in two; take marks from MicMac.",
+        {"compare": "film.film", "marks": "film_marks.marks"},
     ),
     "giant": (
         "Adjust or check a GIANT project.",
