@@ -377,8 +377,8 @@ def check_scans(
         if photo_cameras is None:
             continue
         camera = cameras[int(photo_cameras[rows[each.photo]])]
-        if camera.unit != "mm" or camera.image_y == "down":
-            raise InputError(f"the photo {each.photo} is a scanned film: its camera is in mm, y up")
+        if camera.unit != "mm" or (camera.image_y == "down" and camera.model != "plate"):
+            raise InputError(f"the photo {each.photo} is a scanned film: its camera is in mm, y up, or plate")
         if camera.model.startswith("on_comparator"):
             raise InputError(
                 f"the photo {each.photo} is a scanned film, and its camera is on_comparator, which has a"

@@ -227,8 +227,10 @@ class _Reader:
                 q = self.marks.places_of(photo)
                 start = np.array(conformal(q, photo.true, mirrored=mirrored)[:3])
             found.append((mirrored, start))
+        # The frame of a camera of stars is that of the plate as it was measured.
+        stars = {each.name for each in self.seen.cameras.cameras if each.image_y == "down"}
         told = [
-            None if self.marks.given_side(photo) is not None else side
+            None if photo.camera in stars or self.marks.given_side(photo) is not None else side
             for photo, (side, _) in zip(self.photos, found, strict=True)
         ]
         self.tables.messages.extend(
@@ -349,7 +351,7 @@ def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[M
     found = list(cameras.cameras)
     for row in used:
         camera = found[row]
-        if camera.parameters.get("c", -1.0) > 0:
+        if camera.image_y == "up" and camera.parameters.get("c", -1.0) > 0:
             found[row] = camera = _positive(camera)
             messages.append(
                 Message(
