@@ -1,4 +1,4 @@
-"""Cameras that stars have calibrated, in projects on film: with their covariance, in the frame of the plate."""
+"""Cameras that stars have calibrated, in projects on film: with their covariance, in their own frame."""
 
 from importlib.resources import files
 from pathlib import Path
