@@ -8,7 +8,7 @@ import pytest
 
 from photogram import Result, adjust
 from photogram.diagnosis.adjusted import diagnosed
-from photogram.diagnosis.film_axes import axis_hints
+from photogram.diagnosis.film_axes import _fitted, axis_hints
 from photogram.formats import Wishes, read
 
 ARCHIVE = files("photogram") / "examples" / "archive"
@@ -77,3 +77,12 @@ def test_a_single_mark_is_no_axis(tmp_path: Path) -> None:
     (tmp_path / "fiducial_images.csv").write_text("\n".join(keep) + "\n")
     result = adjust(read(tmp_path, wishes=Wishes(settings=["film.model=conformal"])).block)
     assert axis_hints(result) == []
+
+
+def test_marks_in_one_line_tell_nothing() -> None:
+    places = np.column_stack([np.linspace(-100.0, 100.0, 5), np.zeros(5)])
+    assert _fitted(places, 1e-3 * places.ravel(), 1e-6 * np.eye(10))[:2] == (0.0, 0.0)
+    places[2, 1] = 80.0
+    _, gain, b = _fitted(places, 1e-4 * (places * [1.0, -1.0]).ravel(), 1e-6 * np.eye(10))
+    assert gain > 100
+    np.testing.assert_allclose(b, [1e-4, 0.0], rtol=0, atol=1e-12)

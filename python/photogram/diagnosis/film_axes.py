@@ -18,7 +18,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.declared import dataclass
 from photogram.messages import Message, listed
-from photogram.network.films import Film
+from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
 from photogram.network.unknowns import Unknown
 from photogram.results.films_drawn import mark_residuals
@@ -33,6 +33,8 @@ CHANCE = 1e-3
 """Of a hint where nothing is wrong."""
 EXPLAINED = 0.7
 """Of the weighted sum of squares of a photo's marks that is explained at least: half of it by one of four."""
+ALONE = 1e-6
+"""Part of the largest column that the others must leave of one."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,8 @@ def _found(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
     residuals, marks = mark_residuals(result), result.fiducials
     kind = result.kinds.get(Fiducial.KIND)
     read = [] if kind is None else [result.block.observations[row] for row in kind.rows.tolist()]
+    every = (each for each in result.block.observations if isinstance(each, KnownTogether))
+    known = [each for each in every if all(isinstance(own, Mark) for own in each.joined)]
     limit = critical_chi_square(CHANCE / len(films), 2)
     for photo, film in films.items():
         own = np.flatnonzero(residuals.photos == photo).tolist()
@@ -82,7 +86,7 @@ def _found(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
             continue
         adjusted = [marks[residuals.marks[k]] for k in own]
         sd = film.readings.pitch * np.concatenate([_deviations(read[k]) for k in own])
-        covariance = _certificate(result, [each.given for each in adjusted]) + np.diag(sd**2)
+        covariance = _certificate(known, [each.given for each in adjusted]) + np.diag(sd**2)
         places = np.array([each.given.position[:2] for each in adjusted])
         away = residuals.xy[own] + np.array([each.position[:2] for each in adjusted]) - places
         whole, gain, b = _fitted(places, away.ravel(), covariance)
@@ -98,28 +102,29 @@ def _deviations(read: object) -> Floats:
     return np.broadcast_to(np.asarray(own, dtype=float), (2,))
 
 
-def _certificate(result: Result, marks: list[Unknown]) -> Floats:
-    """Return (2 n, 2 n) what is known of marks together; 0 of marks that are errorless."""
+def _certificate(known: list[KnownTogether], marks: list[Unknown]) -> Floats:
+    """Return (2 n, 2 n) the covariance of what is known of marks; 0 of marks that are errorless."""
     first = {id(mark): 2 * k for k, mark in enumerate(marks)}
     found = np.zeros((2 * len(marks),) * 2)
-    for each in result.block.observations:
-        if not isinstance(each, KnownTogether) or not any(id(mark) in first for mark in each.joined):
-            continue
+    for each in known:
+        rows = [(k, first[id(mark)]) for k, mark in enumerate(each.joined) if id(mark) in first]
         width = 2 * len(each.joined)
-        known = (
+        whole = (
             np.diag(np.broadcast_to(np.asarray(each.sd, dtype=float), (width,)) ** 2)
             if each.covariance is None
             else np.asarray(each.covariance)
         )
-        rows = [(k, first[id(mark)]) for k, mark in enumerate(each.joined) if id(mark) in first]
         here = [at + axis for _, at in rows for axis in (0, 1)]
         there = [2 * k + axis for k, _ in rows for axis in (0, 1)]
-        found[np.ix_(here, here)] = known[np.ix_(there, there)]
+        found[np.ix_(here, here)] = whole[np.ix_(there, there)]
     return found
 
 
 def _fitted(places: Floats, away: Floats, covariance: Floats) -> tuple[float, float, Floats]:
-    """Return the weighted sum of squares of a conformal fit, what b1 and b2 take of it, and these."""
+    """Return the weighted sum of squares of a conformal fit, what b1 and b2 take of it, and these.
+
+    Marks in one line tell nothing of them: both are 0 then.
+    """
     x, y = places.T
     one, none = np.ones_like(x), np.zeros_like(x)
     columns = [(one, none), (none, one), (x, y), (-y, x), (x, -y), (y, x)]
@@ -128,6 +133,9 @@ def _fitted(places: Floats, away: Floats, covariance: Floats) -> tuple[float, fl
     basis, triangle = np.linalg.qr(np.linalg.solve(root, design))
     right = np.linalg.solve(root, away)
     parts = basis.T @ right
+    size = np.abs(np.diag(triangle))
+    if size.min() < ALONE * size.max():
+        return 0.0, 0.0, np.zeros(2)
     whole = float(right @ right - parts[:4] @ parts[:4])
     b: Floats = np.linalg.solve(triangle[4:, 4:], parts[4:])
     return whole, float(parts[4:] @ parts[4:]), b
