@@ -11,7 +11,7 @@ import pytest
 import photogram
 from photogram import InnerConstraints
 from photogram.distributed import Division, plan_in_parts
-from photogram.distributed.tasks import Shelf
+from photogram.distributed.shelf import Shelf
 from photogram.memory import give_back, resident_memory
 
 STATUS = Path("/proc/self/status")

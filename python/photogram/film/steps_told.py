@@ -25,6 +25,10 @@ _WHY = (
 )
 
 
+def _said(found: StepsCompared) -> str:
+    return found.sentence[:1].upper() + found.sentence[1:]
+
+
 def _axes(found: StepsCompared) -> list[Quantity]:
     """Return what of each coordinate is compared."""
     unit = (Axis.of("", found.inside.block.linear_unit),)
@@ -73,7 +77,7 @@ def steps_text(found: StepsCompared) -> str:
             *field(at, 0, head="at", gap="  "),
         ]
     )
-    said = f"{found.sentence[:1].upper()}{found.sentence[1:]}."
+    said = f"{_said(found)}."
     sections = [
         *verdict_sections(found.inside.verdict)[:1],
         (WHAT, [said, "", "medians of standard deviations; by how much two steps differ from one", *lines]),
@@ -112,5 +116,5 @@ def steps_page(found: StepsCompared) -> Page:
         judgements=[judged(verdict, "films inside the adjustment")],
         advice=[],
         highlights=_facts(found),
-        sections=[Section("points", "Points", [page_table(found.sentence, _axes(found))], _WHY)],
+        sections=[Section("points", "Points", [page_table(_said(found), _axes(found))], _WHY)],
     )
