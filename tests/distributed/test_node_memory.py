@@ -100,7 +100,7 @@ def test_what_a_process_holds_is_what_it_has_taken():
 
 
 def test_nodes_go_before_factors_and_the_last_ones_first(monkeypatch):
-    monkeypatch.setattr("photogram.distributed.tasks.resident_memory", lambda: None)
+    monkeypatch.setattr("photogram.distributed.shelf.resident_memory", lambda: None)
     shelf = Shelf()
     for number in range(3):
         shelf.put(("node", "run", number), number, 10.0)
