@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import tempfile
 from collections.abc import Callable, Iterator
@@ -27,12 +28,13 @@ from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
 from photogram.distributed.merging import merged
-from photogram.distributed.parts import films_of, incidence_of, vertices_of
+from photogram.distributed.parts import incidence_of, photos_of_unknowns, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, opened
 from photogram.errors import InputError
-from photogram.network.block import Block, checked, refuse_passages, refuse_trajectories
+from photogram.io.structure import Encoder
+from photogram.network.block import Block, checked, flown_by, refuse_passages
 from photogram.network.core import CoreOptions
 from photogram.network.datum import (
     DatumRow,
@@ -43,6 +45,7 @@ from photogram.network.datum import (
 from photogram.network.films import Reseau, Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
+from photogram.results.saved_trajectories import STANDS
 
 __all__ = ["adjust_in_parts", "fingerprint", "plan_in_parts"]
 
@@ -156,7 +159,6 @@ def _ready(
     """
     check_cameras(checked(block))
     check_datum(datum)
-    refuse_trajectories(block, "blocks in parts")
     refuse_passages(block, "blocks in parts", but=Scan)
     _check_films(block)
     block = started(block)
@@ -208,9 +210,10 @@ def _run(
 def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
-    films = films_of(block)
-    of_films = sum(len(each.deviations) for each in block.unknowns if id(each) in films and not each.is_held)
-    unknowns = UNKNOWNS + of_films / len(block.photo_ids)
+    of_unknowns = photos_of_unknowns(block)
+    own = [each for each in block.unknowns if id(each) in of_unknowns and not each.is_held]
+    poses = UNKNOWNS * (len(block.photo_ids) - len(block.timed))
+    unknowns = (poses + sum(len(each.deviations) for each in own)) / len(block.photo_ids)
     return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]
 
 
@@ -227,6 +230,9 @@ def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None)
         digest.update(repr(each).encode())
     for passage in block.passages:
         digest.update(repr((passage, passage.numbers().tolist())).encode())
+    if flown_by(block):
+        flights = Encoder(STANDS).value([*block.timed, *block.all_trajectories])
+        digest.update(json.dumps(flights).encode())
     return digest.hexdigest()
 
 

@@ -16,7 +16,7 @@ from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
 from photogram.io.seals import Seals, check_seal, seal
 from photogram.io.structure import Decoder, Encoder
-from photogram.network.block import Block
+from photogram.network.block import Block, flown_by
 from photogram.network.cameras import Camera
 from photogram.network.chosen import IMAGES, PHOTOS
 from photogram.network.films import Film, Pattern, Readings, Scan
@@ -27,6 +27,7 @@ from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
+from photogram.results.saved_trajectories import CLASSES, STANDS
 
 __all__ = [
     "AtHome",
@@ -34,7 +35,7 @@ __all__ = [
     "Names",
     "Part",
     "assembled_part",
-    "films_of",
+    "photos_of_unknowns",
     "homes_of",
     "incidence_of",
     "names_above",
@@ -113,7 +114,7 @@ class Homes:
     Attributes
     ----------
     owners
-        (P,) of photos; one on a frame belongs to the node of its frame.
+        (P,) of photos; one on a frame or trajectory belongs to the node of the photo that stands for it.
     points, images, observations
         (n,), (m,) and of each other observation.
     """
@@ -159,33 +160,49 @@ class AtHome:
 
 
 def vertices_of(block: Block) -> Indices:
-    """Return (P,) the photo whose pose each photo has: that of its frame, where it is on one."""
-    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.mounts else {}
+    """Return (P,) the photo that stands for each photo: its frame, or the first on its trajectory."""
+    moves = bool(block.mounts or block.timed)
+    rows = {name: row for row, name in enumerate(block.photo_ids)} if moves else {}
     found = np.arange(len(block.photo_ids), dtype=np.int64)
     for each in block.mounts:
         found[rows[each.photo]] = rows[each.frame]
+    first: dict[int, int] = {}
+    for timed, trajectory in zip(block.timed, block.trajectories, strict=True):
+        row = rows[timed.photo]
+        found[row] = first.setdefault(id(trajectory), row)
     return found
 
 
-def films_of(block: Block) -> dict[int, str]:
-    """Return the photos in whose blocks of unknowns those of films stand, by the identity of the unknowns.
+def photos_of_unknowns(block: Block) -> dict[int, str]:
+    """Return the photos with which common unknowns are handed up, by the identity of the unknowns.
 
-    Those that films of several photos have are common unknowns as any other, and so are all beside photos on
-    frames: halves of joined scans.
+    Those of a film go with its photo, the coefficients of a trajectory with the first photo on it. Those that
+    films of several photos have are common unknowns as any other, and so are all of films beside photos on
+    frames (halves of joined scans) or trajectories.
     """
     found: dict[int, set[str]] = {}
-    for each in () if block.mounts else block.passages:
+    for each in () if block.mounts or flown_by(block) else block.passages:
         if isinstance(each, Scan):
             for own in (each.film.placement, each.film.size, each.film.bend):
                 found.setdefault(id(own), set()).add(each.photo)
     found.pop(id(None), None)
-    return {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+    alone = {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+    for timed, trajectory in zip(block.timed, block.trajectories, strict=True):
+        for part in trajectory.coefficients:
+            for coefficient in part:
+                alone.setdefault(id(coefficient), timed.photo)
+    return alone
 
 
-def _photos_of(observation: Observation, films: Mapping[int, str]) -> list[str]:
-    """Return the photos that an observation touches, by their poses or by their films."""
-    of_films = [films[id(each)] for each in observation.unknowns if id(each) in films]
-    return [*dict.fromkeys([*observation.photos, *of_films])]
+def _photos_of(observation: Observation, of_unknowns: Mapping[int, str]) -> list[str]:
+    """Return the photos that an observation touches: by their poses, films or trajectories."""
+    moment, photos, unknowns = observation.moment, observation.photos, observation.unknowns
+    if moment is not None:
+        # One coefficient stands for all.
+        photos, own = (), [part[0] for part in moment.trajectory.coefficients if part]
+        unknowns = (*unknowns, *own)
+    others = [of_unknowns[id(each)] for each in unknowns if id(each) in of_unknowns]
+    return [*dict.fromkeys([*photos, *others])]
 
 
 def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
@@ -198,13 +215,13 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
     photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
     tied = [tuple(points[name] for name in each.points) for each in block.observations]
     edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
-    own_edges, others, of_observations, films = [], [], [], films_of(block)
+    own_edges, others, of_observations, of_unknowns = [], [], [], photos_of_unknowns(block)
     count = len(block.point_ids)
     for each, members in zip(block.observations, tied, strict=True):
         edge = int(edges[members[0]]) if members else count
         count += not members
         of_observations.append(edge)
-        for name in _photos_of(each, films):
+        for name in _photos_of(each, of_unknowns):
             own_edges.append(edge)
             others.append(int(vertices[photos[name]]))
     incidence = Incidence(
@@ -223,7 +240,7 @@ def homes_of(block: Block, owners: Indices, root: int) -> Homes:
     block
         The block.
     owners
-        (P,) the nodes of photos; those on frames do not count.
+        (P,) the nodes of photos; of those for which others stand they do not count.
     root
         The root of the tree, to which observations of common unknowns alone belong.
     """
@@ -305,6 +322,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         image_sd=at_home.image_sd,
         observations=own,
         mounts=[each for each in block.mounts if each.photo in present],
+        timed=[each for each in block.timed if each.photo in present],
         passages=[each for each in block.passages if isinstance(each, Scan) and each.photo in present],
     )
     whole = {id(each): row for row, each in enumerate(block.unknowns)}
@@ -324,7 +342,9 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
     )
 
 
-def names_above(part: Part, below: Names, shared: Indices, films: Mapping[int, str], *, root: bool) -> Names:
+def names_above(
+    part: Part, below: Names, shared: Indices, of_unknowns: Mapping[int, str], *, root: bool
+) -> Names:
     """Return what a part hands up: photos of nodes above, cameras and unknowns that belong to the root.
 
     Parameters
@@ -333,39 +353,45 @@ def names_above(part: Part, below: Names, shared: Indices, films: Mapping[int, s
         The part, and what nodes below it hand up.
     shared
         The cameras that have unknown parameters and several photos in the whole block.
-    films
-        Of the whole block (:func:`films_of`): these unknowns are handed up with their photos.
+    of_unknowns
+        Of the whole block (:func:`photos_of_unknowns`): these unknowns are handed up with their photos.
     root
         Whether it is the root, which hands nothing up.
     """
     if root:
         return Names()
-    # A photo on a frame has no unknowns of its own.
+    # A photo for which another stands has no unknowns of its own.
     free = vertices_of(part.block) == np.arange(len(part.photos))
     photos = part.photos[(part.owners != part.node) & free]
     cameras = part.block.photo_cameras
     used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
     known = zip(part.unknowns.tolist(), part.common, strict=True)
-    unknowns = sorted(row for row, each in known if not (each.is_held or id(each) in films))
+    unknowns = sorted(row for row, each in known if not (each.is_held or id(each) in of_unknowns))
     return Names(photos.tolist(), sorted(used | set(below.cameras)), unknowns)
 
 
 def shared_cameras(block: Block) -> Indices:
-    """Return which cameras have an unknown parameter and several photos: they belong to the root."""
+    """Return which cameras have an unknown parameter and several photos: they belong to the root.
+
+    So do those of photos on frames and trajectories, in whose blocks they do not stand.
+    """
     if block.photo_cameras is None:
         return np.zeros(0, dtype=np.int64)
     photos = np.bincount(block.photo_cameras, minlength=len(block.cameras))
+    mounted = {each.photo for each in (*block.mounts, *block.timed)}
+    rows = [row for row, name in enumerate(block.photo_ids) if name in mounted] if mounted else []
+    photos[block.photo_cameras[rows]] += 1
     own = [row for row, each in enumerate(block.cameras) if photos[row] > 1 and not each.is_held]
     return np.array(own, dtype=np.int64)
 
 
 def _touch(block: Block, touched: Bools, observations: list[Observation]) -> None:
-    """Add the photos of observations, and of the frames that photos are on."""
-    if not (observations or block.mounts):
+    """Add the photos of observations, and those that stand for photos on frames and trajectories."""
+    if not (observations or block.mounts or block.timed):
         return
-    rows, films = {name: row for row, name in enumerate(block.photo_ids)}, films_of(block)
+    rows, of_unknowns = {name: row for row, name in enumerate(block.photo_ids)}, photos_of_unknowns(block)
     for each in observations:
-        touched[[rows[name] for name in _photos_of(each, films)]] = True
+        touched[[rows[name] for name in _photos_of(each, of_unknowns)]] = True
     vertices = vertices_of(block)
     touched[vertices[np.flatnonzero(touched)]] = True
 
@@ -392,7 +418,7 @@ def write_part(folder: Path, part: Part) -> str:
             if values is not None:
                 columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
         write_file(folder / f"{table}.parquet", seals.through(table, parquet_content(columns, {})))
-    encoder = Encoder()
+    encoder = Encoder(STANDS)
     document = {
         "node": part.node,
         "tables": seals.known,
@@ -442,7 +468,7 @@ def read_part(folder: Path, sealed: str) -> Part:
 
 def _classes() -> list[type]:
     alone = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Spheroid)
-    return [*alone, *_below(Observation), *_below(Passage), *_below(Unknown)]
+    return [*alone, *CLASSES, *_below(Observation), *_below(Passage), *_below(Unknown)]
 
 
 def _below(base: type) -> Iterator[type]:

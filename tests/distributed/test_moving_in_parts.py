@@ -1,0 +1,71 @@
+"""Photos on trajectories in parts: coefficients go up with the first photo of theirs."""
+
+import numpy as np
+import pytest
+from test_blocks import agrees
+
+from moving_blocks import flown_frames, rolling, scanned
+from photogram import Camera, adjust, adjust_in_parts, simulate
+from photogram.distributed import Division
+from photogram.distributed.parts import photos_of_unknowns, vertices_of
+from photogram.network.simulated_motion import LineScanner, RollingShutter
+from photogram.network.trajectories import Polynomial
+
+SIZE = {"strips": 4, "photos_per_strip": 8, "points_per_photo": 30, "seed": 3}
+ERRORS = {"position_error": 1.0, "attitude_error": 1e-3, "position_sd": 0.05, "attitude_sd": 1e-4}
+
+
+def scenes():
+    """Return images of a scanner with coefficients of their own, weighted, as a planetary network has."""
+    motion = LineScanner(lines=1, scenes=True, position=Polynomial(0), rotation=Polynomial(2))
+    return simulate(motion=motion, **SIZE, **ERRORS).block
+
+
+def shutters():
+    """Return photos of a rolling shutter, each with its own uniform motion, and a readout time of all."""
+    return simulate(motion=RollingShutter(readout=0.03), **SIZE, **ERRORS).block
+
+
+def strips():
+    """Return strips of three lines each, on splines."""
+    return simulate(motion=LineScanner(lines=3, speed=70.0), **SIZE, **ERRORS).block
+
+
+def same_unknowns(found, whole, least):
+    """Compare common unknowns with those of one process: values in standard deviations, and cofactors."""
+    for one, other in zip(found.unknowns, whole.unknowns, strict=True):
+        deviations = np.sqrt(np.diag(other.cofactors))
+        at = np.outer(deviations, deviations)
+        assert np.abs((one.cofactors - other.cofactors)[at > 0] / at[at > 0]).max(initial=0.0) < least
+        apart = (one.values - other.values)[deviations > 0] / deviations[deviations > 0]
+        assert np.abs(apart).max(initial=0.0) < least
+        np.testing.assert_allclose(one.redundancy, other.redundancy, rtol=0, atol=least)
+        assert one.observations == other.observations
+
+
+@pytest.mark.parametrize(
+    ("make", "parts"),
+    [(scenes, 2), (scenes, 5), (shutters, 2), (shutters, 4), (strips, 2), (strips, 3), (rolling, 3)],
+)
+def test_trajectories_in_parts_are_those_of_one_process(make, parts):
+    block = make()
+    whole, found = adjust(block), adjust_in_parts(block, Division(parts=parts))
+    agrees(found, whole, 1e-9, tied=True)
+    same_unknowns(found, whole, 1e-9)
+    assert [str(each) for each in found.messages] == [str(each) for each in whole.messages]
+    for name, own in whole.trajectories.items():
+        other = found.trajectories[name]
+        np.testing.assert_allclose(other.position_sd, own.position_sd, rtol=1e-9)
+        np.testing.assert_allclose(other.rotation_sd, own.rotation_sd, rtol=1e-9)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_records_frames_and_smoothness_are_at_home_once(smooth):
+    """Records of clocks, lever arms and boresights, and frames on the trajectory of a scanner."""
+    block = scanned(photos=True, smooth=smooth)
+    whole, found = adjust(block), adjust_in_parts(block, Division(parts=2))
+    agrees(found, whole, 1e-8, tied=True)
+    same_unknowns(found, whole, 1e-8)
+    for kind, other in whole.kinds.items():
+        np.testing.assert_allclose(found.kinds[kind].residuals, other.residuals, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(found.kinds[kind].redundancy, other.redundancy, rtol=0, atol=1e-8)
