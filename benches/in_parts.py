@@ -2,7 +2,7 @@
 
 python benches/in_parts.py [--write docs/distributed.md] [--photos 500000]
 python benches/in_parts.py --run 50x100 --workers 2 --parts 8 --memory 1GiB --alone   a real one, printed
-python benches/in_parts.py --scanners 5000 --parts 16 --memory 1GiB --alone           images of scanners in orbit
+python benches/in_parts.py --scanners 5000 --parts 16 --memory 1GiB --alone           scanners in orbit
 
 Rates are measured beside: one thread adjusts 5,000 simulated photographs. Nothing of the large blocks is
 formed: their work, memory and traffic are counted on the tree that nested dissection gives, and a list

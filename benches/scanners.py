@@ -171,7 +171,9 @@ def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> N
     if not (run / MANIFEST).exists():
         own = [sys.executable, __file__, str(images), "--divide", "--parts", str(parts), "--folder", str(run)]
         subprocess.run(own, check=True)
-        print(f"simulated and divided in {time.perf_counter() - start:,.0f} s, {on_disk(run):.2f} GiB on disk")
+        print(
+            f"simulated and divided in {time.perf_counter() - start:,.0f} s, {on_disk(run):.2f} GiB on disk"
+        )
 
     def divided(_: int) -> Any:
         raise AssertionError("the parts lie in the folder")

@@ -10,7 +10,7 @@ from test_datum_in_parts import in_both
 import photogram
 from photogram import _photocore, adjust, adjust_in_parts
 from photogram.distributed import Division
-from photogram.distributed.parts import photos_of_unknowns
+from photogram.distributed.graph import photos_of_unknowns
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.films import (

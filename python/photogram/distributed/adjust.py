@@ -27,8 +27,8 @@ from photogram.arguments.annotations import check_arguments
 from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
+from photogram.distributed.graph import incidence_of, photos_of_unknowns, vertices_of
 from photogram.distributed.merging import merged
-from photogram.distributed.parts import incidence_of, photos_of_unknowns, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, opened

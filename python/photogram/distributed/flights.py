@@ -1,4 +1,4 @@
-"""Photos on trajectories of a block that is to be divided: what is found of all its images and photos is told."""
+"""Trajectories of a block that is to be divided: what is found of all its photos and images is told."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ __all__ = ["with_flights"]
 
 
 def with_flights(block: Block) -> Block:
-    """Return a block whose photos are on the same trajectories, at the same times, whatever is left out of it.
+    """Return a block whose photos are on the same trajectories, at the same times, whatever it is without.
 
-    A photo that moves by itself is on a trajectory that is given; a scanner has a time, which is the middle of
-    all its images; coefficients are smooth by observations alone, which are at home in one node.
+    A photo that moves by itself is on a trajectory that is given; a scanner has a time, the middle of all its
+    images; coefficients are smooth by observations alone, each of which is at home in one node.
     """
     if not flown_by(block):
         return block
@@ -49,7 +49,7 @@ def _told(observation: Observation, trajectories: dict[int, Trajectory]) -> Obse
 
 def _unsmoothed(trajectory: Trajectory) -> Trajectory:
     """Return a trajectory with the same coefficients, of which it says nothing together."""
-    changes = {
+    changes: dict[str, Any] = {
         name: replace(basis, smooth=None, correlation=None)
         for name in ("position", "rotation")
         if isinstance(basis := getattr(trajectory, name), Spline) and basis.smoothed

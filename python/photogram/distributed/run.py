@@ -15,19 +15,14 @@ from photogram.declared import asdict, dataclass
 from photogram.distributed.cut import Tree, cut, tree_of
 from photogram.distributed.files import read_json, write_json
 from photogram.distributed.flights import with_flights
-from photogram.distributed.parts import (
-    Names,
-    Part,
+from photogram.distributed.graph import (
     homes_of,
     incidence_of,
-    names_above,
-    part_of,
     photos_of_unknowns,
-    read_part,
     shared_cameras,
     vertices_of,
-    write_part,
 )
+from photogram.distributed.parts import Names, Part, names_above, part_of, read_part, write_part
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
