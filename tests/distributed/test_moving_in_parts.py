@@ -1,12 +1,16 @@
 """Photos on trajectories in parts: coefficients go up with the first photo of theirs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_blocks import agrees
 
 from moving_blocks import rolling, scanned
 from photogram import adjust, adjust_in_parts, simulate
+from photogram.adjustment.adjustment import core_options
 from photogram.distributed import Division
+from photogram.distributed.adjust import fingerprint
 from photogram.network.simulated_motion import LineScanner, RollingShutter
 from photogram.network.trajectories import Polynomial
 
@@ -69,3 +73,12 @@ def test_records_frames_and_smoothness_are_at_home_once(smooth):
     for kind, other in whole.kinds.items():
         np.testing.assert_allclose(found.kinds[kind].residuals, other.residuals, rtol=0, atol=1e-9)
         np.testing.assert_allclose(found.kinds[kind].redundancy, other.redundancy, rtol=0, atol=1e-8)
+
+
+def test_a_run_is_that_of_its_trajectories():
+    """Digits that are not shown, and smoothness, tell one block from another."""
+    block, options = scanned(), core_options("constrained", None)
+    later = block.replace(timed=[replace(each, time=1e-9) for each in block.timed])
+    blocks = [block, later, scanned(smooth=True), scanned(records=False)]
+    assert len({fingerprint(each, options) for each in blocks}) == 4
+    assert fingerprint(block, options) == fingerprint(scanned(), options)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import tempfile
 from collections.abc import Callable, Iterator
@@ -11,6 +10,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
+import orjson
 
 from photogram.adjustment.adjustment import (
     AsPublished,
@@ -29,12 +29,13 @@ from photogram.distributed.division import Division
 from photogram.distributed.files import alone
 from photogram.distributed.graph import incidence_of, photos_of_unknowns, vertices_of
 from photogram.distributed.merging import merged
+from photogram.distributed.parts import IN_TABLES
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, opened
 from photogram.errors import InputError
 from photogram.io.structure import Encoder
-from photogram.network.block import Block, checked, flown_by, refuse_passages
+from photogram.network.block import Block, checked, refuse_passages
 from photogram.network.core import CoreOptions
 from photogram.network.datum import (
     DatumRow,
@@ -220,19 +221,12 @@ def _counted(block: Block, parts: int) -> Counts:
 def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None) -> str:
     """Return what tells a block and how it is adjusted from others."""
     digest = hashlib.sha256(repr((options, row)).encode())
-    for name in (
-        *("photo_positions", "photo_attitudes", "photo_position_sd", "photo_attitude_sd", "photo_cameras"),
-        *("point_positions", "point_sd", "image_photos", "image_points", "image_xy", "image_sd"),
-    ):
+    for name in IN_TABLES:
         values = getattr(block, name)
-        digest.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
-    for each in (*block.cameras, *block.observations, *block.unknowns):
-        digest.update(repr(each).encode())
-    for passage in block.passages:
-        digest.update(repr((passage, passage.numbers().tolist())).encode())
-    if flown_by(block):
-        flights = Encoder(STANDS).value([*block.timed, *block.all_trajectories])
-        digest.update(json.dumps(flights).encode())
+        if isinstance(values, np.ndarray):
+            digest.update(np.ascontiguousarray(values).tobytes())
+    settings = Encoder(STANDS).fields(block, ["title", *IN_TABLES])
+    digest.update(orjson.dumps(settings))
     return digest.hexdigest()
 
 

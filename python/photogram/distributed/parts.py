@@ -30,6 +30,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.saved_trajectories import CLASSES, STANDS
 
 __all__ = [
+    "IN_TABLES",
     "AtHome",
     "Names",
     "Part",
@@ -47,7 +48,8 @@ TABLES: dict[str, tuple[str, ...]] = {
 }
 """The arrays of a block that have a row for each photo, point or image."""
 SETTINGS = "part.json"
-_ROWS = ("photo_ids", "point_ids")
+IN_TABLES = ("photo_ids", "point_ids", *(name for each in TABLES.values() for name in each))
+"""The fields of a block that are no settings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +297,7 @@ def write_part(folder: Path, part: Part) -> str:
         "tables": seals.known,
         "observations": part.observations.tolist(),
         "unknowns": part.unknowns.tolist(),
-        "block": encoder.fields(block, [*_ROWS, *(name for each in TABLES.values() for name in each)]),
+        "block": encoder.fields(block, IN_TABLES),
         # After the block, whose unknowns are the same objects.
         "common": encoder.value(list(part.common)),
     }

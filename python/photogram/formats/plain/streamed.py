@@ -114,8 +114,8 @@ class Streamed:
             )
         if self.project.block.timed:
             raise InputError(
-                f"the photo {self.project.block.timed[0].photo} has a rolling shutter, or is on a trajectory, and"
-                " images in Parquet are read batch by batch: keep them in CSV, or"
+                f"the photo {self.project.block.timed[0].photo} has a rolling shutter, or is on a trajectory,"
+                " and images in Parquet are read batch by batch: keep them in CSV, or"
                 " photogram.adjust_in_parts(photogram.formats.read(path).block, ...)",
                 file=settings.path,
             )
