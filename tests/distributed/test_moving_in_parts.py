@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_blocks import agrees
 
+import test_moving
 from moving_blocks import rolling, scanned
 from photogram import adjust, adjust_in_parts, simulate
 from photogram.adjustment.adjustment import core_options
@@ -82,3 +83,38 @@ def test_a_run_is_that_of_its_trajectories():
     blocks = [block, later, scanned(smooth=True), scanned(records=False)]
     assert len({fingerprint(each, options) for each in blocks}) == 4
     assert fingerprint(block, options) == fingerprint(scanned(), options)
+
+
+def coefficients(result, trajectory, which):
+    """Return (K, 3) adjusted coefficients, and the cofactors of each by itself, which is what parts keep."""
+    found = {id(each.given): each for each in result.unknowns}
+    own = [found[id(each)] for each in trajectory.coefficients[which]]
+    q = np.full((len(own), 3, len(own), 3), np.nan)
+    for k, each in enumerate(own):
+        q[k, :, k] = each.cofactors
+    return np.array([each.position for each in own]), q.reshape(3 * len(own), -1)
+
+
+def solved(result, solution, name, trajectory, which, *, unknowns=1e-6, cofactors=1e-8):
+    """Assert the coefficients of a trajectory and these cofactors."""
+    truth, q = solution["unknowns_solved"][name], np.array(solution["cofactors"][name])
+    value, sd = np.array(truth["value"]), np.array(truth["sd"])
+    ours, own = coefficients(result, trajectory, which)
+    assert (np.abs(ours - value) < unknowns * sd).all()
+    kept, scale = np.isfinite(own), np.outer(sd.ravel(), sd.ravel())
+    np.testing.assert_allclose((own / scale)[kept], (q / scale)[kept], rtol=0, atol=cofactors)
+
+
+@pytest.mark.parametrize(
+    "case", ["rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair"]
+)
+def test_golden_networks_in_parts(case, monkeypatch):
+    """What one process has to give of them, to the same digits."""
+
+    def adjusted(block, **options):
+        return adjust_in_parts(block, Division(parts=2), **options)
+
+    monkeypatch.setattr(test_moving, "adjust", adjusted)
+    monkeypatch.setattr(test_moving, "coefficients", coefficients)
+    monkeypatch.setattr(test_moving, "solved", solved)
+    getattr(test_moving, f"test_{case}")()
