@@ -188,10 +188,10 @@ def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> N
             outcome = own_run.adjust(told(start))
             seconds = time.perf_counter() - start
             print("\n".join(OnDisk(outcome, own_run.manifest, []).lines()))
-        peaks = client.run(peak_memory)
+        peaks, processors = client.run(peak_memory), client.run(time.process_time)
     print(f"adjusted in {seconds:,.0f} s; parts, states and results take {on_disk(run):.2f} GiB on disk")
-    for _, peak in sorted(peaks.items()):
-        print(f"peak of a worker {peak / 2**20:,.0f} MiB")
+    for worker, peak in sorted(peaks.items()):
+        print(f"peak of a worker {peak / 2**20:,.0f} MiB, {processors[worker]:,.0f} s of a processor")
     print(f"peak of this process {peak_memory() / 2**20:,.0f} MiB")
 
 
