@@ -27,7 +27,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
-from photogram.distributed.graph import incidence_of, photos_of_unknowns, vertices_of
+from photogram.distributed.graph import alone_of, incidence_of, vertices_of
 from photogram.distributed.merging import merged
 from photogram.distributed.parts import IN_TABLES
 from photogram.distributed.planned import PartsPlan
@@ -43,7 +43,7 @@ from photogram.network.datum import (
     MinimumConstraints,
     check_datum,
 )
-from photogram.network.films import Reseau, Scan
+from photogram.network.films import Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 from photogram.results.saved_trajectories import STANDS
@@ -161,19 +161,8 @@ def _ready(
     check_cameras(checked(block))
     check_datum(datum)
     refuse_passages(block, "blocks in parts", but=Scan)
-    _check_films(block)
     block = started(block)
     return block, *with_datum(block, options, datum)
-
-
-def _check_films(block: Block) -> None:
-    """Refuse films whose photos have many unknowns that do not stand in the blocks of these."""
-    for each in block.passages:
-        if isinstance(each, Scan) and isinstance(each.film.pattern, Reseau):
-            raise InputError(
-                f"blocks in parts: the film of the photo {each.photo} has a reseau of its own (pattern"
-                " local), which is not taken there"
-            )
 
 
 def _fits(block: Block, room: int | None) -> bool:
@@ -211,8 +200,8 @@ def _run(
 def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
-    of_unknowns = photos_of_unknowns(block)
-    own = [each for each in block.unknowns if id(each) in of_unknowns and not each.is_held]
+    alone = alone_of(block)
+    own = [each for each in block.unknowns if id(each) in alone and not each.is_held]
     poses = UNKNOWNS * (len(block.photo_ids) - len(block.timed))
     unknowns = (poses + sum(len(each.deviations) for each in own)) / len(block.photo_ids)
     return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]

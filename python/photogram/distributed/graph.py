@@ -15,6 +15,7 @@ from photogram.network.observations import Observation
 
 __all__ = [
     "Homes",
+    "alone_of",
     "homes_of",
     "incidence_of",
     "photos_of",
@@ -77,14 +78,28 @@ def photos_of_unknowns(block: Block) -> dict[int, str]:
     return alone
 
 
-def photos_of(observation: Observation, of_unknowns: Mapping[int, str]) -> list[str]:
-    """Return the photos that an observation touches: by their poses, films or trajectories."""
+def alone_of(block: Block) -> dict[int, str]:
+    """Return the photos of what they alone have, by the identity of the unknowns: nodes of reseaus, too.
+
+    A node of a reseau is a block by itself, which images in its cells touch; it goes where its photo goes.
+    """
+    found: dict[int, set[str]] = {}
+    for each in block.passages:
+        if isinstance(each, Scan) and each.film.pattern is not None:
+            for own in each.film.pattern.weights:
+                found.setdefault(id(own), set()).add(each.photo)
+    alone = {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+    return photos_of_unknowns(block) | alone
+
+
+def photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:
+    """Return the photos that an observation touches: by poses, or by what they alone have."""
     moment, photos, unknowns = observation.moment, observation.photos, observation.unknowns
     if moment is not None:
         # One coefficient stands for all.
         photos, own = (), [part[0] for part in moment.trajectory.coefficients if part]
         unknowns = (*unknowns, *own)
-    others = [of_unknowns[id(each)] for each in unknowns if id(each) in of_unknowns]
+    others = [alone[id(each)] for each in unknowns if id(each) in alone]
     return [*dict.fromkeys([*photos, *others])]
 
 
@@ -98,13 +113,13 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
     photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
     tied = [tuple(points[name] for name in each.points) for each in block.observations]
     edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
-    own_edges, others, of_observations, of_unknowns = [], [], [], photos_of_unknowns(block)
+    own_edges, others, of_observations, alone = [], [], [], alone_of(block)
     count = len(block.point_ids)
     for each, members in zip(block.observations, tied, strict=True):
         edge = int(edges[members[0]]) if members else count
         count += not members
         of_observations.append(edge)
-        for name in photos_of(each, of_unknowns):
+        for name in photos_of(each, alone):
             own_edges.append(edge)
             others.append(int(vertices[photos[name]]))
     incidence = Incidence(

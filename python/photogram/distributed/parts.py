@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.declared import dataclass, field
 from photogram.distributed.files import read_json, write_file, write_json
-from photogram.distributed.graph import Homes, photos_of, photos_of_unknowns, vertices_of
+from photogram.distributed.graph import Homes, alone_of, photos_of, vertices_of
 from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
 from photogram.io.seals import Seals, check_seal, seal
@@ -19,7 +19,7 @@ from photogram.io.structure import Decoder, Encoder
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.chosen import IMAGES, PHOTOS
-from photogram.network.films import Film, Pattern, Readings, Scan
+from photogram.network.films import Film, Pattern, Readings, Reseau, Scan
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
@@ -230,9 +230,15 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
 
 
 def names_above(
-    part: Part, below: Names, shared: Indices, of_unknowns: Mapping[int, str], *, root: bool
+    part: Part,
+    below: Names,
+    shared: Indices,
+    of_unknowns: Mapping[int, str],
+    alone: Mapping[int, str],
+    *,
+    root: bool,
 ) -> Names:
-    """Return what a part hands up: photos of nodes above, cameras and unknowns that belong to the root.
+    """Return what a part hands up: photos of nodes above with what they alone have, and what is of the root.
 
     Parameters
     ----------
@@ -242,6 +248,8 @@ def names_above(
         The cameras that have unknown parameters and several photos in the whole block.
     of_unknowns
         Of the whole block (:func:`photos_of_unknowns`): these unknowns are handed up with their photos.
+    alone
+        Of the whole block (:func:`alone_of`): these unknowns are at home where their photos are.
     root
         Whether it is the root, which hands nothing up.
     """
@@ -252,8 +260,12 @@ def names_above(
     photos = part.photos[(part.owners != part.node) & free]
     cameras = part.block.photo_cameras
     used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
-    known = zip(part.unknowns.tolist(), part.common, strict=True)
-    unknowns = sorted(row for row, each in known if not (each.is_held or id(each) in of_unknowns))
+    at_home = {part.block.photo_ids[row] for row in np.flatnonzero(part.owners == part.node)}
+    unknowns = sorted(
+        row
+        for row, each in zip(part.unknowns.tolist(), part.common, strict=True)
+        if not (each.is_held or id(each) in of_unknowns or alone.get(id(each)) in at_home)
+    )
     return Names(photos.tolist(), sorted(used | set(below.cameras)), unknowns)
 
 
@@ -262,9 +274,9 @@ def _touch(block: Block, touched: Bools, observations: list[Observation]) -> Non
     if not (observations or block.mounts or block.timed):
         return
     rows = {name: row for row, name in enumerate(block.photo_ids)}
-    of_unknowns = photos_of_unknowns(block) if observations else {}
+    alone = alone_of(block) if observations else {}
     for each in observations:
-        touched[[rows[name] for name in photos_of(each, of_unknowns)]] = True
+        touched[[rows[name] for name in photos_of(each, alone)]] = True
     vertices = vertices_of(block)
     touched[vertices[np.flatnonzero(touched)]] = True
 
@@ -340,8 +352,8 @@ def read_part(folder: Path, sealed: str) -> Part:
 
 
 def _classes() -> list[type]:
-    alone = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Spheroid)
-    return [*alone, *CLASSES, *_below(Observation), *_below(Passage), *_below(Unknown)]
+    single = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Reseau, Spheroid)
+    return [*single, *CLASSES, *_below(Observation), *_below(Passage), *_below(Unknown)]
 
 
 def _below(base: type) -> Iterator[type]:
