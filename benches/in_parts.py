@@ -2,6 +2,7 @@
 
 python benches/in_parts.py [--write docs/distributed.md] [--photos 500000]
 python benches/in_parts.py --run 50x100 --workers 2 --parts 8 --memory 1GiB --alone   a real one, printed
+python benches/in_parts.py --scanners 5000 --parts 16 --memory 1GiB --alone           scanners in orbit
 
 Rates are measured beside: one thread adjusts 5,000 simulated photographs. Nothing of the large blocks is
 formed: their work, memory and traffic are counted on the tree that nested dissection gives, and a list
@@ -21,13 +22,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from peak import peak_memory
-from photogram import adjust, adjust_in_parts, simulate
+from photogram import Block, adjust, adjust_in_parts, simulate
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.counts import FORMATION, Counts, counted_work
 from photogram.distributed.cut import Incidence, Tree
 from photogram.distributed.division import bytes_of
 from photogram.distributed.schedule import Times, scheduled
 from photogram.distributed.workers import connected
+from scanners import simulated
 
 BANDWIDTH = 1.25e9 / 2
 """Bytes a second between two workers: half of 10 Gbit Ethernet."""
@@ -137,10 +139,8 @@ def page(photos: int) -> list[str]:
     ]
 
 
-def carried_out(size: str, workers: int, parts: int, memory: str, *, alone: bool) -> None:
-    """Adjust a simulated block on a cluster on this machine; print the plan and what came of it."""
-    strips, photos = (int(number) for number in size.split("x"))
-    block = simulate(strips=strips, photos_per_strip=photos, seed=1).block
+def carried_out(block: Block, workers: int, parts: int, memory: str, *, alone: bool) -> None:
+    """Adjust a block on a cluster on this machine; print the plan and what came of it."""
     with connected("local", workers, bytes_of(memory)) as client, TemporaryDirectory() as folder:
         division = Division(cluster=client, parts=parts, memory=memory, folder=folder)
         plan = plan_in_parts(block, division)
@@ -173,6 +173,7 @@ def main() -> None:
     """Print the tables, or write them into the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run")
+    parser.add_argument("--scanners", type=int)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--parts", type=int, default=8)
     parser.add_argument("--memory", default="1GiB")
@@ -180,8 +181,13 @@ def main() -> None:
     parser.add_argument("--write", type=Path)
     parser.add_argument("--photos", type=int, default=500_000)
     given = parser.parse_args()
-    if given.run:
-        carried_out(given.run, given.workers, given.parts, given.memory, alone=given.alone)
+    if given.run or given.scanners:
+        if given.scanners:
+            block, _ = simulated(given.scanners)
+        else:
+            strips, photos = (int(number) for number in given.run.split("x"))
+            block = simulate(strips=strips, photos_per_strip=photos, seed=1).block
+        carried_out(block, given.workers, given.parts, given.memory, alone=given.alone)
         return
     text = "\n".join(page(given.photos))
     print(text)

@@ -78,12 +78,12 @@ def _without_images(block: Block, folder: Path) -> Project:
     return Project(block=held, path=folder, title="", sizes=none, pixel_mm=none, starts=starts)
 
 
-def _on_disk(folder: Path) -> float:
+def on_disk(folder: Path) -> float:
     """Return GiB of all files of a folder."""
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 2**30
 
 
-def _told(start: float) -> Callable[[Progress], None]:
+def told(start: float) -> Callable[[Progress], None]:
     """Return what tells of each iteration."""
 
     def tell(progress: Progress) -> None:
@@ -96,7 +96,7 @@ def _told(start: float) -> Callable[[Progress], None]:
 
 def carried_out(project: Path, run: Path, workers: int, parts: int, memory: str) -> None:
     """Adjust a project; print the plan, what came of it and what it took."""
-    print(f"the project takes {_on_disk(project):.2f} GiB on disk", flush=True)
+    print(f"the project takes {on_disk(project):.2f} GiB on disk", flush=True)
     with connected("local", workers, bytes_of(memory)) as client:
         division = Division(cluster=client, parts=parts, memory=memory)
         start = time.perf_counter()
@@ -104,11 +104,11 @@ def carried_out(project: Path, run: Path, workers: int, parts: int, memory: str)
         print(f"divided and planned in {time.perf_counter() - start:,.0f} s")
         print("\n".join(plan.lines()), flush=True)
         start = time.perf_counter()
-        found = adjusted_on_disk(project, Wishes(), run, division, progress=_told(start))
+        found = adjusted_on_disk(project, Wishes(), run, division, progress=told(start))
         seconds = time.perf_counter() - start
         peaks = client.run(peak_memory)
     print("\n".join(found.lines()))
-    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {_on_disk(run):.2f} GiB on disk")
+    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {on_disk(run):.2f} GiB on disk")
     for _, peak in sorted(peaks.items()):
         print(f"peak of a worker {peak / 2**20:,.0f} MiB")
     print(f"peak of this process {peak_memory() / 2**20:,.0f} MiB")

@@ -1,8 +1,11 @@
 """Line scanners in orbit, each image with a trajectory of its own, all covariances: docs/performance.md.
 
 python benches/scanners.py 2000 50000     images; four images a point, 200 measures an image; Linux
+python benches/scanners.py 230000 --parts 128 --workers 2 --memory 8GiB --folder DIR      docs/distributed.md
 
 Corrections have 12 coefficients an image: degree 0 of the position, degree 2 of the rotation, all weighted.
+In parts the block is simulated and divided by a process of its own, and never in memory again. A folder that
+is given keeps the run, which goes on there where it was ended.
 """
 
 from __future__ import annotations
@@ -11,13 +14,23 @@ import argparse
 import subprocess
 import sys
 import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from on_disk import on_disk, told
 from peak import forget_peak, peak_memory
 from photogram import Block, Camera, adjust
+from photogram.adjustment.adjustment import core_options
 from photogram.arguments.types import Floats, Indices
+from photogram.distributed import Division
+from photogram.distributed.division import bytes_of
+from photogram.distributed.run import MANIFEST, partition
+from photogram.distributed.running import opened
+from photogram.distributed.workers import connected
+from photogram.formats.in_parts import OnDisk
 from photogram.memory import give_back, resident_memory
 from photogram.network.attitudes import Attitudes
 from photogram.network.timed import Lines, LineSensor, Timed
@@ -31,6 +44,10 @@ ACROSS = 4
 """Orbits from which a point is seen."""
 SD = {"image": 0.0035, "position": 20.0, "rotation": np.array([1e-4, 3e-5, 3e-5]), "control": 5.0}
 """Millimetres, metres, radians by degree, metres."""
+
+
+TOGETHER = 2**20
+"""Images of points that are simulated at once."""
 
 
 def measured(images: Indices, points: Floats, begins: Floats, c: Floats, r: Floats) -> Floats:
@@ -73,7 +90,10 @@ def simulated(count: int, points_per_image: int = 50) -> tuple[Block, int]:
     images = (of * along + which)[there]
     c = random.normal(0, SD["position"], (len(begins), 3))
     r = random.normal(0, 1, (3, len(begins), 3)) * SD["rotation"][:, np.newaxis, np.newaxis]
-    xy = measured(images, ground[points], begins, c, r)
+    xy = np.empty((len(images), 2))
+    for start in range(0, len(images), TOGETHER):
+        some = slice(start, start + TOGETHER)
+        xy[some] = measured(images[some], ground[points[some]], begins, c, r)
     # An error in the focal plane, as lines: what the image moves by in one.
     xy += random.normal(0, SD["image"], xy.shape) / [PITCH, -C / ALTITUDE * SPEED * LINE]
     control = np.zeros(n, dtype=bool)
@@ -134,13 +154,67 @@ def row(count: int, ordering: Any) -> str:
     )
 
 
+def source(images: int) -> str:
+    """Return what tells a simulated block from others."""
+    return f"{images} images of scanners"
+
+
+def divide(images: int, parts: int, run: Path) -> None:
+    """Simulate a block, and write its parts into the folder of a run."""
+    block, _ = simulated(images)
+    partition(block, run, parts, core_options("constrained", None), source(images))
+
+
+def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> None:
+    """Adjust a block whose parts lie in a folder; print the plan, what came of it and what it took."""
+    start = time.perf_counter()
+    if not (run / MANIFEST).exists():
+        own = [sys.executable, __file__, str(images), "--divide", "--parts", str(parts), "--folder", str(run)]
+        subprocess.run(own, check=True)
+        print(
+            f"simulated and divided in {time.perf_counter() - start:,.0f} s, {on_disk(run):.2f} GiB on disk"
+        )
+
+    def divided(_: int) -> Any:
+        raise AssertionError("the parts lie in the folder")
+
+    with connected("local", workers, bytes_of(memory)) as client:
+        division = Division(cluster=client, parts=parts, memory=memory)
+        with opened(run, source(images), images, divided, divided, division, None) as own_run:
+            start = time.perf_counter()
+            print("\n".join(own_run.plan().lines()))
+            print(f"planned in {time.perf_counter() - start:,.0f} s", flush=True)
+            start = time.perf_counter()
+            outcome = own_run.adjust(told(start))
+            seconds = time.perf_counter() - start
+            print("\n".join(OnDisk(outcome, own_run.manifest, []).lines()))
+        peaks, processors = client.run(peak_memory), client.run(time.process_time)
+    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {on_disk(run):.2f} GiB on disk")
+    for worker, peak in sorted(peaks.items()):
+        print(f"peak of a worker {peak / 2**20:,.0f} MiB, {processors[worker]:,.0f} s of a processor")
+    print(f"peak of this process {peak_memory() / 2**20:,.0f} MiB")
+
+
 def main() -> None:
-    """Print the table, each row from a process of its own."""
+    """Print the table, each row from a process of its own; or what came of a block in parts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("images", nargs="+", type=int)
     parser.add_argument("--ordering", default="auto", help="of the images; see photogram.adjust")
+    parser.add_argument("--parts", type=int, help="adjust in so many parts")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--memory", default="8GiB", help="of a worker")
+    parser.add_argument("--folder", type=Path, help="of the run; kept")
     parser.add_argument("--row", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--divide", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
+    if given.divide:
+        divide(given.images[0], given.parts, given.folder)
+        return
+    if given.parts:
+        with TemporaryDirectory() as temporary:
+            run = given.folder or Path(temporary) / "run"
+            in_parts(given.images[0], given.parts, given.workers, given.memory, run)
+        return
     if given.row:
         print(row(given.images[0], given.ordering), flush=True)
         return

@@ -10,7 +10,7 @@ from test_datum_in_parts import in_both
 import photogram
 from photogram import _photocore, adjust, adjust_in_parts
 from photogram.distributed import Division
-from photogram.distributed.parts import films_of
+from photogram.distributed.graph import photos_of_unknowns
 from photogram.distributed.run import read_manifest, read_node
 from photogram.network.cameras import Camera
 from photogram.network.films import (
@@ -120,7 +120,7 @@ def test_films_in_parts_are_those_of_one_process(block, whole, parts):
 
 
 def test_a_node_hands_up_no_film_that_is_not_its_photos(block):
-    films = films_of(block)
+    films = photos_of_unknowns(block)
     assert len(films) == sum(2 + (each.film.bend is not None) for each in block.passages)
     shared = block.passages[0].film.scanner
     assert id(shared) not in films

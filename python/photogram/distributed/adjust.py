@@ -10,6 +10,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
+import orjson
 
 from photogram.adjustment.adjustment import (
     AsPublished,
@@ -26,13 +27,15 @@ from photogram.arguments.annotations import check_arguments
 from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
+from photogram.distributed.graph import alone_of, incidence_of, vertices_of
 from photogram.distributed.merging import merged
-from photogram.distributed.parts import alone_of, incidence_of, vertices_of
+from photogram.distributed.parts import IN_TABLES
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, opened
 from photogram.errors import InputError
-from photogram.network.block import Block, checked, refuse_passages, refuse_trajectories
+from photogram.io.structure import Encoder
+from photogram.network.block import Block, checked, refuse_passages
 from photogram.network.core import CoreOptions
 from photogram.network.datum import (
     DatumRow,
@@ -43,6 +46,7 @@ from photogram.network.datum import (
 from photogram.network.films import Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
+from photogram.results.saved_trajectories import STANDS
 
 __all__ = ["adjust_in_parts", "fingerprint", "plan_in_parts"]
 
@@ -156,7 +160,6 @@ def _ready(
     """
     check_cameras(checked(block))
     check_datum(datum)
-    refuse_trajectories(block, "blocks in parts")
     refuse_passages(block, "blocks in parts", but=Scan)
     block = started(block)
     return block, *with_datum(block, options, datum)
@@ -198,24 +201,21 @@ def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
     alone = alone_of(block)
-    own = sum(len(each.deviations) for each in block.unknowns if id(each) in alone and not each.is_held)
-    unknowns = UNKNOWNS + own / len(block.photo_ids)
+    own = [each for each in block.unknowns if id(each) in alone and not each.is_held]
+    poses = UNKNOWNS * (len(block.photo_ids) - len(block.timed))
+    unknowns = (poses + sum(len(each.deviations) for each in own)) / len(block.photo_ids)
     return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]
 
 
 def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None) -> str:
     """Return what tells a block and how it is adjusted from others."""
     digest = hashlib.sha256(repr((options, row)).encode())
-    for name in (
-        *("photo_positions", "photo_attitudes", "photo_position_sd", "photo_attitude_sd", "photo_cameras"),
-        *("point_positions", "point_sd", "image_photos", "image_points", "image_xy", "image_sd"),
-    ):
+    for name in IN_TABLES:
         values = getattr(block, name)
-        digest.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
-    for each in (*block.cameras, *block.observations, *block.unknowns):
-        digest.update(repr(each).encode())
-    for passage in block.passages:
-        digest.update(repr((passage, passage.numbers().tolist())).encode())
+        if isinstance(values, np.ndarray):
+            digest.update(np.ascontiguousarray(values).tobytes())
+    settings = Encoder(STANDS).fields(block, ["title", *IN_TABLES])
+    digest.update(orjson.dumps(settings))
     return digest.hexdigest()
 
 

@@ -15,7 +15,7 @@ from photogram.adjustment.adjustment import messages_of
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
-from photogram.distributed.parts import shared_cameras
+from photogram.distributed.graph import shared_cameras
 from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block

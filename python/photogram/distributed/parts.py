@@ -10,8 +10,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.declared import dataclass, field
-from photogram.distributed.cut import Incidence, homes, joined
 from photogram.distributed.files import read_json, write_file, write_json
+from photogram.distributed.graph import Homes, alone_of, photos_of, vertices_of
 from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
 from photogram.io.seals import Seals, check_seal, seal
@@ -27,22 +27,17 @@ from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
+from photogram.results.saved_trajectories import CLASSES, STANDS
 
 __all__ = [
+    "IN_TABLES",
     "AtHome",
-    "Homes",
     "Names",
     "Part",
-    "alone_of",
     "assembled_part",
-    "films_of",
-    "homes_of",
-    "incidence_of",
     "names_above",
     "part_of",
     "read_part",
-    "shared_cameras",
-    "vertices_of",
     "write_part",
 ]
 
@@ -53,7 +48,8 @@ TABLES: dict[str, tuple[str, ...]] = {
 }
 """The arrays of a block that have a row for each photo, point or image."""
 SETTINGS = "part.json"
-_ROWS = ("photo_ids", "point_ids")
+IN_TABLES = ("photo_ids", "point_ids", *(name for each in TABLES.values() for name in each))
+"""The fields of a block that are no settings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +104,6 @@ class Names:
 
 
 @dataclass(frozen=True, eq=False)
-class Homes:
-    """The nodes where points, images and other observations are at home.
-
-    Attributes
-    ----------
-    owners
-        (P,) of photos; one on a frame belongs to the node of its frame.
-    points, images, observations
-        (n,), (m,) and of each other observation.
-    """
-
-    owners: Indices
-    points: Indices
-    images: Indices
-    observations: Indices
-
-
-@dataclass(frozen=True, eq=False)
 class AtHome:
     """The n points, m images and other observations that are at home in a node.
 
@@ -157,94 +135,6 @@ class AtHome:
     image_xy: Floats
     image_sd: Floats
     observations: Indices
-
-
-def vertices_of(block: Block) -> Indices:
-    """Return (P,) the photo whose pose each photo has: that of its frame, where it is on one."""
-    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.mounts else {}
-    found = np.arange(len(block.photo_ids), dtype=np.int64)
-    for each in block.mounts:
-        found[rows[each.photo]] = rows[each.frame]
-    return found
-
-
-def films_of(block: Block) -> dict[int, str]:
-    """Return the photos in whose blocks of unknowns those of films stand, by the identity of the unknowns.
-
-    Those that films of several photos have are common unknowns as any other, and so are all beside photos on
-    frames: halves of joined scans.
-    """
-    found: dict[int, set[str]] = {}
-    for each in () if block.mounts else block.passages:
-        if isinstance(each, Scan):
-            for own in (each.film.placement, each.film.size, each.film.bend):
-                found.setdefault(id(own), set()).add(each.photo)
-    found.pop(id(None), None)
-    return {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
-
-
-def alone_of(block: Block) -> dict[int, str]:
-    """Return the photos of what they alone have, by the identity of the unknowns: films, nodes of reseaus.
-
-    A node of a reseau is a block by itself, which images in its cells touch; it goes where its photo goes.
-    """
-    found: dict[int, set[str]] = {}
-    for each in block.passages:
-        if isinstance(each, Scan) and each.film.pattern is not None:
-            for own in each.film.pattern.weights:
-                found.setdefault(id(own), set()).add(each.photo)
-    return films_of(block) | {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
-
-
-def _photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:
-    """Return the photos that an observation touches, by their poses or by what they alone have."""
-    own = [alone[id(each)] for each in observation.unknowns if id(each) in alone]
-    return [*dict.fromkeys([*observation.photos, *own])]
-
-
-def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
-    """Return what each point and observation touches; the edge of each point, and of each observation.
-
-    Points that are observed together are one edge: they stay together in one node.
-    """
-    vertices = vertices_of(block)
-    points = {name: row for row, name in enumerate(block.point_ids)} if block.observations else {}
-    photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
-    tied = [tuple(points[name] for name in each.points) for each in block.observations]
-    edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
-    own_edges, others, of_observations, alone = [], [], [], alone_of(block)
-    count = len(block.point_ids)
-    for each, members in zip(block.observations, tied, strict=True):
-        edge = int(edges[members[0]]) if members else count
-        count += not members
-        of_observations.append(edge)
-        for name in _photos_of(each, alone):
-            own_edges.append(edge)
-            others.append(int(vertices[photos[name]]))
-    incidence = Incidence(
-        np.concatenate([vertices[block.image_photos], np.array(others, dtype=np.int64)]),
-        np.concatenate([edges[block.image_points], np.array(own_edges, dtype=np.int64)]),
-        count,
-    )
-    return incidence, edges, np.array(of_observations, dtype=np.int64)
-
-
-def homes_of(block: Block, owners: Indices, root: int) -> Homes:
-    """Return the nodes where everything is at home.
-
-    Parameters
-    ----------
-    block
-        The block.
-    owners
-        (P,) the nodes of photos; those on frames do not count.
-    root
-        The root of the tree, to which observations of common unknowns alone belong.
-    """
-    incidence, edges, of_observations = incidence_of(block)
-    found = homes(owners, incidence, root)
-    points = found[edges]
-    return Homes(owners[vertices_of(block)], points, points[block.image_points], found[of_observations])
 
 
 def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
@@ -319,6 +209,7 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         image_sd=at_home.image_sd,
         observations=own,
         mounts=[each for each in block.mounts if each.photo in present],
+        timed=[each for each in block.timed if each.photo in present],
         passages=[each for each in block.passages if isinstance(each, Scan) and each.photo in present],
     )
     whole = {id(each): row for row, each in enumerate(block.unknowns)}
@@ -338,53 +229,54 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
     )
 
 
-def names_above(part: Part, below: Names, whole: Block, shared: Indices, *, root: bool) -> Names:
+def names_above(
+    part: Part,
+    below: Names,
+    shared: Indices,
+    of_unknowns: Mapping[int, str],
+    alone: Mapping[int, str],
+    *,
+    root: bool,
+) -> Names:
     """Return what a part hands up: photos of nodes above with what they alone have, and what is of the root.
 
     Parameters
     ----------
     part, below
         The part, and what nodes below it hand up.
-    whole
-        The block, or all of it but points and images.
     shared
-        Its cameras that have unknown parameters and several photos.
+        The cameras that have unknown parameters and several photos in the whole block.
+    of_unknowns
+        Of the whole block (:func:`photos_of_unknowns`): these unknowns are handed up with their photos.
+    alone
+        Of the whole block (:func:`alone_of`): these unknowns are at home where their photos are.
     root
         Whether it is the root, which hands nothing up.
     """
     if root:
         return Names()
-    # A photo on a frame has no unknowns of its own.
+    # A photo for which another stands has no unknowns of its own.
     free = vertices_of(part.block) == np.arange(len(part.photos))
     photos = part.photos[(part.owners != part.node) & free]
     cameras = part.block.photo_cameras
     used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
-    films, alone = films_of(whole), alone_of(whole)
     at_home = {part.block.photo_ids[row] for row in np.flatnonzero(part.owners == part.node)}
     unknowns = sorted(
         row
         for row, each in zip(part.unknowns.tolist(), part.common, strict=True)
-        if not (each.is_held or id(each) in films or alone.get(id(each)) in at_home)
+        if not (each.is_held or id(each) in of_unknowns or alone.get(id(each)) in at_home)
     )
     return Names(photos.tolist(), sorted(used | set(below.cameras)), unknowns)
 
 
-def shared_cameras(block: Block) -> Indices:
-    """Return which cameras have an unknown parameter and several photos: they belong to the root."""
-    if block.photo_cameras is None:
-        return np.zeros(0, dtype=np.int64)
-    photos = np.bincount(block.photo_cameras, minlength=len(block.cameras))
-    own = [row for row, each in enumerate(block.cameras) if photos[row] > 1 and not each.is_held]
-    return np.array(own, dtype=np.int64)
-
-
 def _touch(block: Block, touched: Bools, observations: list[Observation]) -> None:
-    """Add the photos of observations, and of the frames that photos are on."""
-    if not (observations or block.mounts):
+    """Add the photos of observations, and those that stand for photos on frames and trajectories."""
+    if not (observations or block.mounts or block.timed):
         return
-    rows, alone = {name: row for row, name in enumerate(block.photo_ids)}, alone_of(block)
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    alone = alone_of(block) if observations else {}
     for each in observations:
-        touched[[rows[name] for name in _photos_of(each, alone)]] = True
+        touched[[rows[name] for name in photos_of(each, alone)]] = True
     vertices = vertices_of(block)
     touched[vertices[np.flatnonzero(touched)]] = True
 
@@ -411,13 +303,13 @@ def write_part(folder: Path, part: Part) -> str:
             if values is not None:
                 columns.append(Column(name, np.asarray(values), "", f"as Block.{name}"))
         write_file(folder / f"{table}.parquet", seals.through(table, parquet_content(columns, {})))
-    encoder = Encoder()
+    encoder = Encoder(STANDS)
     document = {
         "node": part.node,
         "tables": seals.known,
         "observations": part.observations.tolist(),
         "unknowns": part.unknowns.tolist(),
-        "block": encoder.fields(block, [*_ROWS, *(name for each in TABLES.values() for name in each)]),
+        "block": encoder.fields(block, IN_TABLES),
         # After the block, whose unknowns are the same objects.
         "common": encoder.value(list(part.common)),
     }
@@ -461,7 +353,7 @@ def read_part(folder: Path, sealed: str) -> Part:
 
 def _classes() -> list[type]:
     single = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Reseau, Spheroid)
-    return [*single, *_below(Observation), *_below(Passage), *_below(Unknown)]
+    return [*single, *CLASSES, *_below(Observation), *_below(Passage), *_below(Unknown)]
 
 
 def _below(base: type) -> Iterator[type]:

@@ -14,19 +14,16 @@ from photogram.arguments.types import Floats, Indices
 from photogram.declared import asdict, dataclass
 from photogram.distributed.cut import Tree, cut, tree_of
 from photogram.distributed.files import read_json, write_json
-from photogram.distributed.parts import (
-    Names,
-    Part,
+from photogram.distributed.flights import with_flights
+from photogram.distributed.graph import (
     alone_of,
     homes_of,
     incidence_of,
-    names_above,
-    part_of,
-    read_part,
+    photos_of_unknowns,
     shared_cameras,
     vertices_of,
-    write_part,
 )
+from photogram.distributed.parts import Names, Part, names_above, part_of, read_part, write_part
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.core import CoreOptions, block_network
@@ -141,6 +138,7 @@ def partition(
     held = held_for_datum(block, options)
     if datum is not None and not held:
         raise AdjustmentError("the block is not free: control, weights or observations give its datum")
+    block = with_flights(block)
     # A node has some of the observations of a drift only.
     block = block.replace(observations=with_epochs(block.observations))
     incidence, _, _ = incidence_of(block)
@@ -205,7 +203,7 @@ def divided(
     AdjustmentError
         The folder cannot be written to.
     """
-    shared, alone = shared_cameras(block), alone_of(block)
+    shared, of_unknowns, alone = shared_cameras(block), photos_of_unknowns(block), alone_of(block)
     outer: list[Names] = []
     seals: list[str] = []
     counts: list[tuple[int, int, int, int]] = []
@@ -215,7 +213,7 @@ def divided(
             below = below.union(outer[child])
         part = part_at(node, below)
         root = node == tree.root
-        outer.append(names_above(part, below, block, shared, root=root))
+        outer.append(names_above(part, below, shared, of_unknowns, alone, root=root))
         folder = part_folder(run, node)
         folder.mkdir(parents=True, exist_ok=True)
         seals.append(write_part(folder, part))

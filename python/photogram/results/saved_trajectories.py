@@ -22,7 +22,7 @@ from photogram.network.trajectories import (
     Trajectory,
 )
 
-__all__ = ["CLASSES", "STANDS"]
+__all__ = ["CLASSES", "STANDS", "KeptTrajectory"]
 
 
 @dataclass(frozen=True, eq=False)

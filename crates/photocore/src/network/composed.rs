@@ -186,6 +186,8 @@ impl Bundle {
             by_i * DMatrix::from_fn(rows, columns, of) * by_j.transpose()
         };
         let mut parts = composed.parts();
+        // What it does not step with adds nothing, even where nothing is known of that.
+        parts.retain(|(_, by)| by.iter().any(|&partial| partial != 0.0));
         parts.sort_by_key(|part| part.0);
         let mut sum = Matrix6::zeros();
         for (j, part) in parts.iter().enumerate() {

@@ -1,5 +1,7 @@
 //! The blocks of a network's unknowns.
 
+use std::collections::BTreeSet;
+
 use super::NetworkError;
 use super::model::Bundle;
 use super::surroundings::{BlockOf, Surroundings};
@@ -31,7 +33,8 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
 }
 
 impl Surroundings {
-    /// The retained blocks of a model of these points that outer ones are, and those that each node below leaves something for.
+    /// The retained blocks of a model of these points that outer ones are, and those that each node below leaves something for; each once,
+    /// common unknowns may stand in one.
     ///
     /// # Errors
     /// One that has no unknowns of its own here.
@@ -54,7 +57,12 @@ impl Surroundings {
             };
             found.map(|block| block as u32).ok_or(NetworkError::NoBlock(block))
         };
-        let blocks = |all: &Vec<BlockOf>| all.iter().map(block).collect::<Result<Vec<u32>, NetworkError>>();
+        let blocks = |all: &Vec<BlockOf>| -> Result<Vec<u32>, NetworkError> {
+            let mut seen = BTreeSet::new();
+            let mut found = all.iter().map(block).collect::<Result<Vec<u32>, NetworkError>>()?;
+            found.retain(|&block| seen.insert(block));
+            Ok(found)
+        };
         Ok((blocks(&self.outer)?, self.below.iter().map(blocks).collect::<Result<_, _>>()?))
     }
 }

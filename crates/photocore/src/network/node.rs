@@ -94,6 +94,7 @@ impl Network {
     ) -> Result<Node, NetworkError> {
         self.check()?;
         self.check_blocks(&surroundings)?;
+        let surroundings = self.told_by_coefficients(surroundings);
         let mut network = self.clone();
         network.release(&surroundings);
         let in_photos = surroundings.held.clone();

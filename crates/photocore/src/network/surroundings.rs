@@ -2,10 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use super::{Network, Trajectory};
+
 /// What a block of unknowns that several nodes touch belongs to: indices into the network of the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockOf {
-    /// The pose of a photo, with a camera that is its alone, and with its film.
+    /// The pose of a photo, with a camera that is its alone, and with its film; all coefficients of the trajectory that it is on.
     Photo(usize),
     /// A camera that several photos of the larger network share.
     Camera(usize),
@@ -60,5 +62,23 @@ impl Surroundings {
         self.all()
             .filter_map(|block| if let BlockOf::Common(own) = block { Some(own) } else { None })
             .collect()
+    }
+}
+
+impl Network {
+    /// With the coefficients of trajectories in the place of photos on them, which have no unknowns of their own.
+    pub(super) fn told_by_coefficients(&self, given: Surroundings) -> Surroundings {
+        let mut flown = vec![None; self.photos.len()];
+        let of_photos = self.mounts.iter().map(|mount| (mount.photo(), mount.trajectory()));
+        of_photos.for_each(|(photo, trajectory)| flown[photo] = flown[photo].or(trajectory));
+        let told = |block: &BlockOf| -> Vec<BlockOf> {
+            let trajectory = if let BlockOf::Photo(photo) = *block { flown[photo] } else { None };
+            let Some(trajectory) = trajectory else { return vec![*block] };
+            let Trajectory { position, rotation, .. } = &self.trajectories[trajectory];
+            let unknown = position.iter().chain(rotation).filter(|&&common| !self.commons[common].is_held());
+            unknown.map(|&common| BlockOf::Common(common)).collect()
+        };
+        let all = |blocks: &Vec<BlockOf>| blocks.iter().flat_map(told).collect();
+        Surroundings { outer: all(&given.outer), below: given.below.iter().map(all).collect(), ..given }
     }
 }

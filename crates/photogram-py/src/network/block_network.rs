@@ -35,14 +35,19 @@ pub struct BlockNetwork {
     pub records: usize,
 }
 
+/// A solution without what stands for so many records.
+pub fn without_records(mut solution: Solution, records: usize) -> Solution {
+    solution.photos.truncate(solution.photos.len() - records);
+    if records > 0 {
+        solution.cameras.pop();
+    }
+    solution
+}
+
 impl BlockNetwork {
     /// A solution as callers know it: without what stands for records.
-    fn told(&self, mut solution: Solution, pool: &Threads) -> Told {
-        solution.photos.truncate(self.network.photos.len() - self.records);
-        if self.records > 0 {
-            solution.cameras.pop();
-        }
-        Told::new(solution, pool)
+    fn told(&self, solution: Solution, pool: &Threads) -> Told {
+        Told::new(without_records(solution, self.records), pool)
     }
 }
 
@@ -168,7 +173,8 @@ impl BlockNetwork {
         threads: usize,
         held: Vec<(usize, usize)>,
     ) -> PyResult<Node> {
-        Node::new(py, (&self.network, &self.options), (outer, children), middle, held, threads)
+        let own = (&self.network, &self.options, self.records);
+        Node::new(py, own, (outer, children), middle, held, threads)
     }
 }
 

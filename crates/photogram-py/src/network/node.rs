@@ -16,6 +16,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::block_network::without_records;
 use super::covariances::refused;
 use super::solution::BlockSolution;
 use super::tables::Told;
@@ -119,6 +120,8 @@ fn slice<'a>(name: &str, array: &'a Numbers<'_>) -> PyResult<&'a [f64]> {
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct Node {
     node: Arc<Core>,
+    /// How many of its photos, the last, are records on trajectories.
+    records: usize,
 }
 
 #[pymethods]
@@ -260,6 +263,7 @@ impl Node {
         let (formed, contribution) = formed.map_err(|error: Failure| failed(&error))?;
         Ok(FormedNode {
             node: Arc::clone(&self.node),
+            records: self.records,
             sum_of_squares: formed.sum_of_squares(),
             decrease: formed.decrease(),
             undetermined: self.node.undetermined(&formed).map(|error| failure(&error, "block")),
@@ -278,9 +282,10 @@ impl Node {
     ) -> PyResult<BlockSolution> {
         let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
         let told = watched(py, self.workers(threads), None, |pool, _| {
-            self.node.solution(&state, &before, pool).map(|solution| Told::new(solution, pool))
+            let solution = self.node.solution(&state, &before, pool)?;
+            Ok(Told::new(without_records(solution, self.records), pool))
         })?;
-        BlockSolution::new(py, told.map_err(|error| failed(&error))?, 6)
+        BlockSolution::new(py, told.map_err(|error: Failure| failed(&error))?, 6)
     }
 }
 
@@ -288,7 +293,7 @@ impl Node {
     /// A block as a node of a larger one, whose blocks are named for the nodes above and below.
     pub fn new(
         py: Python<'_>,
-        (network, options): (&Network, &Options),
+        (network, options, records): (&Network, &Options, usize),
         (outer, children): (Vec<BlockRow>, Vec<Vec<BlockRow>>),
         middle: Option<[f64; 3]>,
         held: Vec<(usize, usize)>,
@@ -299,7 +304,7 @@ impl Node {
         let surroundings = Surroundings { outer: blocks(outer)?, below, middle, held };
         let workers = Workers::of(threads, network.images.len());
         let node = watched(py, workers, None, |pool, _| network.node(options, surroundings, pool))?;
-        node.map(|node| Self { node: Arc::new(node) }).map_err(|error| failed(&error))
+        node.map(|node| Self { node: Arc::new(node), records }).map_err(|error| failed(&error))
     }
 
     fn workers(&self, threads: usize) -> Workers {
@@ -311,6 +316,7 @@ impl Node {
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct FormedNode {
     node: Arc<Core>,
+    records: usize,
     sum_of_squares: f64,
     decrease: f64,
     undetermined: Option<FailureRow>,
@@ -478,7 +484,7 @@ impl FormedNode {
         let workers = Workers::of(threads, self.node.images());
         let found = watched(py, workers, progress, |pool, watch| {
             let found = self.node.invert(formed, given, &state, datum, pool, watch);
-            found.map(|(solution, below)| (Told::new(solution, pool), below))
+            found.map(|(solution, below)| (Told::new(without_records(solution, self.records), pool), below))
         })?;
         let (told, below) = found.map_err(|error| failed(&error))?;
         let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();

@@ -114,7 +114,9 @@ class Streamed:
             )
         if self.project.block.timed:
             raise InputError(
-                "photos with a rolling shutter, or on trajectories, are read whole: without parts",
+                f"the photo {self.project.block.timed[0].photo} has a rolling shutter, or is on a trajectory,"
+                " and images in Parquet are read batch by batch: keep them in CSV, or"
+                " photogram.adjust_in_parts(photogram.formats.read(path).block, ...)",
                 file=settings.path,
             )
         refuse_passages(self.project.block, "blocks in parts")

@@ -1,0 +1,163 @@
+"""The graph of a block: which photos stand for others and for common unknowns, and what ties them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from photogram.arguments.types import Indices
+from photogram.declared import dataclass
+from photogram.distributed.cut import Incidence, homes, joined
+from photogram.network.block import Block, flown_by
+from photogram.network.films import Scan
+from photogram.network.observations import Observation
+
+__all__ = [
+    "Homes",
+    "alone_of",
+    "homes_of",
+    "incidence_of",
+    "photos_of",
+    "photos_of_unknowns",
+    "shared_cameras",
+    "vertices_of",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Homes:
+    """The nodes where points, images and other observations are at home.
+
+    Attributes
+    ----------
+    owners
+        (P,) of photos; one on a frame or trajectory belongs to the node of the photo that stands for it.
+    points, images, observations
+        (n,), (m,) and of each other observation.
+    """
+
+    owners: Indices
+    points: Indices
+    images: Indices
+    observations: Indices
+
+
+def vertices_of(block: Block) -> Indices:
+    """Return (P,) the photo that stands for each photo: its frame, or the first on its trajectory."""
+    moves = bool(block.mounts or block.timed)
+    rows = {name: row for row, name in enumerate(block.photo_ids)} if moves else {}
+    found = np.arange(len(block.photo_ids), dtype=np.int64)
+    for each in block.mounts:
+        found[rows[each.photo]] = rows[each.frame]
+    first: dict[int, int] = {}
+    for timed, trajectory in zip(block.timed, block.trajectories, strict=True):
+        row = rows[timed.photo]
+        found[row] = first.setdefault(id(trajectory), row)
+    return found
+
+
+def photos_of_unknowns(block: Block) -> dict[int, str]:
+    """Return the photos with which common unknowns are handed up, by the identity of the unknowns.
+
+    Those of a film go with its photo, the coefficients of a trajectory with the first photo on it. Those that
+    films of several photos have are common unknowns as any other, and so are all of films beside photos on
+    frames (halves of joined scans) or trajectories.
+    """
+    found: dict[int, set[str]] = {}
+    for each in () if block.mounts or flown_by(block) else block.passages:
+        if isinstance(each, Scan):
+            for own in (each.film.placement, each.film.size, each.film.bend):
+                found.setdefault(id(own), set()).add(each.photo)
+    found.pop(id(None), None)
+    alone = {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+    for timed, trajectory in zip(block.timed, block.trajectories, strict=True):
+        for part in trajectory.coefficients:
+            for coefficient in part:
+                alone.setdefault(id(coefficient), timed.photo)
+    return alone
+
+
+def alone_of(block: Block) -> dict[int, str]:
+    """Return the photos of what they alone have, by the identity of the unknowns: nodes of reseaus, too.
+
+    A node of a reseau is a block by itself, which images in its cells touch; it goes where its photo goes.
+    """
+    found: dict[int, set[str]] = {}
+    for each in block.passages:
+        if isinstance(each, Scan) and each.film.pattern is not None:
+            for own in each.film.pattern.weights:
+                found.setdefault(id(own), set()).add(each.photo)
+    alone = {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+    return photos_of_unknowns(block) | alone
+
+
+def photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:
+    """Return the photos that an observation touches: by poses, or by what they alone have."""
+    moment, photos, unknowns = observation.moment, observation.photos, observation.unknowns
+    if moment is not None:
+        # One coefficient stands for all.
+        photos, own = (), [part[0] for part in moment.trajectory.coefficients if part]
+        unknowns = (*unknowns, *own)
+    others = [alone[id(each)] for each in unknowns if id(each) in alone]
+    return [*dict.fromkeys([*photos, *others])]
+
+
+def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
+    """Return what each point and observation touches; the edge of each point, and of each observation.
+
+    Points that are observed together are one edge: they stay together in one node.
+    """
+    vertices = vertices_of(block)
+    points = {name: row for row, name in enumerate(block.point_ids)} if block.observations else {}
+    photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
+    tied = [tuple(points[name] for name in each.points) for each in block.observations]
+    edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
+    own_edges, others, of_observations, alone = [], [], [], alone_of(block)
+    count = len(block.point_ids)
+    for each, members in zip(block.observations, tied, strict=True):
+        edge = int(edges[members[0]]) if members else count
+        count += not members
+        of_observations.append(edge)
+        for name in photos_of(each, alone):
+            own_edges.append(edge)
+            others.append(int(vertices[photos[name]]))
+    incidence = Incidence(
+        np.concatenate([vertices[block.image_photos], np.array(others, dtype=np.int64)]),
+        np.concatenate([edges[block.image_points], np.array(own_edges, dtype=np.int64)]),
+        count,
+    )
+    return incidence, edges, np.array(of_observations, dtype=np.int64)
+
+
+def homes_of(block: Block, owners: Indices, root: int) -> Homes:
+    """Return the nodes where everything is at home.
+
+    Parameters
+    ----------
+    block
+        The block.
+    owners
+        (P,) the nodes of photos; of those for which others stand they do not count.
+    root
+        The root of the tree, to which observations of common unknowns alone belong.
+    """
+    incidence, edges, of_observations = incidence_of(block)
+    found = homes(owners, incidence, root)
+    points = found[edges]
+    return Homes(owners[vertices_of(block)], points, points[block.image_points], found[of_observations])
+
+
+def shared_cameras(block: Block) -> Indices:
+    """Return which cameras have an unknown parameter and several photos: they belong to the root.
+
+    So do those of photos on frames and trajectories, in whose blocks they do not stand.
+    """
+    if block.photo_cameras is None:
+        return np.zeros(0, dtype=np.int64)
+    photos = np.bincount(block.photo_cameras, minlength=len(block.cameras))
+    mounted = {each.photo for each in block.mounts} | {each.photo for each in block.timed}
+    rows = [row for row, name in enumerate(block.photo_ids) if name in mounted] if mounted else []
+    photos[block.photo_cameras[rows]] += 1
+    own = [row for row, each in enumerate(block.cameras) if photos[row] > 1 and not each.is_held]
+    return np.array(own, dtype=np.int64)
