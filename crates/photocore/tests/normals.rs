@@ -87,8 +87,13 @@ impl Dense {
             }
         }
         let right = (0..equations).map(|_| number()).collect();
-        let weight: Vec<f64> = (0..layout.unknowns()).map(|_| 0.5 + 0.4 * number()).collect();
-        let prior_right = weight.iter().map(|w| w * number()).collect();
+        let mut weight: Vec<f64> = (0..layout.unknowns()).map(|_| 0.5 + 0.4 * number()).collect();
+        let mut prior_right: Vec<f64> = weight.iter().map(|w| w * number()).collect();
+        let held = (0..layout.locals()).filter(|&local| layout.stands_apart(local));
+        for unknown in held.flat_map(|local| layout.local_range(local)) {
+            (weight[unknown], prior_right[unknown]) = (1.0, 0.0);
+            (0..equations).for_each(|row| matrix[(row, unknown)] = 0.0);
+        }
         Self { layout, matrix, right, prior: Prior { weight, right: prior_right, between: vec![] } }
     }
 
@@ -316,7 +321,12 @@ fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedIn
         let (first, count) = (groups.start * layout.rows(), groups.len() * layout.rows());
         let found = system.local_cofactors(selected, dense, &dense.prior, dense, local, &[]);
         assert_eq!(found.rows(), count);
+        let group = |row: usize| row / layout.rows();
         for (k, value) in found.equations.iter().enumerate() {
+            if layout.stands_apart(local) && group(k / count) != group(k % count) {
+                assert!(value.is_nan(), "no pattern has it");
+                continue;
+            }
             assert_close(*value, exact[(first + k / count, first + k % count)], 1e-9, "block of equations");
         }
     }
@@ -415,7 +425,7 @@ fn compare_blocks(layout: &Layout, selected: &SelectedInverse, inverse: &Mat<f64
             }
         }
     }
-    for local in 0..layout.locals() {
+    for local in (0..layout.locals()).filter(|&local| !layout.stands_apart(local)) {
         let blocks: BTreeSet<usize> =
             layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).collect();
         for (&one, &other) in blocks.iter().flat_map(|one| blocks.iter().map(move |other| (one, other))) {
@@ -490,6 +500,55 @@ fn shared_cameras_agree_with_dense_algebra() {
     }
 }
 
+/// Views of a target whose first points are held, by a lens of 60 knots: every group touches those about it, and some of another lens.
+fn target(views: usize, points: usize, held: usize) -> Dense {
+    let (near, lens) = (|k: usize| views + k % 52, |k: usize| views + 60 + k % 2);
+    let ptr: Vec<usize> = (0..=points).map(|point| point * views).collect();
+    let view = (0..points).flat_map(|_| 0..views as u32).collect();
+    let dims = [vec![6; views], vec![2; 60], vec![9; 2]].concat();
+    let layout = Layout::new(2, 3, &dims, ptr, view).unwrap();
+    let about = |group: usize| {
+        let first = near(group / 3 + group % views);
+        (first..first + 8).step_by(1 + group % 2).chain([lens(group % views)]).map(|block| block as u32)
+    };
+    let shared: Vec<Vec<u32>> = (0..points * views).map(|group| about(group).collect()).collect();
+    let ends = shared.iter().scan(0, |end, own| {
+        *end += own.len();
+        Some(*end)
+    });
+    let layout = layout.with_shared(std::iter::once(0).chain(ends).collect(), shared.concat()).unwrap();
+    let known: Vec<bool> = (0..layout.unknowns()).map(|unknown| unknown < 3 * held).collect();
+    Dense::new(layout.with_held(&known), 23)
+}
+
+#[test]
+fn groups_of_held_local_blocks_stand_apart() {
+    for ordering in ALL {
+        compare_with_dense(&target(12, 30, 30), ordering);
+        compare_with_dense(&target(12, 30, 20), ordering);
+    }
+}
+
+/// What the equations of a held local block have to do with each other is found from them as functions.
+#[test]
+fn equations_of_a_held_local_block_are_functions() {
+    let dense = target(12, 30, 20);
+    let (threads, system) = (threads(2), System::new(dense.layout.clone(), Ordering::Auto).unwrap());
+    let factor = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let functions = system.local_functions(&dense, 7);
+    let reduced = done(system.reduce(&threads, &dense, &dense.prior, &functions, None, &mut go));
+    let found = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
+    let count = dense.layout.unknowns();
+    let inverse =
+        dense.normal_matrix().llt(faer::Side::Lower).unwrap().solve(Mat::<f64>::identity(count, count));
+    let all = &dense.matrix * inverse * dense.matrix.transpose();
+    let (rows, first) = (functions.len(), 2 * dense.layout.groups_of(7).start);
+    assert_eq!(rows, 24);
+    for (k, value) in found.iter().enumerate() {
+        assert_close(*value, all[(first + k / rows, first + k % rows)], 1e-10, "of two views");
+    }
+}
+
 /// The camera of the whole block is joined to everything: it goes last, and the others are ordered by the shape they have without it.
 #[test]
 fn what_is_joined_to_everything_is_eliminated_last() {
@@ -532,28 +591,32 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
 fn bits_do_not_depend_on_the_number_of_threads() {
     same_bits(block(8, 40, 5).layout);
     same_bits(with_cameras(8, 40, true));
+    same_bits_of(&target(5, 400, 390));
 }
 
 fn same_bits(plain: Layout) {
     let tie = |k: u32| Tie { rows: 2, retained: vec![k, k + 40, 7] };
-    let dense = Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3);
+    same_bits_of(&Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3));
+}
+
+fn same_bits_of(dense: &Dense) {
     let rights: Vec<f64> = (0..20 * dense.layout.unknowns()).map(|k| (k % 17) as f64 - 8.0).collect();
     let run = |count: usize| {
         let threads = threads(count);
         let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
-        let factor = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::default(), &mut go));
+        let factor = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::default(), &mut go));
         let solution =
-            done(system.solve(&threads, &factor, &dense, &dense.prior, &SolveOptions::default(), &mut go));
-        let more = done(system.solve(&threads, &factor, &dense, &dense.prior, &solved_for(&rights), &mut go));
-        let alone = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
+            done(system.solve(&threads, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
+        let more = done(system.solve(&threads, &factor, dense, &dense.prior, &solved_for(&rights), &mut go));
+        let alone = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
         let written =
-            done(system.solve(&threads, &alone, &dense, &dense.prior, &solved_for(&rights), &mut go));
+            done(system.solve(&threads, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
         let functions: Vec<Function> =
             (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
-        let reduced = done(system.reduce(&threads, &dense, &dense.prior, &functions, None, &mut go));
+        let reduced = done(system.reduce(&threads, dense, &dense.prior, &functions, None, &mut go));
         let of_functions = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
         let cofactors =
-            done(system.invert(&threads, factor, &dense, &dense.prior, &InvertOptions::default(), &mut go))
+            done(system.invert(&threads, factor, dense, &dense.prior, &InvertOptions::default(), &mut go))
                 .cofactors;
         let numbers =
             [solution, more, written, of_functions, cofactors.local, cofactors.retained, cofactors.equations];

@@ -20,6 +20,11 @@ const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-5;
 /// With this damping a step follows the gradient; if that does not lower the sum of squares, nothing will.
 const MOST_DAMPING: f64 = 1e9;
+/// One group of so many may touch blocks that the layout does not have on the way.
+const FEW: usize = 20;
+/// None may any more after a step that changes no unknown by more than this multiple of its standard deviation: what is left out is found before
+/// the last steps, not after them.
+const SETTLED: f64 = 0.1;
 
 /// A full step that changes no unknown by more than this multiple of its standard deviation, and fails, follows a combination that is
 /// so weakly determined that the others bend off the straight line on the way: it is followed along the curve (see
@@ -121,11 +126,13 @@ impl<'a> Run<'a, '_> {
         self.stay(state, status)
     }
 
-    /// Whether full steps have led to where groups touch other blocks than the layout has.
+    /// Whether full steps have led to where groups touch other blocks than the layout has: more than a few groups, or any once steps are short.
     fn is_outgrown(&self, state: &State<'a>) -> bool {
+        let Some(last) = self.iterations.last() else { return false };
+        let most = if last.largest_change <= SETTLED { 0 } else { self.problem.layout().groups() / FEW };
         state.linearized.damping() == 0.0
             && self.problem.model.steps_swing()
-            && self.threads.install(|| self.problem.model.has_outgrown(state.values()))
+            && self.threads.install(|| self.problem.model.outgrown(state.values())) > most
     }
 
     /// Solves, and takes the step or ends with it.

@@ -3,8 +3,10 @@
 //! What is left out has an infinite standard deviation: its equations stand in the normal equations with weight zero, so that pattern,
 //! order and symbolic factorisation stay, and cofactors of what is out are inside the pattern too.
 
+use std::ops::ControlFlow;
+
 use super::equations::ObservationEquations;
-use super::linearized::{Inverted, Linearized};
+use super::linearized::{CofactorError, Inverted, Linearized};
 use super::options::Phase;
 use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
@@ -99,6 +101,53 @@ impl Leverages {
         threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])))
     }
 
+    /// The same with what groups of local blocks that are held have to do with each other, which no pattern of normal equations has.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn of_locals_together(
+        &self,
+        problem: &AnyProblem<'_>,
+        observation_sd: &[f64],
+        locals: &[usize],
+        terms: impl Fn(usize) -> Vec<f64> + Sync,
+        threads: &Threads,
+    ) -> Result<Vec<LocalCofactors>, AdjustError> {
+        let mut found = self.of_locals(problem, observation_sd, locals, terms, threads);
+        self.put_together(problem, observation_sd, locals, &mut found, threads)?;
+        Ok(found)
+    }
+
+    /// Puts what groups of local blocks that are held have to do with each other where it belongs, from the normal equations formed again.
+    fn put_together(
+        &self,
+        problem: &AnyProblem<'_>,
+        observation_sd: &[f64],
+        locals: &[usize],
+        found: &mut [LocalCofactors],
+        threads: &Threads,
+    ) -> Result<(), AdjustError> {
+        let apart = |local: usize| problem.layout().stands_apart(local);
+        if !locals.iter().any(|&local| apart(local)) {
+            return Ok(());
+        }
+        let (_, asked, _) = self.equations(problem, observation_sd, threads);
+        let (values, held, mut on) = (self.values.clone(), self.held.clone(), |_| ControlFlow::Continue(()));
+        let formed = Linearized::form(problem, None, values, held, threads, &mut on)?;
+        for (&local, own) in locals.iter().zip(found).filter(|&(&local, _)| apart(local)) {
+            let functions = problem.system.local_functions(&asked, local);
+            let cofactors = match formed.cofactors(problem, &functions, None, None, threads, &mut on) {
+                Err(CofactorError::Adjust(error)) => return Err(error),
+                found => found.unwrap_or_default(),
+            };
+            let (count, rows) = (functions.len(), own.rows());
+            for (to, from) in own.equations.chunks_exact_mut(rows).zip(cofactors.chunks_exact(count.max(1))) {
+                to[..count].copy_from_slice(from);
+            }
+        }
+        Ok(())
+    }
+
     /// What all equations of some local blocks, which take no part, have to do with each other if they did: for each two of them the
     /// inverse of their variances as the others predict them, but for what the local block takes up.
     ///
@@ -110,6 +159,9 @@ impl Leverages {
     /// * `terms`: the equations of the weighted unknowns of each, of unit weight.
     ///
     /// Empty where the local block would not be determined.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
     pub fn of_gone(
         &self,
         problem: &AnyProblem<'_>,
@@ -117,7 +169,7 @@ impl Leverages {
         locals: &[usize],
         terms: impl Fn(usize) -> Vec<f64> + Sync,
         threads: &Threads,
-    ) -> Vec<Vec<f64>> {
+    ) -> Result<Vec<Vec<f64>>, AdjustError> {
         let layout = problem.layout();
         let unknowns = || locals.iter().flat_map(|&local| layout.local_range(local));
         let (_, asked, mut prior) = self.equations(problem, observation_sd, threads);
@@ -128,15 +180,18 @@ impl Leverages {
         }
         let of = |&local: &usize| {
             let own_terms = terms(local);
-            let own =
-                problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &own_terms);
+            problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &own_terms)
+        };
+        let mut found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
+        self.put_together(problem, observation_sd, locals, &mut found, threads)?;
+        let shown = |own: &LocalCofactors| {
             let rows = own.rows();
             let alone = DMatrix::from_row_slice(rows, rows, &own.by_local);
             let all = DMatrix::from_row_slice(rows, rows, &own.equations);
             let factor = (DMatrix::identity(rows, rows) + all - &alone).cholesky();
             factor.map_or(vec![], |factor| (factor.inverse() - alone).as_slice().to_vec())
         };
-        threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])))
+        Ok(threads.install(|| parallel::map(found.len(), 1, |k| shown(&found[k]))))
     }
 
     /// Cofactors of the equations of some ties, with the given standard deviations.

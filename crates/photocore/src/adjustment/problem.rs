@@ -32,10 +32,10 @@ pub trait Model: Sync {
         false
     }
 
-    /// Whether groups touch other blocks at given values than the layout has, or would but for a small step: what is not there is left out of
-    /// their equations. Iterations end where it is so, and whoever made the layout makes another.
-    fn has_outgrown(&self, _unknowns: &[f64]) -> bool {
-        false
+    /// How many groups touch other blocks at given values than the layout has: what is not there is left out of their equations. Iterations end
+    /// where these are more than a few, or steps short, and whoever made the layout makes another.
+    fn outgrown(&self, _unknowns: &[f64]) -> usize {
+        0
     }
 
     /// Whether the last steps fall by a constant factor only, because second derivatives times residuals count where unknowns are determined

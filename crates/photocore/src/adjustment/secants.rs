@@ -66,12 +66,15 @@ impl ObservationEquations<'_> {
                 sum.column_mut(j).iter_mut().zip(u).for_each(|(sum, u)| *sum += weight * u * v);
             }
         };
-        let of_unknown =
-            |unknown: usize| steps.iter().map(|step| step[unknown]).collect::<SmallVec<[f64; 16]>>();
+        // Unknown by unknown.
+        let unknowns = 0..steps.first().map_or(0, |step| step.len());
+        let turned: Vec<f64> = unknowns.flat_map(|k| steps.iter().map(move |step| step[k])).collect();
+        let of_unknown = |unknown: usize| &turned[unknown * steps.len()..][..steps.len()];
         let changes = |taken: &mut dyn Iterator<Item = (usize, f64)>| {
             let mut changes = SmallVec::<[f64; 16]>::from_elem(0.0, steps.len());
-            taken
-                .for_each(|(k, a)| changes.iter_mut().zip(steps).for_each(|(sum, step)| *sum += a * step[k]));
+            taken.for_each(|(k, a)| {
+                changes.iter_mut().zip(of_unknown(k)).for_each(|(sum, change)| *sum += a * change);
+            });
             changes
         };
         let observed = self.problem().for_stretches(threads, |buffers, locals| {
@@ -91,12 +94,12 @@ impl ObservationEquations<'_> {
         });
         for (unknown, &weight) in prior.weight.iter().enumerate().filter(|&(_, &weight)| weight != 0.0) {
             let own = of_unknown(unknown);
-            add(&mut sum, weight, &own, &own);
+            add(&mut sum, weight, own, own);
         }
         for &(i, j, weight) in &prior.between {
             let (own, other) = (of_unknown(i), of_unknown(j));
-            add(&mut sum, weight, &own, &other);
-            add(&mut sum, weight, &other, &own);
+            add(&mut sum, weight, own, other);
+            add(&mut sum, weight, other, own);
         }
         sum
     }

@@ -34,8 +34,9 @@ impl Buffers {
     }
 }
 
-/// Local blocks that a thread takes at least.
+/// Local blocks that a thread takes at least, fewer where they have more groups than this in the mean.
 const AT_LEAST: usize = 64;
+const GROUPS: usize = 32;
 
 impl AnyProblem<'_> {
     /// What `each` makes of every local block, in their order.
@@ -44,7 +45,7 @@ impl AnyProblem<'_> {
         threads: &Threads,
         each: impl Fn(&mut Buffers, usize) -> T + Sync,
     ) -> Vec<T> {
-        by_parts(threads, self.layout().locals(), AT_LEAST, each)
+        by_parts(threads, self.layout().locals(), self.at_least(), each)
     }
 
     /// What `each` makes of stretches of local blocks, in their order.
@@ -53,10 +54,16 @@ impl AnyProblem<'_> {
         threads: &Threads,
         each: impl Fn(&mut Buffers, Range<usize>) -> T + Sync,
     ) -> Vec<T> {
-        let count = self.layout().locals();
-        let stretch = |index: usize| index * AT_LEAST..count.min((index + 1) * AT_LEAST);
+        let (count, length) = (self.layout().locals(), self.at_least());
+        let stretch = |index: usize| index * length..count.min((index + 1) * length);
         let each = |buffers: &mut Buffers, index: usize| each(buffers, stretch(index));
-        by_parts(threads, count.div_ceil(AT_LEAST), 1, each)
+        by_parts(threads, count.div_ceil(length), 1, each)
+    }
+
+    /// Local blocks that a thread takes at least.
+    fn at_least(&self) -> usize {
+        let (locals, groups) = (self.layout().locals(), self.layout().groups());
+        (AT_LEAST * GROUPS * locals / groups.max(1)).clamp(1, AT_LEAST)
     }
 
     /// What `each` makes of every tie, in their order: there are few.

@@ -138,14 +138,12 @@ impl Trial {
             rows.flat_map(|row| own.cofactors[row * count..][starts[j]..starts[j + 1]].to_vec()).collect()
         };
         let mut found = vec![];
-        for j in 0..own.suspects.len() {
-            for i in 0..j {
-                let out =
-                    |k: usize| !self.suspects.all[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
-                if out(i) || out(j) {
-                    continue;
-                }
-                let rho = canonical_correlation(&block(i, i), &block(j, j), &block(i, j));
+        let is_in = |&k: &usize| self.suspects.all[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
+        let taking_part: Vec<usize> = (0..own.suspects.len()).filter(is_in).collect();
+        let alone: Vec<Vec<f64>> = (0..own.suspects.len()).map(|k| block(k, k)).collect();
+        for (at, &j) in taking_part.iter().enumerate() {
+            for &i in &taking_part[..at] {
+                let rho = canonical_correlation(&alone[i], &alone[j], &block(i, j));
                 if rho > limit {
                     found.push((own.suspects[i], own.suspects[j], rho));
                 }

@@ -41,9 +41,6 @@ impl Bundle {
     }
 }
 
-/// One image of so many may lack knots on the way: its equations leave them out.
-const FEW: usize = 20;
-
 impl Model for Bundle {
     fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
         Box::new(At { bundle: self, stations: self.evaluated(unknowns) })
@@ -108,8 +105,8 @@ impl Model for Bundle {
         !self.passages.lenses().is_empty()
     }
 
-    fn has_outgrown(&self, unknowns: &[f64]) -> bool {
-        self.beyond_windows(unknowns) > self.images.len() / FEW
+    fn outgrown(&self, unknowns: &[f64]) -> usize {
+        self.beyond_windows(unknowns)
     }
 
     /// Straight rays turn and stretch with everything else; what a frame carries may have known lengths.

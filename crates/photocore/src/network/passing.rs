@@ -48,14 +48,28 @@ impl Columns {
     /// Adds the partials of the computed position by one of the unknowns at a place.
     #[inline]
     fn add(&self, rows: &mut GroupRows<'_>, place: InBlock, k: usize, by: [f64; 2]) {
-        let slot = self.slots.iter().find(|slot| slot.block == place.block);
-        let (to, start) = match slot.map(|slot| slot.first) {
-            Some(Some(first)) => (&mut *rows.shared, first),
-            Some(None) => (&mut *rows.retained, 0),
-            None => return,
+        if let Some(slot) = self.slot(place.block, 0) {
+            self.add_at(rows, slot, place.first + k, by);
+        }
+    }
+
+    /// The slot of a block, looked for from some slot on.
+    #[inline]
+    fn slot(&self, block: usize, from: usize) -> Option<usize> {
+        let is_it = |slot: &Slot| slot.block == block;
+        let (before, after) = self.slots.split_at(from);
+        after.iter().position(is_it).map(|place| from + place).or_else(|| before.iter().position(is_it))
+    }
+
+    /// Adds the partials of the computed position by an unknown of the block of a slot.
+    #[inline]
+    fn add_at(&self, rows: &mut GroupRows<'_>, slot: usize, k: usize, by: [f64; 2]) {
+        let (to, start) = match self.slots[slot].first {
+            Some(first) => (&mut *rows.shared, first),
+            None => (&mut *rows.retained, 0),
         };
         let width = to.len() / 2;
-        (0..2).for_each(|row| to[width * row + start + place.first + k] += by[row]);
+        (0..2).for_each(|row| to[width * row + start + k] += by[row]);
     }
 
     /// Makes room for the equations of pose, point and camera alone of so many images.
@@ -218,7 +232,7 @@ impl Bundle {
         });
     }
 
-    /// Writes the equations of images of one photo side by side, where all of them pass the same; false where they may not.
+    /// Writes the equations of images of one photo side by side, all of which touch the same blocks; false where there is no such way.
     pub(super) fn observe_all_passing(
         &self,
         at: (&Stations, &Bent),
@@ -228,8 +242,7 @@ impl Bundle {
     ) -> bool {
         let (stations, bent) = at;
         let (first, count) = (groups[0] as usize, groups.len());
-        let photo = self.images[first].photo;
-        if self.passages.is_empty() || !self.pass_alike(photo) || bent.mounted.is_some() || count < FEWEST {
+        if self.passages.is_empty() || bent.mounted.is_some() || count < FEWEST {
             return false;
         }
         let columns = self.columns(first, rows.shared.len() / (2 * count));
@@ -331,10 +344,15 @@ impl Bundle {
         let (Some(lens), Some(camera)) = (lens, camera) else { return };
         let Some(patch) = camera.patch(&self.sight_bent((stations, bent), group, local)) else { return };
         let [fx, fy, ..] = camera.parameters();
+        let mut last = 0;
         for (knot, weight) in patch.knots(camera.columns()) {
-            if let Some(place) = self.blocks.of_common[self.passages.lenses()[lens].commons[knot]] {
-                columns.add(rows, place, 0, [fx * weight, 0.0]);
-                columns.add(rows, place, 1, [0.0, fy * weight]);
+            let place = self.blocks.of_common[self.passages.lenses()[lens].commons[knot]];
+            if let Some((InBlock { first, .. }, slot)) =
+                place.and_then(|place| Some((place, columns.slot(place.block, last)?)))
+            {
+                columns.add_at(rows, slot, first, [fx * weight, 0.0]);
+                columns.add_at(rows, slot, first + 1, [0.0, fy * weight]);
+                last = slot;
             }
         }
     }

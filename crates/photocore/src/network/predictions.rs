@@ -159,7 +159,8 @@ impl Trial {
         let terms = self.terms(sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_locals(problem, observation_sd, &places, further, threads);
+        let cofactors = found.of_locals_together(problem, observation_sd, &places, further, threads);
+        let cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?;
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next());
@@ -187,6 +188,7 @@ impl Trial {
         let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
         let cofactors = found.of_gone(problem, given, &places, further, threads);
+        let cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?;
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {
             let known = self.local(point).and_then(|_| found_at.next()).filter(|(_, own)| !own.is_empty());

@@ -57,7 +57,7 @@ impl Formation<'_> {
                 sums.cached = control.allocated(reserved(numbers))?;
             }
         }
-        if batches.locals() < MANY || rayon::current_num_threads() == 1 {
+        if batches.units() < MANY || rayon::current_num_threads() == 1 {
             self.assemble_in_turn(front, batches, &mut sums);
             return Some(sums);
         }
@@ -76,7 +76,7 @@ impl Formation<'_> {
             });
             for batch in filled {
                 sums.add(batch);
-                if self.caches {
+                if self.caches && !batch.apart {
                     batch.cache(layout, &mut sums.cached);
                 }
             }
@@ -98,7 +98,7 @@ impl Formation<'_> {
             self.fill(&mut batch, run);
             batch.add_to(&mut front.columns(), layout);
             sums.add(&mut batch);
-            if self.caches {
+            if self.caches && !batch.apart {
                 batch.cache_in_place(layout);
             }
         }
@@ -112,7 +112,7 @@ impl Formation<'_> {
     fn fill(&self, batch: &mut Batch, run: &[u32]) {
         batch.gather(self.equations, self.system, run);
         batch.eliminate(&self.system.layout, self.prior, self.damping);
-        self.control.count(run.len());
+        self.system.count(run, self.control);
     }
 
     /// The first columns of the shares of a front that several threads add to, each a few blocks.

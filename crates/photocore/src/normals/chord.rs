@@ -72,11 +72,13 @@ impl System {
         for run in self.incidence.batches_at(index).iter().take_while(|_| !control.stopped()) {
             batch.gather(equations, self, run);
             batch.eliminate_from_rights(&self.layout, prior);
-            found.own.extend_from_slice(batch.reduced.as_chunks().0);
+            if !batch.apart {
+                found.own.extend_from_slice(batch.reduced.as_chunks().0);
+            }
             let start = found.values.len();
             batch.ranges(&self.symbolic).for_each(|range| found.room(0, range));
             batch.add_rights_of_others(&self.layout, found.values[start..].as_flattened_mut());
-            control.count(run.len());
+            self.count(run, control);
         }
         self.workspace.put_back_batch(batch);
         found

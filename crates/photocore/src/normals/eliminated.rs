@@ -220,7 +220,7 @@ type Part<'a> = (usize, Batches<'a>);
 impl Elimination<'_> {
     /// All batches in the order of the incidence: what is cached at a supernode is read from its start.
     pub fn parts(&self) -> Vec<Part<'_>> {
-        let at = |node: usize| self.system.incidence.batches_at(node);
+        let at = |node: usize| self.system.incidence.batches_of_locals_at(node);
         let nodes = 0..=self.system.symbolic.supernode_count();
         match self.cached.is_empty() {
             true => nodes
@@ -282,7 +282,7 @@ impl Elimination<'_> {
         let solve = |reader: &mut Reader<'_>, ((node, batches), mut own): (Part<'_>, Vec<[f64; C]>)| {
             let mut at = 0;
             reader.begin(node);
-            own.reserve(if is_given { 0 } else { batches.locals() * layout.local_dim() });
+            own.reserve(if is_given { 0 } else { batches.units() * layout.local_dim() });
             for locals in batches.iter().take_while(|_| !self.control.stopped()) {
                 let (batch, count) = (reader.next(locals), locals.len() * layout.local_dim());
                 for others in others {

@@ -1,11 +1,13 @@
 //! What the equations of one local block take up together, from the selected inverse.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 use super::equations::{Equations, GroupRows, Prior};
+use super::functions::Function;
 use super::selected::SelectedInverse;
 use super::system::System;
 
@@ -20,7 +22,7 @@ struct Own {
 /// Cofactors of equations a of one local block, whether or not they take part: with Q the inverse normal matrix.
 #[derive(Debug, Clone)]
 pub struct LocalCofactors {
-    /// a Q a^T of every two equations: square, row by row.
+    /// a Q a^T of every two equations: square, row by row; NaN of two groups of a local block that is held ([`System::local_functions`]).
     pub equations: Vec<f64>,
     /// The same with all unknowns known but those of the local block.
     pub by_local: Vec<f64>,
@@ -63,8 +65,12 @@ impl System {
         local: usize,
         terms: &[f64],
     ) -> LocalCofactors {
-        let formed = self.own_equations(equations, local, &[]);
-        let Own { local: a, others: b, blocks } = self.own_equations(asked, local, terms);
+        let groups = self.layout.groups_of(local);
+        if self.layout.stands_apart(local) {
+            return self.cofactors_apart(selected, asked, local, groups, terms.len());
+        }
+        let formed = self.own_equations(equations, local, groups.clone(), &[]);
+        let Own { local: a, others: b, blocks } = self.own_equations(asked, local, groups, terms);
         let (rows, dim) = (a.nrows(), a.ncols());
         let mut normal = formed.local.transpose() * &formed.local;
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
@@ -74,15 +80,7 @@ impl System {
         let coupling = factor.solve(formed.local.transpose() * &formed.others);
         let by_local = factor.solve(a.transpose());
         let c = &b - &a * &coupling;
-        let mut q = Mat::<f64>::zeros(b.ncols(), b.ncols());
-        for (&row, &first) in &blocks {
-            for (&column, &left) in &blocks {
-                let values = selected.block(row, column).unwrap_or_default();
-                let width = self.layout.retained_dim(column);
-                values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
-            }
-        }
-        let others = q * c.transpose();
+        let others = self.inverse_over(selected, &blocks, b.ncols()) * c.transpose();
         let alone = &a * &by_local;
         let found = &c * &others + &alone;
         let own = by_local - coupling * &others;
@@ -98,9 +96,79 @@ impl System {
         }
     }
 
-    fn own_equations(&self, equations: &dyn Equations, local: usize, terms: &[f64]) -> Own {
+    /// The same of a local block that is held, group by group; further equations of its unknowns, so many numbers, take up nothing.
+    fn cofactors_apart(
+        &self,
+        selected: &SelectedInverse,
+        asked: &dyn Equations,
+        local: usize,
+        groups: Range<usize>,
+        terms: usize,
+    ) -> LocalCofactors {
+        let (rows, dim) = (self.layout.rows(), self.layout.local_dim());
+        let (of_groups, count) = (groups.len() * rows, groups.len() * rows + terms / dim);
+        let known = |k: usize| if k / count < of_groups && k % count < of_groups { f64::NAN } else { 0.0 };
+        let mut equations: Vec<f64> = (0..count * count).map(known).collect();
+        let mut others: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for (first, group) in (0..).step_by(rows).zip(groups) {
+            let Own { others: b, blocks, .. } = self.own_equations(asked, local, group..group + 1, &[]);
+            let along = self.inverse_over(selected, &blocks, b.ncols()) * b.transpose();
+            let found = &b * &along;
+            for (i, j) in (0..rows * rows).map(|k| (k / rows, k % rows)) {
+                equations[(first + i) * count + first + j] = found[(i, j)];
+            }
+            for (&block, &start) in &blocks {
+                let width = self.layout.retained_dim(block);
+                let of_block = others.entry(block).or_insert_with(|| vec![f64::NAN; count * width]);
+                let own = &mut of_block[first * width..][..rows * width];
+                own.iter_mut().enumerate().for_each(|(k, to)| *to = along[(start + k % width, k / width)]);
+            }
+        }
+        let [by_local, local] = [count * count, count * dim].map(|length| vec![0.0; length]);
+        LocalCofactors { equations, by_local, local, others: others.into_iter().collect() }
+    }
+
+    /// The equations of a local block as functions of the unknowns that are not local.
+    pub fn local_functions(&self, equations: &dyn Equations, local: usize) -> Vec<Function> {
+        let Own { others, blocks, .. } =
+            self.own_equations(equations, local, self.layout.groups_of(local), &[]);
+        let columns = blocks.keys().flat_map(|&block| self.layout.retained_range(block));
+        let columns: Vec<usize> = columns.collect();
+        let function = |row: usize| {
+            let taken = columns.iter().enumerate().map(|(k, &unknown)| (unknown, others[(row, k)]));
+            taken.filter(|&(_, value)| value != 0.0).collect()
+        };
+        (0..others.nrows()).map(function).collect()
+    }
+
+    /// The inverse over some blocks, each from a row and column on; zero outside the pattern.
+    fn inverse_over(
+        &self,
+        selected: &SelectedInverse,
+        blocks: &BTreeMap<usize, usize>,
+        order: usize,
+    ) -> Mat<f64> {
+        let mut q = Mat::<f64>::zeros(order, order);
+        for (&row, &first) in blocks {
+            for (&column, &left) in blocks {
+                let values = selected.block(row, column).unwrap_or_default();
+                let width = self.layout.retained_dim(column);
+                values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
+            }
+        }
+        q
+    }
+
+    /// Some groups of a local block, and further equations of its unknowns.
+    fn own_equations(
+        &self,
+        equations: &dyn Equations,
+        local: usize,
+        groups: Range<usize>,
+        terms: &[f64],
+    ) -> Own {
         let layout = &self.layout;
-        let (rows, l, groups) = (layout.rows(), layout.local_dim(), layout.groups_of(local));
+        let (rows, l) = (layout.rows(), layout.local_dim());
         let touched = groups.clone().flat_map(|group| layout.blocks_of(group));
         let mut blocks: BTreeMap<usize, usize> = touched.map(|block| (block, 0)).collect();
         let (mut width, mut columns) = (0, BTreeMap::new());

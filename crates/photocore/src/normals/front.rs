@@ -158,6 +158,44 @@ impl Columns<'_> {
         add_right(simd, &mut self.right[own], diagonal, 1.0, a.rows, b);
     }
 
+    /// Adds a block, column by column with its stride: its rows and its columns belong to so many of the front from one on, and it is transposed
+    /// there where it would stand above the diagonal. On the diagonal it is its lower triangle. What goes to other columns is left out.
+    #[inline]
+    pub fn add_block(
+        &mut self,
+        (row, height): (usize, usize),
+        (column, width): (usize, usize),
+        (block, stride): (&[f64], usize),
+    ) {
+        if row < column {
+            for i in self.own(row, height) {
+                let own = self.target(column, row + i).0[..width].iter_mut();
+                own.zip(block[i..].iter().step_by(stride)).for_each(|(sum, value)| *sum += value);
+            }
+            return;
+        }
+        for j in self.own(column, width) {
+            let above = if row == column { j } else { 0 };
+            let own = self.target(row + above, column + j).0[..height - above].iter_mut();
+            own.zip(&block[j * stride + above..]).for_each(|(sum, value)| *sum += value);
+        }
+    }
+
+    /// Adds to the right-hand side from a row of the front on, and to the diagonal before elimination, where these columns are.
+    #[inline]
+    pub fn add_to_right(&mut self, row: usize, values: &[f64], square: impl Fn(usize) -> f64) {
+        for i in self.own(row, values.len()) {
+            self.right[row + i - self.columns.start] += values[i];
+            self.diagonal[row + i - self.columns.start] += square(i);
+        }
+    }
+
+    /// Which of so many columns of the front from one on are among these.
+    fn own(&self, first: usize, count: usize) -> Range<usize> {
+        let place = |column: usize| column.saturating_sub(first).min(count);
+        place(self.columns.start)..place(self.columns.end)
+    }
+
     /// Takes A^T b off the right-hand side.
     #[inline(always)]
     pub fn subtract_right<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {

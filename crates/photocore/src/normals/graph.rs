@@ -26,7 +26,7 @@ impl Graph {
         for (index, tie) in ties.iter().enumerate() {
             tie.iter().for_each(|&block| ties_of[block as usize].push(index));
         }
-        let (local_ptr, locals) = locals_by_block(layout);
+        let (unit_ptr, units) = units_by_block(layout);
         let joined = |seen_by: &mut Vec<u32>, block: usize| {
             let mut neighbours = Vec::new();
             seen_by[block] = block as u32;
@@ -35,9 +35,9 @@ impl Graph {
                     neighbours.push(other);
                 }
             };
-            for &local in &locals[local_ptr[block]..local_ptr[block + 1]] {
-                layout.main_blocks_of(local as usize).iter().copied().for_each(&mut join);
-                layout.all_shared_of(local as usize).iter().copied().for_each(&mut join);
+            for &unit in &units[unit_ptr[block]..unit_ptr[block + 1]] {
+                layout.main_blocks_of(unit as usize).iter().copied().for_each(&mut join);
+                layout.all_shared_of(unit as usize).iter().copied().for_each(&mut join);
             }
             for &tie in &ties_of[block] {
                 ties[tie].iter().copied().for_each(&mut join);
@@ -145,15 +145,15 @@ impl Graph {
     }
 }
 
-/// Where the local blocks of every retained block start, and these, each once.
-fn locals_by_block(layout: &Layout) -> (Vec<usize>, Vec<u32>) {
+/// Where the units of every retained block start, and these, each once.
+fn units_by_block(layout: &Layout) -> (Vec<usize>, Vec<u32>) {
     let mut last = vec![u32::MAX; layout.retained()];
     let mut each = |take: &mut dyn FnMut(usize, u32)| {
         last.fill(u32::MAX);
-        for local in 0..layout.locals() {
-            for &block in layout.main_blocks_of(local).iter().chain(layout.all_shared_of(local)) {
-                if std::mem::replace(&mut last[block as usize], local as u32) != local as u32 {
-                    take(block as usize, local as u32);
+        for unit in 0..layout.units() {
+            for &block in layout.main_blocks_of(unit).iter().chain(layout.all_shared_of(unit)) {
+                if std::mem::replace(&mut last[block as usize], unit as u32) != unit as u32 {
+                    take(block as usize, unit as u32);
                 }
             }
         }
@@ -161,10 +161,10 @@ fn locals_by_block(layout: &Layout) -> (Vec<usize>, Vec<u32>) {
     let mut ptr = vec![0; layout.retained() + 1];
     each(&mut |block, _| ptr[block + 1] += 1);
     (0..layout.retained()).for_each(|block| ptr[block + 1] += ptr[block]);
-    let (mut next, mut locals) = (ptr.clone(), vec![0; ptr[layout.retained()]]);
-    each(&mut |block, local| {
-        locals[next[block]] = local;
+    let (mut next, mut units) = (ptr.clone(), vec![0; ptr[layout.retained()]]);
+    each(&mut |block, unit| {
+        units[next[block]] = unit;
         next[block] += 1;
     });
-    (ptr, locals)
+    (ptr, units)
 }

@@ -13,27 +13,27 @@ use crate::parallel;
 /// Local blocks from which on several threads sort them, and how many of them are taken together.
 const MANY: usize = 10_000;
 const TOGETHER: usize = 2048;
-/// Local blocks that are eliminated side by side at the most: their equations stay in the cache.
+/// Units that are eliminated side by side at the most: their equations stay in the cache.
 const MOST: usize = 16;
 
-/// The groups of every local block by the position of their main blocks in the order of elimination, and the local blocks by
-/// their *assembly node*: the supernode of the first position of all retained blocks they touch. All of them are in the pattern of
-/// the node, so that what the elimination of the local block leaves goes into one front.
+/// The groups of every local block by the position of their main blocks in the order of elimination, and the units of the layout by their
+/// *assembly node*: the supernode of the first position of all retained blocks they touch. All of them are in the pattern of the node, so
+/// that what the elimination of the unit leaves goes into one front.
 #[derive(Debug)]
 pub(super) struct Incidence {
     groups: Vec<u32>,
     positions: Vec<u32>,
-    /// The local blocks by node, those of the same pattern side by side.
+    /// The units by node, those of the same pattern side by side.
     by_node: Vec<u32>,
-    /// Where those of each supernode start; then those that have no equations.
+    /// Where the local blocks and, behind them, the groups apart of each supernode start; then those that have no equations.
     node_ptr: Vec<usize>,
-    /// Where each batch starts: a run of blocks of one node whose equations touch the same unknowns in the same way.
+    /// Where each batch starts: a run of units of one node whose equations touch the same unknowns in the same way.
     batch_ptr: Vec<usize>,
     /// What each of the groups has in common with others, as a number; empty where none has anything.
     commons: Vec<u32>,
     /// One group that has it, of each of these.
     group_with: Vec<u32>,
-    /// All that the groups of each local block have in common with others, as the number of a set; empty where none has anything.
+    /// All that the groups of each unit have in common with others, as the number of a set; empty where none has anything.
     sets: Vec<u32>,
     /// What is in each set, ascending: photos of two cameras alternate, and see points with one before the other or after it.
     members: Vec<Vec<u32>>,
@@ -55,11 +55,11 @@ impl Incidence {
         let positions: Vec<u32> = sorted().map(|&[position, _]| position).collect();
         let groups: Vec<u32> = sorted().map(|&[_, group]| group).collect();
         let mut keyed: Vec<Keyed> = pieces.iter().flat_map(|(_, keyed)| keyed).copied().collect();
-        let shared = |local: u32| {
-            let own = if layout.has_shared() { layout.groups_of(local as usize) } else { 0..0 };
+        let shared = |unit: u32| {
+            let own = if layout.has_shared() { layout.groups_of_unit(unit as usize) } else { 0..0 };
             groups[own].iter().map(|&group| layout.shared_of(group as usize))
         };
-        let own = |local: u32| &positions[layout.groups_of(local as usize)];
+        let own = |unit: u32| &positions[layout.groups_of_unit(unit as usize)];
         let compare = |&(first, a): &Keyed, &(second, b): &Keyed| {
             let in_full = || own(a).cmp(own(b)).then_with(|| shared(a).cmp(shared(b)));
             first.cmp(&second).then_with(in_full).then(a.cmp(&b))
@@ -69,8 +69,8 @@ impl Incidence {
         } else {
             keyed.sort_unstable_by(compare);
         }
-        let by_node = keyed.iter().map(|&(_, local)| local).collect();
-        let mut node_ptr = vec![0; symbolic.supernode_count() + 2];
+        let by_node = keyed.iter().map(|&(_, unit)| unit).collect();
+        let mut node_ptr = vec![0; 2 * symbolic.supernode_count() + 3];
         keyed.iter().for_each(|&(key, _)| node_ptr[(key >> HOME) as usize + 1] += 1);
         for index in 1..node_ptr.len() {
             node_ptr[index] += node_ptr[index - 1];
@@ -97,12 +97,12 @@ impl Incidence {
         incidence
     }
 
-    /// Numbers the sets of what the groups of local blocks have in common with others. Neighbours nearly always have the same.
+    /// Numbers the sets of what the groups of units have in common with others. Neighbours nearly always have the same.
     fn find_sets(&mut self, layout: &Layout) {
         let mut known: HashMap<SmallVec<[u32; 16]>, u32> = HashMap::from([(SmallVec::new(), 0)]);
-        let (mut sets, mut members, mut last) = (vec![0; layout.locals()], vec![Vec::new()], 0);
-        for locals in self.batches().iter() {
-            let mut own = SmallVec::from(self.commons_of(layout, locals[0] as usize));
+        let (mut sets, mut members, mut last) = (vec![0; layout.units()], vec![Vec::new()], 0);
+        for units in self.batches().iter() {
+            let mut own = SmallVec::from(self.commons_of(layout, units[0] as usize));
             own.sort_unstable();
             own.dedup();
             if members[last as usize][..] != own[..] {
@@ -111,35 +111,36 @@ impl Incidence {
                     members.len() as u32 - 1
                 });
             }
-            locals.iter().for_each(|&local| sets[local as usize] = last);
+            units.iter().for_each(|&unit| sets[unit as usize] = last);
         }
         (self.sets, self.members) = (sets, members);
     }
 
-    /// Whether the equations of two local blocks touch the same unknowns in the same way.
+    /// Whether the equations of two units touch the same unknowns in the same way.
     fn alike(&self, layout: &Layout, a: usize, b: usize) -> bool {
-        self.positions_of(layout, a) == self.positions_of(layout, b)
+        layout.is_apart(a) == layout.is_apart(b)
+            && self.positions_of(layout, a) == self.positions_of(layout, b)
             && self.commons_of(layout, a) == self.commons_of(layout, b)
     }
 
-    /// The groups of a local block, by position.
-    pub fn groups_of(&self, layout: &Layout, local: usize) -> &[u32] {
-        &self.groups[layout.groups_of(local)]
+    /// The groups of a unit, by position.
+    pub fn groups_of(&self, layout: &Layout, unit: usize) -> &[u32] {
+        &self.groups[layout.groups_of_unit(unit)]
     }
 
-    /// The positions of the main blocks of the groups of a local block.
-    pub fn positions_of(&self, layout: &Layout, local: usize) -> &[u32] {
-        &self.positions[layout.groups_of(local)]
+    /// The positions of the main blocks of the groups of a unit.
+    pub fn positions_of(&self, layout: &Layout, unit: usize) -> &[u32] {
+        &self.positions[layout.groups_of_unit(unit)]
     }
 
-    /// What each group of a local block has in common with others, as a number; empty where none has anything.
-    pub fn commons_of(&self, layout: &Layout, local: usize) -> &[u32] {
-        self.commons.get(layout.groups_of(local)).unwrap_or_default()
+    /// What each group of a unit has in common with others, as a number; empty where none has anything.
+    pub fn commons_of(&self, layout: &Layout, unit: usize) -> &[u32] {
+        self.commons.get(layout.groups_of_unit(unit)).unwrap_or_default()
     }
 
-    /// The set of all that the groups of a local block have in common with others.
-    pub fn set_of(&self, local: usize) -> u32 {
-        self.sets.get(local).copied().unwrap_or_default()
+    /// The set of all that the groups of a unit have in common with others.
+    pub fn set_of(&self, unit: usize) -> u32 {
+        self.sets.get(unit).copied().unwrap_or_default()
     }
 
     /// What is in a set, ascending.
@@ -152,21 +153,30 @@ impl Incidence {
         self.group_with[shared as usize] as usize
     }
 
-    /// The local blocks whose node is a supernode; after the last supernode those without equations.
-    pub fn locals_at(&self, supernode: usize) -> &[u32] {
-        &self.by_node[self.node_ptr[supernode]..self.node_ptr[supernode + 1]]
+    /// The units whose node is a supernode; after the last supernode those without equations.
+    pub fn units_at(&self, supernode: usize) -> &[u32] {
+        &self.by_node[self.node_ptr[2 * supernode]..self.node_ptr[2 * supernode + 2]]
     }
 
     /// All batches, by node.
-    pub fn batches(&self) -> Batches<'_> {
-        Batches { locals: &self.by_node, ptr: &self.batch_ptr }
+    fn batches(&self) -> Batches<'_> {
+        Batches { units: &self.by_node, ptr: &self.batch_ptr }
     }
 
-    /// The batches of a supernode; after the last supernode those of the local blocks without equations.
+    /// The batches of a supernode; after the last supernode those of the units without equations.
     pub fn batches_at(&self, supernode: usize) -> Batches<'_> {
+        self.batches_between(2 * supernode..2 * supernode + 2)
+    }
+
+    /// Of these those of local blocks, whose elimination leaves something to others.
+    pub fn batches_of_locals_at(&self, supernode: usize) -> Batches<'_> {
+        self.batches_between(2 * supernode..2 * supernode + 1)
+    }
+
+    fn batches_between(&self, nodes: Range<usize>) -> Batches<'_> {
         let place = |start: usize| self.batch_ptr.partition_point(|&end| end < start);
-        let (first, last) = (place(self.node_ptr[supernode]), place(self.node_ptr[supernode + 1]));
-        Batches { locals: &self.by_node, ptr: &self.batch_ptr[first..=last] }
+        let (first, last) = (place(self.node_ptr[nodes.start]), place(self.node_ptr[nodes.end]));
+        Batches { units: &self.by_node, ptr: &self.batch_ptr[first..=last] }
     }
 }
 
@@ -197,31 +207,41 @@ fn commons(layout: &Layout) -> (Vec<u32>, Vec<u32>) {
     (numbers, group_with)
 }
 
-/// A local block, and what it is sorted by before all else: its node, and the first three of its positions, zero where there are fewer.
+/// A unit, and what it is sorted by before all else: its node and whether it is a group apart, and the first three of its positions, zero
+/// where there are fewer.
 type Keyed = (u128, u32);
 
 /// Bits of a key below the node.
 const HOME: u32 = 96;
 
-/// The positions and groups of some local blocks, by position, and the keys of these blocks.
+/// The positions and groups of some local blocks, by position unless they stand apart, and the keys of their units.
 fn placed(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u32; 2]>, Vec<Keyed>) {
     let (mut sorted, mut keyed) = (Vec::new(), Vec::with_capacity(locals.len()));
+    let key = |unit: usize, own: &[[u32; 2]]| {
+        let node = node(layout, symbolic, unit, own.first().map(|&[position, _]| position as usize));
+        let home = 2 * node as u128 + u128::from(layout.is_apart(unit));
+        let first = |key: u128, k: usize| key << 32 | own.get(k).map_or(0, |own| u128::from(own[0]) + 1);
+        ((0..3).fold(home, first), unit as u32)
+    };
     for local in locals {
         let start = sorted.len();
         let place = |g: usize| [symbolic.position(layout.retained_of(g)) as u32, g as u32];
         sorted.extend(layout.groups_of(local).map(place));
-        let own = &mut sorted[start..];
-        own.sort_unstable();
-        let node = node(layout, symbolic, local, own.first().map(|&[position, _]| position as usize));
-        let first = |key: u128, k: usize| key << 32 | own.get(k).map_or(0, |own| u128::from(own[0]) + 1);
-        keyed.push(((0..3).fold(node as u128, first), local as u32));
+        let (own, apart) = (&mut sorted[start..], layout.apart_of(local));
+        if apart.is_empty() {
+            own.sort_unstable();
+            keyed.push(key(local, own));
+        } else {
+            keyed.push(key(local, &[]));
+            keyed.extend(apart.zip(own.chunks(1)).map(|(unit, own)| key(unit, own)));
+        }
     }
     (sorted, keyed)
 }
 
-/// The node of a local block, from the first position of its main blocks; after the last supernode where it has no equations.
-fn node(layout: &Layout, symbolic: &Symbolic, local: usize, first: Option<usize>) -> usize {
-    let shared = layout.all_shared_of(local).iter().map(|&block| symbolic.position(block as usize));
+/// The node of a unit, from the first position of its main blocks; after the last supernode where it has no equations.
+fn node(layout: &Layout, symbolic: &Symbolic, unit: usize, first: Option<usize>) -> usize {
+    let shared = layout.all_shared_of(unit).iter().map(|&block| symbolic.position(block as usize));
     let first = shared.chain(first).min();
     first.map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
 }
@@ -229,18 +249,18 @@ fn node(layout: &Layout, symbolic: &Symbolic, local: usize, first: Option<usize>
 /// Consecutive batches.
 #[derive(Clone, Copy)]
 pub(super) struct Batches<'a> {
-    locals: &'a [u32],
+    units: &'a [u32],
     ptr: &'a [usize],
 }
 
 impl<'a> Batches<'a> {
-    /// Their local blocks, batch by batch.
+    /// Their units, batch by batch.
     pub fn iter(self) -> impl Iterator<Item = &'a [u32]> {
-        self.ptr.windows(2).map(move |ends| &self.locals[ends[0]..ends[1]])
+        self.ptr.windows(2).map(move |ends| &self.units[ends[0]..ends[1]])
     }
 
-    /// How many local blocks they have.
-    pub fn locals(self) -> usize {
+    /// How many units they have.
+    pub fn units(self) -> usize {
         self.ptr[self.ptr.len() - 1] - self.ptr[0]
     }
 

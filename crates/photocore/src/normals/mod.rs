@@ -77,6 +77,7 @@ mod room;
 mod selected;
 mod solve;
 mod substitution;
+mod supernodes;
 mod symbolic;
 mod system;
 mod tie_equations;

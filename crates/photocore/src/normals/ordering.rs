@@ -98,8 +98,7 @@ impl Ordering {
 fn dense_blocks(graph: &Graph, layout: &Layout) -> Vec<usize> {
     let count = graph.len() as f64;
     let most = (10.0 * count.sqrt()).min(0.5 * count);
-    let mut main = vec![false; graph.len()];
-    (0..layout.groups()).for_each(|group| main[layout.retained_of(group)] = true);
+    let main = layout.are_main();
     let is_dense = |&block: &usize| !main[block] && graph.degree(block) as f64 > most;
     let mut dense: Vec<usize> = (0..graph.len()).filter(is_dense).collect();
     dense.sort_by_key(|&block| graph.degree(block));

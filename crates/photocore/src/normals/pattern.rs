@@ -17,14 +17,14 @@ impl System {
             let ties = self.ties.at(front).iter().all(|&tie| have(&layout.ties()[tie as usize].retained));
             let below = &self.contributions;
             let below = below.at(front).iter().all(|&part| have(&layout.contributions()[part as usize]));
-            // Local blocks of one batch touch the same.
-            let locals = incidence.batches_at(front).iter().all(|locals| {
-                let local = locals[0] as usize;
+            // Units of one batch touch the same.
+            let units = incidence.batches_at(front).iter().all(|units| {
+                let unit = units[0] as usize;
                 let shared = |&shared: &u32| have(layout.shared_of(incidence.group_with(shared)));
-                incidence.positions_of(layout, local).iter().all(|&position| has(position as usize))
-                    && incidence.members(incidence.set_of(local)).iter().all(shared)
+                incidence.positions_of(layout, unit).iter().all(|&position| has(position as usize))
+                    && incidence.members(incidence.set_of(unit)).iter().all(shared)
             });
-            if !(children && ties && below && locals) {
+            if !(children && ties && below && units) {
                 return Err(LayoutError::Pattern { front });
             }
         }

@@ -32,5 +32,5 @@ fn numbers_of(layout: &Layout, first: usize, count: usize) -> usize {
 pub(super) fn numbers_at(incidence: &Incidence, layout: &Layout, index: usize) -> usize {
     let of_batch =
         |run: &[u32]| run.first().map_or(0, |&first| numbers_of(layout, first as usize, run.len()));
-    incidence.batches_at(index).iter().map(of_batch).sum()
+    incidence.batches_of_locals_at(index).iter().map(of_batch).sum()
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::graph::{Graph, MANY};
 use super::layout::Layout;
 use super::ordering::Ordering;
+use super::supernodes::{Merged, merge_columns, offsets, places, sort_commons};
 use crate::parallel;
 
 /// The order of elimination and the pattern of the factor of the reduced normal equations.
@@ -97,37 +98,30 @@ impl Symbolic {
 
     fn with_order(layout: &Layout, graph: &Graph, ordering: Ordering, order: &[usize]) -> Self {
         let inner = order.len() - layout.outer().len();
-        let block_at = postorder(graph, order, inner);
-        let position_of = places(&block_at);
-        let mut offset = vec![0];
-        for &block in &block_at {
-            offset.push(offset[offset.len() - 1] + layout.retained_dim(block));
-        }
-        let columns = column_patterns(graph, &block_at, &position_of);
+        let mut block_at = postorder(graph, order, inner);
+        let mut columns = column_patterns(graph, &block_at, &places(&block_at));
+        columns.truncate(inner);
+        let mut merged = merge_columns(columns, &offsets(layout, &block_at));
+        sort_commons(layout, &mut block_at, &mut merged);
         let mut symbolic = Self {
             ordering,
             predictions: Vec::new(),
-            position_of,
+            position_of: places(&block_at),
+            offset: offsets(layout, &block_at),
+            supernode_of: vec![0; block_at.len()],
             block_at,
-            offset,
-            supernode_of: Vec::new(),
             supernodes: Vec::new(),
             values: 0,
             open: None,
         };
-        symbolic.gather_supernodes(columns, inner);
+        symbolic.gather_supernodes(merged, inner);
         symbolic
     }
 
-    /// Turns column patterns into supernodes with their panels. Blocks from position `inner` on are outer ones.
-    fn gather_supernodes(&mut self, mut columns: Vec<Vec<usize>>, inner: usize) {
-        let count = columns.len();
-        self.supernode_of = vec![0; count];
+    /// Makes supernodes with their panels. Blocks from position `inner` on are outer ones.
+    fn gather_supernodes(&mut self, merged: Vec<Merged>, inner: usize) {
+        let count = self.block_at.len();
         let outer = (inner < count).then_some((inner..count, Vec::new()));
-        if outer.is_some() {
-            columns.truncate(inner);
-        }
-        let merged = merge_columns(columns, &self.offset);
         self.open = outer.is_some().then_some(merged.len());
         for (blocks, rows) in merged.into_iter().chain(outer) {
             let width = self.offset[blocks.end] - self.offset[blocks.start];
@@ -348,15 +342,6 @@ fn multiply_adds(width: usize, below: usize) -> f64 {
     w * w * w / 6.0 + w * w * r / 2.0 + w * r * r / 2.0
 }
 
-/// Where each block stands in an order.
-fn places(order: &[usize]) -> Vec<usize> {
-    let mut place = vec![0; order.len()];
-    for (k, &block) in order.iter().enumerate() {
-        place[block] = k;
-    }
-    place
-}
-
 /// Reorders so that every subtree of the elimination tree of the first `inner` blocks is contiguous, and that of all others, which
 /// become one front, too; the fill stays the same.
 fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
@@ -411,36 +396,4 @@ fn column_patterns(graph: &Graph, block_at: &[usize], position_of: &[usize]) -> 
         columns.push(pattern);
     }
     columns
-}
-
-/// Widest panel, in unknowns: wide enough that passing updates from panel to panel costs little beside the products, narrow enough that
-/// the inverse of a panel's own triangle, which one thread computes, does too.
-const WIDEST_PANEL: usize = 768;
-
-/// Joins each column with the next one when that is its parent and few explicit zeros come in (relaxed supernodes,
-/// Ashcraft and Grimes 1989). Returns the blocks and the coupled rows of each supernode.
-fn merge_columns(columns: Vec<Vec<usize>>, offset: &[usize]) -> Vec<(Range<usize>, Vec<usize>)> {
-    let dim = |position: usize| offset[position + 1] - offset[position];
-    let size = |rows: &[usize]| rows.iter().map(|&row| dim(row)).sum::<usize>();
-    let mut merged: Vec<(Range<usize>, Vec<usize>)> = Vec::new();
-    let mut filled = 0.0;
-    for (position, rows) in columns.into_iter().enumerate() {
-        let entries = |width: usize, below: usize| (width * (width + 1) / 2 + width * below) as f64;
-        let own = entries(dim(position), size(&rows));
-        if let Some((blocks, above)) = merged.last_mut() {
-            let width = offset[position + 1] - offset[blocks.start];
-            // All rows of the child but its parent stand in the parent's pattern, so the merged rows are the parent's.
-            let zeros = 1.0 - (filled + own) / entries(width, size(&rows));
-            let few = zeros < 0.05 || (width <= 48 && zeros < 0.2) || (width <= 24 && zeros < 0.4);
-            if above.first() == Some(&position) && width <= WIDEST_PANEL && few {
-                blocks.end = position + 1;
-                *above = rows;
-                filled += own;
-                continue;
-            }
-        }
-        merged.push((position..position + 1, rows));
-        filled = own;
-    }
-    merged
 }

@@ -9,6 +9,7 @@ use super::ordering::Ordering;
 use super::room::{made_of_results, numbers_at};
 use super::symbolic::Symbolic;
 use super::tree::Tree;
+use super::watch::Control;
 use super::workspace::Workspace;
 
 /// A system ready to be formed again and again: the pattern and the order are found once.
@@ -77,19 +78,24 @@ impl System {
         &self.symbolic
     }
 
+    /// Counts the local blocks of a batch that is done.
+    pub(super) fn count(&self, units: &[u32], control: &Control) {
+        control.count(units.iter().filter(|&&unit| !self.layout.is_apart(unit as usize)).count());
+    }
+
     /// Numbers that a factor holds at the most: the panels, and what the elimination of local blocks has left for the solution.
     pub fn numbers_in_factor(&self) -> usize {
         self.symbolic.values() + self.cached.iter().sum::<usize>()
     }
 }
 
-/// Time for forming and eliminating the local blocks assembled in a supernode, in multiply-adds of a factorisation: those of their own,
+/// Time for forming and eliminating the units assembled in a supernode, in multiply-adds of a factorisation: those of their own,
 /// which run at a lower rate, and their equations.
 fn formation_work(incidence: &Incidence, layout: &Layout, index: usize) -> f64 {
     let of_batch = |run: &[u32]| {
         let first = run.first().map_or(0, |&first| first as usize);
         let width = layout.reduced_width(first);
-        run.len() * (2 * width * width * layout.local_dim() + 500 * layout.groups_of(first).len())
+        run.len() * (2 * width * width * layout.local_dim() + 500 * layout.groups_of_unit(first).len())
     };
     incidence.batches_at(index).iter().map(of_batch).sum::<usize>() as f64
 }

@@ -12,7 +12,9 @@ impl Batch {
     pub fn add_to(&self, columns: &mut Columns<'_>, layout: &Layout) {
         let (rows, l) = (layout.rows(), layout.local_dim());
         run_for_any_local(layout, self.retained_dim(), AddSlots { batch: self, columns, rows, l });
-        if !self.segments.is_empty() {
+        if self.is_together() {
+            self.add_together(columns);
+        } else if !self.segments.is_empty() {
             run_unsized(AddSegments { batch: self, columns, rows, l });
         }
     }
@@ -35,7 +37,9 @@ impl Batch {
             let constants = &self.constants[slot.constants..][..slot.groups.len() * self.locals.len() * rows];
             columns.add_difference(simd, own, v, self.locals.len());
             columns.add_equations(simd, own, constants);
-            columns.subtract_right(simd, v, &self.reduced);
+            if !self.apart {
+                columns.subtract_right(simd, v, &self.reduced);
+            }
             for other in self.coupled_to(&self.slots[index + 1..]) {
                 columns.add_product(simd, -1.0, self.slot_coupling::<D>(other, l), v);
             }
@@ -129,7 +133,9 @@ impl Batch {
             if segment.runs.is_empty() {
                 columns.add_products(simd, [taken]);
             }
-            columns.subtract_right(simd, v, &self.reduced);
+            if !self.apart {
+                columns.subtract_right(simd, v, &self.reduced);
+            }
             for other in self.coupled_to(&self.segments[index + 1..]) {
                 columns.add_product(simd, -1.0, self.segment_coupling(other, l), v);
             }

@@ -52,6 +52,9 @@ impl Kernel for FromRights<'_> {
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
         let Self { batch, layout, prior } = self;
         let rows = size::<R>(layout.rows());
+        if batch.apart {
+            return;
+        }
         batch.factor::<S, L>(simd, rows, (layout, prior), 0.0);
         let depth = batch.locals.len();
         for (t, triangle) in batch.triangles.iter().enumerate() {

@@ -14,6 +14,9 @@ use crate::normals::vectorised::{Kernel, LANES, copy_vectors, run, size};
 impl Batch {
     /// Eliminates the unknowns of the local blocks. `damping` is added to the diagonal of each as a fraction of it.
     pub fn eliminate(&mut self, layout: &Layout, prior: &Prior, damping: f64) {
+        if self.apart {
+            return self.leave_apart(layout);
+        }
         run(layout, self.retained_dim(), Eliminate { batch: self, layout, prior, damping });
     }
 

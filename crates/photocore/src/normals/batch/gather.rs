@@ -7,9 +7,9 @@ use crate::normals::equations::{Equations, GroupRows};
 use crate::normals::system::System;
 
 impl Batch {
-    /// Gathers the equations of local blocks of one pattern.
-    pub fn gather(&mut self, equations: &dyn Equations, system: &System, locals: &[u32]) {
-        self.place(system, locals);
+    /// Gathers the equations of units of one pattern.
+    pub fn gather(&mut self, equations: &dyn Equations, system: &System, units: &[u32]) {
+        self.place(system, units);
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
         let (depth, incidence) = (self.locals.len(), &system.incidence);
         let mut groups: SmallVec<[u32; 32]> = smallvec![0; depth];
@@ -28,11 +28,10 @@ impl Batch {
                             [..count * slot.dim],
                         shared: &mut self.shared_rows[shared + t * rows * width..][..count * width],
                     };
-                    let locals = &self.locals[t..t + together];
-                    for (group, &local) in groups.iter_mut().zip(locals) {
-                        *group = incidence.groups_of(&system.layout, local as usize)[p];
+                    for (group, &unit) in groups.iter_mut().zip(&units[t..t + together]) {
+                        *group = incidence.groups_of(&system.layout, unit as usize)[p];
                     }
-                    equations.write_alike(locals, &groups[..together], &mut part);
+                    equations.write_alike(&self.locals[t..t + together], &groups[..together], &mut part);
                 }
             }
         }

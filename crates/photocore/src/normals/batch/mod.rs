@@ -1,6 +1,7 @@
 //! Local blocks whose equations touch the same unknowns, gathered and eliminated side by side.
 
 mod add;
+mod apart;
 mod chord;
 mod eliminate;
 mod gather;
@@ -115,13 +116,36 @@ impl Part {
     }
 }
 
+/// Sums over the equations of groups apart that have a number of columns in common with others.
+#[derive(Debug, Default)]
+struct Together {
+    /// Of the products of these columns with themselves, from the diagonal down, and with those of the main block: column by column, as many
+    /// rows as there are of the first; empty where parts are multiplied one by one.
+    products: Vec<f64>,
+    /// Of their products with the right-hand sides.
+    right: Vec<f64>,
+    /// The columns that stand together in the front.
+    runs: Vec<Stretch>,
+}
+
+/// Consecutive columns, from one on, that are consecutive in the front.
+#[derive(Debug)]
+struct Stretch {
+    at: usize,
+    column: usize,
+    width: usize,
+}
+
 /// The equations of some local blocks of one pattern and what their elimination leaves: for each of them, with N = L L^T its
 /// normal matrix, v = L^-1 n and V = L^-1 N_local,other. The normal equations of the others lose V^T V, their right-hand side V^T v.
 ///
 /// What belongs to one retained block stands together, local block by local block.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
+    /// The local block of each unit.
     pub locals: Vec<u32>,
+    /// Whether the units are groups apart.
+    pub apart: bool,
     pub slots: Vec<Slot>,
     pub segments: Vec<Segment>,
     pub triangles: Vec<Triangle>,
@@ -133,6 +157,7 @@ pub(super) struct Batch {
     pub deficient: Vec<usize>,
     /// Whether V is anything but zero: local blocks that are held leave nothing to others.
     coupled: bool,
+    together: Together,
     places: Vec<Place>,
     /// The supernode that the local blocks are assembled in.
     node: usize,
@@ -158,10 +183,16 @@ impl Batch {
         self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
     }
 
+    /// How many local blocks have a coupling: none of groups apart.
+    #[inline(always)]
+    fn coupled_locals(&self) -> usize {
+        if self.apart { 0 } else { self.locals.len() }
+    }
+
     /// The coupling of local blocks of l unknowns to a main block, local block by local block.
     #[inline(always)]
     pub fn slot_coupling<const D: usize>(&self, slot: &Slot, l: usize) -> Strip<'_> {
-        let (width, count) = (size::<D>(slot.dim), self.locals.len() * l);
+        let (width, count) = (size::<D>(slot.dim), self.coupled_locals() * l);
         let values = &self.coupling[slot.coupling..];
         Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
     }
@@ -169,7 +200,7 @@ impl Batch {
     /// The coupling of local blocks of l unknowns to a segment, local block by local block.
     #[inline(always)]
     pub fn segment_coupling(&self, segment: &Segment, l: usize) -> Strip<'_> {
-        let (width, count) = (segment.unknowns.len(), self.locals.len() * l);
+        let (width, count) = (segment.unknowns.len(), self.coupled_locals() * l);
         let values = &self.coupling[segment.coupling..];
         Strip { at: segment.row, rows: Rows { values, width, stride: width, count } }
     }

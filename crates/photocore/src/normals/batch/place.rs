@@ -15,30 +15,31 @@ use crate::normals::vectorised::LANES;
 const FEW: usize = 4;
 
 impl Batch {
-    /// Lays out the buffers for local blocks of one pattern.
-    pub(super) fn place(&mut self, system: &System, locals: &[u32]) {
+    /// Lays out the buffers for units of one pattern.
+    pub(super) fn place(&mut self, system: &System, units: &[u32]) {
         let (layout, symbolic) = (&system.layout, &*system.symbolic);
-        let (rows, l, depth) = (layout.rows(), layout.local_dim(), locals.len());
+        let (rows, l, depth) = (layout.rows(), layout.local_dim(), units.len());
         self.locals.clear();
-        self.locals.extend_from_slice(locals);
+        self.locals.extend(units.iter().map(|&unit| layout.local_of(unit as usize) as u32));
         self.slots.clear();
         self.places.clear();
-        let Some(&first) = locals.first() else { return };
+        let Some(&first) = units.first() else { return };
+        self.apart = layout.is_apart(first as usize);
         let groups = system.incidence.groups_of(layout, first as usize);
         let positions = system.incidence.positions_of(layout, first as usize);
         self.place_slots(symbolic, positions);
         let shared = self.place_commons(system, first as usize);
-        let (mut retained, mut coupling) = (0, self.start);
+        let (mut retained, mut coupling, coupled) = (0, self.start, self.coupled_locals());
         for slot in &mut self.slots {
             slot.row = symbolic.row_of(self.node, slot.position);
             slot.constants = slot.groups.start * rows * depth;
             (slot.retained, slot.coupling) = (retained, coupling);
             retained += slot.groups.len() * rows * depth * slot.dim;
-            coupling += l * depth * slot.dim;
+            coupling += l * coupled * slot.dim;
         }
         for segment in &mut self.segments {
             segment.coupling = coupling;
-            coupling += l * depth * segment.unknowns.len();
+            coupling += l * coupled * segment.unknowns.len();
         }
         self.find_runs();
         self.end = coupling;
@@ -73,22 +74,22 @@ impl Batch {
 
     /// Finds what each group has in common with others, and the segments; returns how many coefficients these have. The segments of the batch
     /// before stay where that was assembled in the same front and had the same in shared.
-    fn place_commons(&mut self, system: &System, local: usize) -> usize {
+    fn place_commons(&mut self, system: &System, unit: usize) -> usize {
         let (layout, incidence, symbolic) = (&system.layout, &system.incidence, &*system.symbolic);
-        let set = incidence.set_of(local);
+        let set = incidence.set_of(unit);
         let are_other = self.set.replace(set) != Some(set);
         if are_other {
             self.commons.clear();
             self.commons.extend(incidence.members(set).iter().map(|&number| Common::of(system, number)));
         }
-        let positions = incidence.positions_of(layout, local);
+        let positions = incidence.positions_of(layout, unit);
         let main = positions.first().map(|&main| main as usize);
         let first = self.commons.iter().map(|shared| shared.first).chain(main).min();
         let node = first.map_or(0, |first| symbolic.supernode_of(first));
         if node != std::mem::replace(&mut self.node, node) || are_other {
             self.place_parts(layout, symbolic);
         }
-        let of_groups = incidence.commons_of(layout, local);
+        let of_groups = incidence.commons_of(layout, unit);
         let mut end = 0;
         for p in 0..positions.len() {
             let shared = of_groups.get(p).map(|number| {

@@ -67,11 +67,13 @@ impl Cofactors {
         let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
         for (index, at_node) in found.iter().enumerate() {
             let mut values = at_node.equations.chunks_exact(rows.max(1));
-            let blocks = at_node.local.chunks_exact(l * l);
-            for (&block, cofactors) in system.incidence.locals_at(index).iter().zip(blocks) {
-                local[block as usize * l * l..][..l * l].copy_from_slice(cofactors);
+            let mut blocks = at_node.local.chunks_exact(l * l).peekable();
+            for &unit in system.incidence.units_at(index) {
+                if let Some(cofactors) = blocks.next_if(|_| !layout.is_apart(unit as usize)) {
+                    local[unit as usize * l * l..][..l * l].copy_from_slice(cofactors);
+                }
                 for (&group, values) in
-                    system.incidence.groups_of(layout, block as usize).iter().zip(&mut values)
+                    system.incidence.groups_of(layout, unit as usize).iter().zip(&mut values)
                 {
                     of_groups[group as usize * rows..][..rows].copy_from_slice(values);
                 }
@@ -110,12 +112,14 @@ impl GroupCofactors {
         let mut by_local = control.allocated(zeros(layout.groups() * size))?;
         let mut alone = control.allocated(zeros(layout.locals() * l * l))?;
         for (index, at_node) in found.iter().enumerate() {
-            let blocks = at_node.alone.chunks_exact(l * l);
+            let mut blocks = at_node.alone.chunks_exact(l * l).peekable();
             let mut pairs = at_node.leverages.chunks_exact(size).zip(at_node.by_local.chunks_exact(size));
-            for (&block, own) in system.incidence.locals_at(index).iter().zip(blocks) {
-                alone[block as usize * l * l..][..l * l].copy_from_slice(own);
+            for &unit in system.incidence.units_at(index) {
+                if let Some(own) = blocks.next_if(|_| !layout.is_apart(unit as usize)) {
+                    alone[unit as usize * l * l..][..l * l].copy_from_slice(own);
+                }
                 for (&group, (together, own)) in
-                    system.incidence.groups_of(layout, block as usize).iter().zip(&mut pairs)
+                    system.incidence.groups_of(layout, unit as usize).iter().zip(&mut pairs)
                 {
                     leverages[group as usize * size..][..size].copy_from_slice(together);
                     by_local[group as usize * size..][..size].copy_from_slice(own);
@@ -152,12 +156,12 @@ impl AtNode {
                 batch.eliminate(layout, prior, 0.0);
                 others.gather(&batch, front, height);
                 others.cofactors(&batch, layout, &mut part);
-                control.count(run.len());
+                system.count(run, control);
             }
             system.workspace.put_back_batch(batch);
             part
         };
-        let mut found = if batches.locals() < MANY {
+        let mut found = if batches.units() < MANY {
             part(&mut others(), batches)
         } else {
             let parts = parallel::map_each_with(batches.parts(MANY / 16), others, part);

@@ -120,9 +120,13 @@ impl Others {
         found: &mut AtNode,
     ) {
         let rows = size::<R>(rows);
-        self.reduce::<L, D>(batch, t);
-        self.multiply::<S, L>(simd);
-        let own = self.own::<S, L>(simd, batch, t, found);
+        let own = if batch.apart {
+            self.without_local::<L>()
+        } else {
+            self.reduce::<L, D>(batch, t);
+            self.multiply::<S, L>(simd);
+            self.own::<S, L>(simd, batch, t, found)
+        };
         for (slot, &(_, start, _)) in batch.slots.iter().zip(&self.strips) {
             for (k, p) in slot.groups.clone().enumerate() {
                 let group = Group { t, slot, start, k, p, rows };
@@ -187,6 +191,15 @@ impl Others {
             }
         }
         batch.triangles[t].backward::<L>(&mut self.h, stride);
+    }
+
+    /// H and H Q of a group apart, and its Q_ll: nothing.
+    fn without_local<const L: usize>(&mut self) -> [[f64; L]; L] {
+        for (matrix, rows) in [(&mut self.h, L), (&mut self.hq, L + 1)] {
+            matrix.clear();
+            matrix.resize(rows * self.stride, 0.0);
+        }
+        [[0.0; L]; L]
     }
 
     /// Computes H Q.

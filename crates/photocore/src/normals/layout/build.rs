@@ -57,6 +57,7 @@ impl Layout {
             block_ptr: vec![0],
             places: None,
             free: Vec::new(),
+            apart: Vec::new(),
             pairs: Vec::new(),
             pair_ptr: vec![0],
             outer: Vec::new(),
@@ -120,8 +121,13 @@ impl Layout {
     }
 
     /// Says which unknowns are held whatever their equations are asked for: `held` of all unknowns. Their coefficients, which must be zero,
-    /// are left out of the products of what groups have in common with others.
+    /// are left out of the products of what groups have in common with others; local blocks that are held as a whole tie no groups together.
     pub fn with_held(mut self, held: &[bool]) -> Self {
+        let of_locals = held.get(self.all_locals()).unwrap_or_default().chunks_exact(self.local_dim);
+        let known = of_locals.enumerate().filter(|(_, own)| !own.contains(&false)).map(|(local, _)| local);
+        let apart =
+            known.flat_map(|local| self.groups_of(local).map(move |group| [group as u32, local as u32]));
+        self.apart = apart.collect();
         let of_retained = held.get(self.all_retained()).unwrap_or_default();
         if of_retained.contains(&true) {
             self.free =

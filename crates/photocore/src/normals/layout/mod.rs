@@ -1,10 +1,10 @@
 //! Which unknowns there are, and which equations touch which of them.
 
 mod build;
+mod units;
 
 use std::ops::Range;
 
-use smallvec::SmallVec;
 use thiserror::Error;
 
 /// The unknowns and the equations of a system.
@@ -36,6 +36,8 @@ pub struct Layout {
     places: Option<Vec<[f64; 3]>>,
     /// The unknowns of each retained block that are not held, as ranges; empty where none is held anywhere.
     free: Vec<Vec<Range<usize>>>,
+    /// The groups of local blocks that are held, with these.
+    apart: Vec<[u32; 2]>,
     /// Pairs of retained blocks, ascending, and where the block of each starts among those of all; one more at the end.
     pairs: Vec<[u32; 2]>,
     pair_ptr: Vec<usize>,
@@ -233,22 +235,16 @@ impl Layout {
         self.group_retained[group] as usize
     }
 
-    /// The main retained blocks of the groups of local block `i`.
-    pub(super) fn main_blocks_of(&self, i: usize) -> &[u32] {
-        &self.group_retained[self.groups_of(i)]
-    }
-
-    /// The shared blocks of the groups of local block `i`.
-    pub(super) fn all_shared_of(&self, i: usize) -> &[u32] {
-        match self.shared_ptr.get(self.group_ptr[i]..=self.group_ptr[i + 1]) {
-            Some(ends) => &self.shared[ends[0]..ends[ends.len() - 1]],
-            None => &[],
-        }
-    }
-
     /// Whether any group touches shared blocks.
     pub fn has_shared(&self) -> bool {
         !self.shared.is_empty()
+    }
+
+    /// Whether each retained block is the main one of a group.
+    pub(super) fn are_main(&self) -> Vec<bool> {
+        let mut main = vec![false; self.retained()];
+        self.group_retained.iter().for_each(|&block| main[block as usize] = true);
+        main
     }
 
     /// The shared blocks that a group touches, in its order.
@@ -274,19 +270,6 @@ impl Layout {
     /// How many they are.
     pub fn shared_width(&self, group: usize) -> usize {
         self.shared_of(group).iter().map(|&block| self.retained_dim(block as usize)).sum()
-    }
-
-    /// The unknowns of retained blocks, a main one counted for each of its groups, that lose products when local block `i` is reduced out.
-    pub(super) fn reduced_width(&self, i: usize) -> usize {
-        let main: usize = self.groups_of(i).map(|group| self.retained_dim(self.retained_of(group))).sum();
-        if !self.has_shared() {
-            return main;
-        }
-        let mut shared: SmallVec<[u32; 16]> =
-            self.groups_of(i).flat_map(|group| self.shared_of(group)).copied().collect();
-        shared.sort_unstable();
-        shared.dedup();
-        main + shared.into_iter().map(|block| self.retained_dim(block as usize)).sum::<usize>()
     }
 
     /// Where local block `i` stands in the vector of unknowns.

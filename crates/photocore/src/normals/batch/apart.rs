@@ -1,0 +1,103 @@
+//! Groups that stand apart: their products with themselves are all that they leave.
+//!
+//! What such a group has in common with others may be many narrow parts (the knots about an image). Their products are summed as those of one
+//! matrix, side by side in lanes, and then spread over the front.
+
+use pulp::Simd;
+
+use super::{Batch, Stretch, Together};
+use crate::normals::front::Columns;
+use crate::normals::layout::Layout;
+use crate::normals::triangle::Triangle;
+use crate::normals::vectorised::{Kernel, LANES, Rows, add_products, add_right, dot, run_unsized};
+
+/// Parts that are narrower than this, in the mean, are multiplied together.
+const NARROW: usize = LANES;
+
+impl Batch {
+    /// Groups apart have nothing to be eliminated.
+    pub(super) fn leave_apart(&mut self, layout: &Layout) {
+        let constants = &self.constants[..self.places.len() * self.locals.len() * layout.rows()];
+        self.sum_of_squares = dot(constants, constants);
+        (self.decrease, self.coupled) = (0.0, false);
+        self.deficient.clear();
+        self.reduced.fill(0.0);
+        self.triangles.fill(Triangle::default());
+        self.together.products.clear();
+        if self.places.first().is_some_and(|own| own.width < NARROW * own.parts.len()) {
+            self.find_columns();
+            run_unsized(Multiply { batch: self, rows: layout.rows() });
+        }
+    }
+
+    /// Whether what the groups have in common with others is multiplied together.
+    pub(super) fn is_together(&self) -> bool {
+        self.apart && !self.together.products.is_empty()
+    }
+
+    /// Adds what groups apart that are multiplied together have in common with others.
+    pub(super) fn add_together(&self, columns: &mut Columns<'_>) {
+        let (Some(slot), Some(place)) = (self.slots.first(), self.places.first()) else { return };
+        let (width, Together { products, right, runs }) = (place.width, &self.together);
+        let of_main = &products[width * width..];
+        for (index, &Stretch { at, column, width: size }) in runs.iter().enumerate() {
+            for other in &runs[..=index] {
+                let block = &products[other.column * width + column..];
+                columns.add_block((at, size), (other.at, other.width), (block, width));
+            }
+            columns.add_block((at, size), (slot.row, slot.dim), (&of_main[column..], width));
+            columns.add_to_right(at, &right[column..column + size], |i| products[(column + i) * (width + 1)]);
+        }
+    }
+
+    /// Finds the columns that stand together in the front.
+    fn find_columns(&mut self) {
+        let mut runs = std::mem::take(&mut self.together.runs);
+        runs.clear();
+        for part in self.parts(0) {
+            let at = self.segments[part.segment].row + part.shift;
+            match runs.last_mut() {
+                Some(last) if (last.at + last.width, last.column + last.width) == (at, part.column) => {
+                    last.width += part.width();
+                }
+                _ => runs.push(Stretch { at, column: part.column, width: part.width() }),
+            }
+        }
+        self.together.runs = runs;
+    }
+
+    #[inline(always)]
+    fn multiply<S: Simd>(&mut self, simd: S, rows: usize) {
+        let Together { mut products, mut right, runs } = std::mem::take(&mut self.together);
+        let (Some(slot), Some(place)) = (self.slots.first(), self.places.first()) else { return };
+        let (width, count) = (place.width, self.locals.len() * rows);
+        let shared = |first: usize, end: usize| {
+            let values = &self.shared_rows[place.rows + first..];
+            Rows { values, width: end - first, stride: width, count }
+        };
+        let main = self.slot_rows::<0>(slot, rows).rows;
+        products.resize(width * (width + slot.dim), 0.0);
+        for first in (0..width).step_by(LANES) {
+            let target = &mut products[first * (width + 1)..];
+            let own = shared(first, width.min(first + LANES));
+            add_products(simd, target, width, [(1.0, shared(first, width), own)]);
+        }
+        add_products(simd, &mut products[width * width..], width, [(1.0, shared(0, width), main)]);
+        right.clear();
+        right.resize(width, 0.0);
+        add_right(simd, &mut right, None, 1.0, shared(0, width), &self.constants[slot.constants..]);
+        self.together = Together { products, right, runs };
+    }
+}
+
+struct Multiply<'a> {
+    batch: &'a mut Batch,
+    rows: usize,
+}
+
+impl Kernel for Multiply<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
+        self.batch.multiply(simd, self.rows);
+    }
+}

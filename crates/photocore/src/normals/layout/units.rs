@@ -1,0 +1,79 @@
+//! What is eliminated as one.
+
+use std::ops::Range;
+
+use smallvec::SmallVec;
+
+use super::Layout;
+
+/// A *unit* is what is eliminated as one: a local block with all its groups. The elimination of a block that is held leaves nothing to others,
+/// and ties none of its groups to another: each of them is a unit by itself, *apart*, numbered behind the local blocks, and the block is one
+/// without groups.
+impl Layout {
+    /// Number of units.
+    pub(in crate::normals) fn units(&self) -> usize {
+        self.locals + self.apart.len()
+    }
+
+    /// Whether a unit is a group apart.
+    pub(in crate::normals) fn is_apart(&self, unit: usize) -> bool {
+        unit >= self.locals
+    }
+
+    /// The local block of a unit.
+    pub(in crate::normals) fn local_of(&self, unit: usize) -> usize {
+        unit.checked_sub(self.locals).map_or(unit, |apart| self.apart[apart][1] as usize)
+    }
+
+    /// The groups of a unit.
+    pub(in crate::normals) fn groups_of_unit(&self, unit: usize) -> Range<usize> {
+        if let Some(apart) = unit.checked_sub(self.locals) {
+            let group = self.apart[apart][0] as usize;
+            return group..group + 1;
+        }
+        let own = self.groups_of(unit);
+        if self.stands_apart(unit) { own.start..own.start } else { own }
+    }
+
+    /// Whether the groups of a local block stand apart: no equations tie those that it is seen from together.
+    pub fn stands_apart(&self, local: usize) -> bool {
+        !self.apart_of(local).is_empty()
+    }
+
+    /// The groups of a local block that stand apart, as units.
+    pub(in crate::normals) fn apart_of(&self, local: usize) -> Range<usize> {
+        let before = |end: usize| self.locals + self.apart.partition_point(|own| (own[1] as usize) < end);
+        before(local)..before(local + 1)
+    }
+
+    /// The main retained blocks of the groups of a unit.
+    pub(in crate::normals) fn main_blocks_of(&self, unit: usize) -> &[u32] {
+        &self.group_retained[self.groups_of_unit(unit)]
+    }
+
+    /// The shared blocks of the groups of a unit.
+    pub(in crate::normals) fn all_shared_of(&self, unit: usize) -> &[u32] {
+        let Range { start, end } = self.groups_of_unit(unit);
+        match self.shared_ptr.get(start..=end) {
+            Some(ends) => &self.shared[ends[0]..ends[ends.len() - 1]],
+            None => &[],
+        }
+    }
+
+    /// The unknowns of retained blocks, a main one counted for each of its groups, that lose products when a unit is reduced out.
+    pub(in crate::normals) fn reduced_width(&self, unit: usize) -> usize {
+        if self.is_apart(unit) {
+            return 0;
+        }
+        let groups = || self.groups_of_unit(unit);
+        let main: usize = groups().map(|group| self.retained_dim(self.retained_of(group))).sum();
+        if !self.has_shared() {
+            return main;
+        }
+        let mut shared: SmallVec<[u32; 16]> =
+            groups().flat_map(|group| self.shared_of(group)).copied().collect();
+        shared.sort_unstable();
+        shared.dedup();
+        main + shared.into_iter().map(|block| self.retained_dim(block as usize)).sum::<usize>()
+    }
+}
