@@ -25,7 +25,7 @@ impl Bundle {
                 let image = &self.images[group];
                 let Station { orientation, camera } = &stations.photos[image.photo];
                 let point = &stations.points[local];
-                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
+                each_camera!(camera, camera => write(orientation, camera, point, Some(image.xy), rows));
             }
             Some(bent) => self.observe_bent((stations, bent), group, local, rows, &mut Composed::new(true)),
         }
