@@ -12,6 +12,7 @@ use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Bent, Mounted, Station, Stations};
 use crate::geometry::{Orientation, POSE, Vector3};
 use crate::normals::{Cofactors, GroupRows, Layout};
+use crate::sorting::sort_by;
 
 impl Bundle {
     /// The photo whose six unknowns the pose of a photo begins with: its frame, or itself.
@@ -186,7 +187,7 @@ impl Bundle {
             by_i * DMatrix::from_fn(rows, columns, of) * by_j.transpose()
         };
         let mut parts = composed.parts();
-        parts.sort_by_key(|part| part.0);
+        sort_by(&mut parts, &|a, b| a.0.cmp(&b.0));
         let mut sum = Matrix6::zeros();
         for (j, part) in parts.iter().enumerate() {
             for before in &parts[..j] {

@@ -10,6 +10,7 @@ use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{AttitudeNumbers, Vector3};
 use crate::normals::{GroupRows, TieRows};
+use crate::sorting::sort_by;
 
 /// A bundle at given values of the unknowns.
 pub(super) struct At<'a> {
@@ -83,7 +84,7 @@ impl Model for Bundle {
         let mut all = self.weighted_angles(values, prior, sd);
         if !self.camera_priors.is_empty() {
             all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));
-            all.sort_by_key(|own| own.first);
+            sort_by(&mut all, &|a, b| a.first.cmp(&b.first));
         }
         all
     }
