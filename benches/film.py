@@ -2,8 +2,9 @@
 
     python benches/film.py 20x50                strips x photographs
 
-Both are adjusted in turn in one process, all covariances included; the median of each phase counts, and so
-does that of the processor time of the whole adjustment in the core and around it.
+All are adjusted in turn in one process, all covariances included; the median of each phase counts, and so
+does that of the processor time of the whole adjustment in the core and around it. A second table has what
+films cost by the count: multiply-adds of the reduction of points, of a factor and of the inverse.
 """
 
 from __future__ import annotations
@@ -38,9 +39,10 @@ SHARED_SD = {"scanner": (4e-6, 4e-6, 6e-6), "pattern": 0.006}
 
 @dataclass(frozen=True)
 class Films:
-    """What the films of a block have in common; `shared`: a weighted scanner and a pattern besides."""
+    """Films of a block; `shared`: with a weighted scanner and pattern; `before`: known, without marks."""
 
-    shared: bool
+    shared: bool = False
+    before: bool = False
 
     def of(self, block: Block) -> Block:
         """Return the block with its images as readings of films, and eight marks on each."""
@@ -57,18 +59,19 @@ class Films:
         of = block.image_photos
         images = readings(block.image_xy, size[of], placement[of])
         scans, observations = [], [KnownTogether("certificate", marks, sd=0.002)]
+        held = 0.0 if self.before else np.inf
         for k, name in enumerate(block.photo_ids):
-            own = FilmPlacement(name, placement[k]), FilmSize(name, size[k])
-            film = Film(*own, scanner, counted, roll=roll, pattern=pattern)
-            read = readings(places, size[[k] * 8], placement[[k] * 8]) + random.normal(0.0, 0.2, (8, 2))
+            own = FilmPlacement(name, placement[k], held), FilmSize(name, size[k], held)
+            film = Film(*own, scanner, counted, roll=None if self.before else roll, pattern=pattern)
             scans.append(Scan(name, film))
+            read = readings(places, size[[k] * 8], placement[[k] * 8]) + random.normal(0.0, 0.2, (8, 2))
             observations.append(KnownFilm(name, *own, roll, ("m", "b1", "b2"), 0.0, sd=1e-4))
             observations += [
                 Fiducial(name, mark, film, xy, sd=0.2) for mark, xy in zip(marks, read.tolist(), strict=True)
             ]
         return block.replace(
             passages=scans,
-            observations=[*block.observations, *observations],
+            observations=[*block.observations, *([] if self.before else observations)],
             image_xy=images,
             image_sd=IMAGE_SD,
         )
@@ -83,42 +86,56 @@ def readings(q: np.ndarray, size: np.ndarray, placement: np.ndarray) -> np.ndarr
     return np.column_stack([ORIGIN + right / PITCH, ORIGIN - up / PITCH])
 
 
-def phases(block: Block) -> dict[str, float]:
-    """Return seconds of each phase, the processor time of all of it, and its iterations."""
+PHASES = ("form", "factor", "solve", "invert", "cofactors")
+COUNTED = ("reduction", "factor", "inverse")
+"""Of what multiply-adds are counted, each done once."""
+
+
+def measured(block: Block) -> dict[str, float]:
+    """Return seconds of each phase, and of the processor for all of it; millions of multiply-adds."""
     start = time.process_time()
     result = adjust(block)
-    took = time.process_time() - start
-    return {**result.seconds, "processor": took, "iterations": len(result.iterations)}
+    found = {"processor": time.process_time() - start}
+    found |= {name: result.seconds[name] for name in PHASES}
+    counts = {name: 1e-6 * result.operations[name] for name in COUNTED}
+    return found | {f"{name} count": own for name, own in counts.items()} | {"count": sum(counts.values())}
 
 
 def compared(size: str, runs: int) -> list[str]:
-    """Return the rows of the table for one size."""
+    """Return the two tables of one size."""
     strips, photos = (int(number) for number in size.split("x"))
     plain = simulate(strips=strips, photos_per_strip=photos, seed=1).block
     kinds = {
         "refined coordinates": plain,
-        "films": Films(shared=False).of(plain),
+        "films fitted before": Films(before=True).of(plain),
+        "films": Films().of(plain),
         "films, scanner, pattern": Films(shared=True).of(plain),
     }
-    timed: dict[str, list[dict[str, float]]] = {kind: [] for kind in kinds}
+    runs_of: dict[str, list[dict[str, float]]] = {kind: [] for kind in kinds}
     for _ in range(runs):
         for kind, block in kinds.items():
-            timed[kind].append(phases(block))
+            runs_of[kind].append(measured(block))
     middle = {
-        kind: {phase: float(np.median([run[phase] for run in own])) for phase in own[0]}
-        for kind, own in timed.items()
+        kind: {name: float(np.median([run[name] for run in own])) for name in own[0]}
+        for kind, own in runs_of.items()
     }
+    counts = {"reduction count": "reduction", "factor count": "factor", "inverse count": "inverse"}
+    return [
+        f"{strips * photos:,} photographs, {len(plain.image_xy):,} images; seconds:",
+        *table(middle, {name: name for name in (*PHASES, "processor")}, ".3f"),
+        "",
+        "10^6 multiply-adds:",
+        *table(middle, counts | {"count": "together"}, ",.0f"),
+    ]
+
+
+def table(middle: dict[str, dict[str, float]], columns: dict[str, str], form: str) -> list[str]:
+    """Return values with, in brackets, their ratio to those of refined coordinates."""
     first, rows = middle["refined coordinates"], []
     for kind, own in middle.items():
-        cells = [
-            f"{own[phase]:.3f} ({own[phase] / first[phase]:.1f})" for phase in own if phase != "iterations"
-        ]
-        rows.append(f"| {strips * photos:,} | {kind} | {own['iterations']:.0f} | {' | '.join(cells)} |")
-    return [
-        f"| photos | {' | '.join(['as', 'iterations', *(p for p in first if p != 'iterations')])} |",
-        f"|---:|---|{'---:|' * len(first)}",
-        *rows,
-    ]
+        cells = [f"{own[name]:{form}} ({own[name] / first[name]:.1f})" for name in columns]
+        rows.append(f"| {kind} | {' | '.join(cells)} |")
+    return [f"| as | {' | '.join(columns.values())} |", f"|---|{'---:|' * len(columns)}", *rows]
 
 
 def main() -> None:

@@ -40,7 +40,7 @@ def words(name, where):
 def where(run, tmp_path, monkeypatch):
     """Go to an empty folder that knows where results are made that commands take as input."""
     monkeypatch.chdir(tmp_path)
-    return {"galveston": Path(PACKAGE) / "galveston"}
+    return {name: Path(PACKAGE) / name for name in ("galveston", "archive")}
 
 
 def with_inputs(run, name, where):
@@ -115,7 +115,8 @@ def test_commands_with_a_directory_of_results_have_a_report():
     made = {name for name, command in COMMANDS.items() if roles(command).get("out") is Writes.DIRECTORY}
     assert set(PAGED) <= made
     # The report of `features` is that of `adjust`; the page of `statement` is its result.
-    assert made - set(PAGED) <= {*("convert", "convert-lens", "features", "new", "simulate", "statement")}
+    bare = {*("convert", "convert-lens", "features", "film marks", "new", "simulate", "statement")}
+    assert made - set(PAGED) <= bare
 
 
 def test_help_of_parents_names_their_commands(run):

@@ -958,6 +958,36 @@ class BlockNetwork:
 def give_back() -> None:
     """Have the allocator give back to the system what was freed; nothing but with the C library of GNU."""
 
+def judge_full_step(
+    taken: Sequence[tuple[float, float]],
+    change: float,
+    *,
+    chord: float | None,
+    unknowns: int,
+    tolerance: float,
+) -> str:
+    """Return what a full step is, by the rules of one process; see `adjustment/history.rs`.
+
+    Parameters
+    ----------
+    taken
+        Damping and largest change of each step so far.
+    change
+        No unknown changes by more than this multiple of its standard deviation.
+    chord
+        The length of the chord that followed the last step, where one did.
+    unknowns, tolerance
+        How many unknowns there are; when to stop.
+
+    Returns
+    -------
+    `last`: no further one is needed; `rests`: it is rounding, as those before; `before a chord`: a chord
+    after it pays; `one of many`.
+    """
+
+def is_chord(chord: float, change: float) -> bool:
+    """Return whether a chord so long is taken after a full step that has changed the unknowns so much."""
+
 def step_rules() -> dict[str, float]:
     """Return the constants of the rules of steps of one process, by name; see `adjustment/damped.rs`."""
 
@@ -1006,6 +1036,10 @@ class Node:
 
         The outer part of it must be set to what the node above has, where points are among the outer blocks.
         """
+
+    @property
+    def ends_slowly(self) -> bool:
+        """Whether photos share cameras that are unknown: a chord pays near the end (docs/adjustment.md)."""
 
     @property
     def prediction(self) -> dict[str, float]:
@@ -1110,6 +1144,42 @@ class FormedNode:
         progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
     ) -> _Floats:
         """Return the step (N,) of all unknowns, given that of the outer ones (S,)."""
+
+    @property
+    def has_chord(self) -> bool:
+        """Whether the right-hand side of a chord was reduced, and is not solved for."""
+
+    def reduce_chord(
+        self,
+        state: _Floats,
+        left: Sequence[_Floats],
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
+    ) -> tuple[_Floats, float] | None:
+        """Reduce the right-hand side that the equations have at a state: a second step with one factor.
+
+        Parameters
+        ----------
+        state
+            (N,) after a step.
+        left
+            (S,) of each child what it has left.
+
+        Returns
+        -------
+        (S,) what is left for the outer unknowns, and by how much the chord lowers the sum of squares, as far
+        as known here; None where what that takes is not kept, for want of memory.
+        """
+
+    def solve_chord(
+        self,
+        outer: _Floats,
+        *,
+        threads: int,
+        progress: Callable[[str, int, int, IterationRow | None], None] | None = None,
+    ) -> _Floats:
+        """Return the chord (N,) where its right-hand side was reduced, given that of the outer ones (S,)."""
 
     def reduce(
         self,

@@ -105,7 +105,6 @@ def test_a_project_on_disk_is_adjusted_without_being_read_whole(tmp_path, projec
 REFUSED = {
     "--datum": "control",
     "--hold": "A=XYZ",
-    "--loss": "huber",
     "--self-calibrate": "all",
     "--snoop": None,
     "--level": 0.01,
@@ -150,17 +149,20 @@ def test_what_is_not_done_of_a_project_on_disk_is_refused(tmp_path, project, opt
     assert not (tmp_path / "out" / "report.txt").exists()
 
 
-def test_a_project_on_disk_that_chooses_a_loss_is_adjusted_with_it(tmp_path):
+@pytest.mark.parametrize(("said", "option"), [("huber", None), ("none", "huber"), ("huber", "none")])
+def test_a_project_on_disk_is_adjusted_with_the_loss_that_is_chosen(tmp_path, said, option):
     given = project_of(tied_block(), tmp_path / "robust")
     settings = given / "project.toml"
-    settings.write_text(settings.read_text().replace('loss = "none"', 'loss = "huber"'))
-    assert read(given).options.loss == "huber"
-    called(given, "--parts", 3, "--keep-all", "--out", tmp_path / "out")
+    settings.write_text(settings.read_text().replace('loss = "none"', f'loss = "{said}"'))
+    assert (read(given).options.loss or "none") == said
+    chosen = ["--loss", option] if option else []
+    called(given, "--parts", 3, "--keep-all", *chosen, "--out", tmp_path / "out")
     nodes = [read_result(each) for each in sorted((tmp_path / "out" / "run" / "results").iterdir())]
-    whole = adjust(read(given).block, loss="huber")
+    loss = option or said
+    whole = adjust(read(given).block, loss=None if loss == "none" else loss)
     weights = np.sort(np.concatenate([each.image_weights for each in nodes]))
     np.testing.assert_allclose(weights, np.sort(whole.image_weights), rtol=0, atol=1e-6)
-    assert (weights < 1).any()
+    assert (weights < 1).any() == (loss == "huber")
 
 
 @pytest.mark.parametrize("chosen", ["unity", "constrained", "redundancy"])

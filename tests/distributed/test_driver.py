@@ -10,7 +10,8 @@ from toy import ToyEngine, adjusted, kept, make
 from photogram import _photocore
 from photogram.distributed.driver import Driver, Stop
 from photogram.distributed.executors import Serial
-from photogram.distributed.tasks import Job, shelf
+from photogram.distributed.shelf import shelf
+from photogram.distributed.tasks import Job
 from photogram.errors import AdjustmentError, RankError
 
 

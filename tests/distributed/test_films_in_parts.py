@@ -11,7 +11,7 @@ import photogram
 from photogram import _photocore, adjust, adjust_in_parts
 from photogram.distributed import Division
 from photogram.distributed.parts import films_of
-from photogram.errors import InputError
+from photogram.distributed.run import read_manifest, read_node
 from photogram.network.cameras import Camera
 from photogram.network.films import (
     Film,
@@ -140,20 +140,48 @@ def test_inner_constraints_of_films_in_parts(block):
     assert np.nanmax(np.abs(found.film - one.film) / one.film_sd) < 1e-6
 
 
-def test_what_parts_do_not_take_is_refused(block):
-    first = block.passages[0]
-    size = [-HALF, -HALF, HALF, HALF, 3, 3]
-    local = Scan(
-        first.photo,
-        Film(
-            *first.film.unknowns[:2],
-            first.film.scanner,
-            first.film.readings,
-            pattern=Reseau(first.photo, size, (0.01, 0.01)),
-        ),
-    )
-    with pytest.raises(InputError, match="has a reseau of its own"):
-        adjust_in_parts(block.replace(passages=[local, *block.passages[1:]]), Division(parts=2))
+def with_reseaus(block):
+    """Return a block in which every other photo has a reseau of its own, the others the pattern of a roll."""
+    grid = [-HALF, -HALF, HALF, HALF, 3, 3]
+    scans, known = [], []
+    for row, scan in enumerate(block.passages):
+        if row % 2 == 0:
+            own = Reseau(scan.photo, grid, (0.006, 0.004), 0.005)
+            known.append(KnownTogether("reseau", own.weights, covariance=own.covariance))
+            scan = replace(scan, film=replace(scan.film, pattern=own))
+        scans.append(scan)
+    return block.replace(passages=scans, observations=[*block.observations, *known])
+
+
+@pytest.mark.parametrize("halves", [(), (0, 22)])
+def test_reseaus_of_single_photos_in_parts(block, halves):
+    """Their nodes go up as far as their photos do, and no farther."""
+    changed = with_reseaus(with_halves(block, halves) if halves else block)
+    one, other = adjust(changed), adjust_in_parts(changed, Division(parts=5))
+    assert one.degrees_of_freedom == other.degrees_of_freedom
+    assert other.sums_of_squares.total == pytest.approx(one.sums_of_squares.total, rel=1e-9)
+    assert np.nanmax(np.abs(other.film_sd - one.film_sd) / one.film_sd) < 1e-6
+    nodes = [pair for pair in zip(one.unknowns, other.unknowns, strict=True) if "node" in pair[0].name]
+    assert len(nodes) == 9 * len(changed.passages[::2])
+    for mine, parted in nodes:
+        sd = np.sqrt(np.diag(mine.cofactors))
+        assert np.abs((parted.position - mine.position)[:2] / sd).max() < 1e-6
+        np.testing.assert_allclose(np.sqrt(np.diag(parted.cofactors)), sd, rtol=1e-6)
+        assert parted.observations == mine.observations
+    kinds = [each.kinds["reseau"] for each in (one, other)]
+    np.testing.assert_allclose(kinds[1].redundancy, kinds[0].redundancy, rtol=0, atol=1e-7)
+
+
+def test_reseaus_are_no_matter_of_the_root(block, tmp_path):
+    changed = with_reseaus(block)
+    adjust_in_parts(changed, Division(parts=5, folder=tmp_path))
+    manifest = read_manifest(tmp_path)
+    rows = [row for below in manifest.tree.children[-1] for row in manifest.outer[below].unknowns]
+    names = [changed.unknowns[row].name for row in rows]
+    of_root = {name.split(" node ")[0] for name in names if " node " in name}
+    part = read_node(tmp_path, manifest, manifest.tree.root)
+    assert 0 < len(of_root) < len(changed.passages[::2]) / 2
+    assert of_root <= set(part.block.photo_ids)
 
 
 def with_halves(block, rows):

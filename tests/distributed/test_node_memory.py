@@ -11,7 +11,7 @@ import pytest
 import photogram
 from photogram import InnerConstraints
 from photogram.distributed import Division, plan_in_parts
-from photogram.distributed.tasks import Shelf
+from photogram.distributed.shelf import Shelf
 from photogram.memory import give_back, resident_memory
 
 STATUS = Path("/proc/self/status")
@@ -100,7 +100,7 @@ def test_what_a_process_holds_is_what_it_has_taken():
 
 
 def test_nodes_go_before_factors_and_the_last_ones_first(monkeypatch):
-    monkeypatch.setattr("photogram.distributed.tasks.resident_memory", lambda: None)
+    monkeypatch.setattr("photogram.distributed.shelf.resident_memory", lambda: None)
     shelf = Shelf()
     for number in range(3):
         shelf.put(("node", "run", number), number, 10.0)

@@ -21,7 +21,7 @@ from photogram.distributed.adjust import fingerprint
 from photogram.distributed.core import CoreEngine
 from photogram.distributed.files import alone
 from photogram.distributed.run import partition, read_node
-from photogram.distributed.tasks import shelf
+from photogram.distributed.shelf import shelf
 from photogram.distributed.workers import connected
 from photogram.errors import InputError
 from photogram.formats.format import Wishes

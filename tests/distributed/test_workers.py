@@ -77,13 +77,13 @@ def test_what_an_earlier_run_has_left_does_not_count_as_held(client, tmp_path):
 
 
 def _leave(size):
-    from photogram.distributed.tasks import shelf
+    from photogram.distributed.shelf import shelf
 
     shelf.put(("node", "elsewhere", 0), b"x" * size, float(size))
 
 
 def _left():
-    from photogram.distributed.tasks import shelf
+    from photogram.distributed.shelf import shelf
 
     return len(shelf._kept)
 

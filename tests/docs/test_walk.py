@@ -10,7 +10,7 @@ COMMANDS = {
     "gallery.md": 10,
     "index.md": 1,
     "tutorials/aerial-block.md": 6,
-    "tutorials/archive.md": 17,
+    "tutorials/archive.md": 18,
     "tutorials/calibration.md": 7,
     "tutorials/drone.md": 7,
     "tutorials/metrology.md": 5,

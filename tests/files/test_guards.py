@@ -54,6 +54,8 @@ RUNS = {
     "calibrate": (["calibrate", "corners.csv"], ["corners.csv"]),
     "certificate": (["certificate", "rc10.toml"], ["rc10.toml"]),
     "camera compare": (["camera", "compare", "rc10.toml", "later.toml"], ["rc10.toml", "later.toml"]),
+    "film compare": (["film", "archive"], ["archive/images.csv", "archive/rc10-2345.toml"]),
+    "film marks": (["film", "marks", "archive"], ["archive/fiducial_images.csv"]),
     "convert-lens": (["convert-lens", "project", "--to", "opencv5"], ["project/images.csv"]),
     "perspective-center": (["perspective-center", "grid.deck"], ["grid.deck"]),
     "stellar-camera plate": (["stellar-camera", "plate.toml"], ["plate.toml", "stars.csv", "images.csv"]),
@@ -125,7 +127,8 @@ def place(tmp_path, request):
                 shutil.copy(file, tmp_path)
     for project in ("galveston", "second"):
         shutil.copytree(EXAMPLES / "galveston", tmp_path / project)
-    shutil.copytree(EXAMPLES / "project", tmp_path / "project")
+    for project in ("project", "archive"):
+        shutil.copytree(EXAMPLES / project, tmp_path / project)
     (tmp_path / "flight").mkdir()
     (tmp_path / "flight" / "geo.txt").write_text("EPSG:4979\nDJI_0001.JPG 8.5 47.3 500\n")
     (tmp_path / "former.json").write_text("{}")

@@ -8,8 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram.cli import app
-from photogram.errors import ContradictionError
-from photogram.formats import read
+from photogram.errors import ContradictionError, InputError
+from photogram.formats import Wishes, read
+from photogram.formats.additions import deviations
+from photogram.network.observations import Fiducial
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 
@@ -83,3 +85,23 @@ def test_resampled_scans_are_told(folder: Path) -> None:
     path.write_text("\n".join([head, names, *lines]) + "\n")
     changed(folder / "photos.csv", "scanner,true", "scanner,false")
     assert any("marks lie at the same pixels on all photos" in each for each in said(folder))
+
+
+def test_deviations_of_marks_may_be_said_beside_a_plain_project(folder: Path) -> None:
+    changed(folder / "project.toml", "fiducial_images = 0.2\n", "")
+    with pytest.raises(InputError, match=r"give sd, or \[sd\] fiducial_images"):
+        read(folder)
+    wishes = Wishes(sd=deviations(["fiducial_images=0.3"]))
+    observations = read(folder, wishes=wishes).block.observations
+    found = {float(np.max(each.sd)) for each in observations if isinstance(each, Fiducial)}  # type: ignore[arg-type]
+    assert found == {0.3}
+    with pytest.raises(InputError, match="which has no fiducial_images: --sd"):
+        read(Path(str(ARCHIVE)).parent / "galveston", wishes=wishes)
+    with pytest.raises(InputError, match="one of photos, images, points, fiducials, fiducial_images"):
+        deviations(["fiducial=0.3"])
+
+
+def test_a_film_that_was_seen_from_the_other_side_is_told(folder: Path) -> None:
+    changed(folder / "photos.csv", "scanner,true", "scanner,")
+    [message] = said(folder)
+    assert "the film of 83-6 was seen from the other side" in message

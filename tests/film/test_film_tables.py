@@ -1,6 +1,7 @@
 """Writing films, marks and scanners: what is written is read as it was."""
 
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -142,3 +143,30 @@ def test_what_tables_have_no_place_for_is_refused(tmp_path: Path) -> None:
         to_files(own.replace(block=own.block.replace(observations=others)), "plain")
     with pytest.raises(InputError, match=r"readings of a scanned film, which are not written"):
         to_files(own, "bingo")
+
+
+def test_plates_on_a_comparator_need_no_scanner(tmp_path: Path) -> None:
+    """Readings in mm, y up, as a comparator has them that was calibrated before: photos share it."""
+    archive = files("photogram") / "examples" / "archive"
+    for each in archive.iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes())
+    for table, sd in (("images", "0.005"), ("fiducial_images", "0.004")):
+        rows = [line.split(",") for line in (tmp_path / f"{table}.csv").read_text().splitlines()]
+        rows = [[*row[:2], "x", "y", "sd"] if row[0] == "photo" else row for row in rows if row[0][0] != "#"]
+        for row in rows[1:]:
+            x, y = 0.02 * (float(row[2]) - 6000.0), 0.02 * (6000.0 - float(row[3]))
+            row[2:] = [repr(1.00001 * x + 0.99998 * 2e-5 * y), repr(0.99998 * y), sd]
+        (tmp_path / f"{table}.csv").write_text("\n".join(map(",".join, rows)) + "\n")
+    photos = (
+        (tmp_path / "photos.csv").read_text().replace(",scanner,", ",,").replace("film,,", "film,scanner,")
+    )
+    (tmp_path / "photos.csv").write_text(photos)
+    for name in ("scanners.csv", "covariances.csv"):
+        (tmp_path / name).unlink()
+    block = read(tmp_path).block
+    assert len({id(scan.film.scanner) for scan in block.passages}) == 1  # type: ignore[attr-defined]
+    found, scanned = (adjust(each, unit_variance="unity") for each in (block, read(archive).block))
+    assert block.image_unit == "mm"
+    # The scanner's scales have standard deviations of four millionths, and this comparator none.
+    assert found.sums_of_squares.total == pytest.approx(scanned.sums_of_squares.total, rel=1e-4)
+    np.testing.assert_allclose(found.point_positions, scanned.point_positions, rtol=0, atol=1e-3)

@@ -43,15 +43,21 @@ def test_two_steps_have_smaller_standard_deviations(tmp_path: Path) -> None:
         for which in ("full", "two_steps")
     ]
     ratio = 100.0 * (np.median(sd[1] / sd[0], axis=0) - 1.0)
-    said = compare_steps(before, inside)
-    assert said.startswith(
-        f"standard deviations of points differ by {ratio[0]:+.1f} % in X, {ratio[1]:+.1f} % in Y"
+    found = compare_steps(inside, before)
+    np.testing.assert_allclose(found.percent, ratio, rtol=0, atol=1e-5)
+    assert (
+        f"standard deviations of points by {ratio[0]:+.1f} % in X, {ratio[1]:+.1f} % in Y" in found.sentence
     )
     assert ratio[1] < 0
+    document = json.loads(found.to_json())
+    assert document["sums"]["inside"]["degrees_of_freedom"] == 131
+    assert document["sums"]["before"]["degrees_of_freedom"] == 59
+    assert [each["axis"] for each in document["axes"]] == [*"XYZ"]
+    with pytest.raises(InputError, match='are not such of interior = "inside"'):
+        compare_steps(before, inside)
+    other = before.block.replace(point_ids=[f"q{k}" for k in before.block.point_ids])
     with pytest.raises(InputError, match="different points"):
-        compare_steps(
-            before, adjust(before.block.replace(point_ids=[f"q{k}" for k in before.block.point_ids]))
-        )
+        compare_steps(inside, adjust(other))
 
 
 def test_good_marks_have_no_hint(tmp_path: Path) -> None:

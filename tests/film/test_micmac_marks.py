@@ -1,12 +1,15 @@
 """Marks of MicMac: written, read as they were, and the side of y found."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from photogram import InputError
+from photogram.formats import Wishes, read
 from photogram.formats.micmac import read_marks, write_marks
 from photogram.formats.project import Project
 from photogram.io.csv_text import csv_text
@@ -126,3 +129,20 @@ def test_files_at_fault_are_refused(tmp_path: Path) -> None:
         read_marks(folder)
     with pytest.raises(InputError, match=r"has no MeasuresIm"):
         read_marks(tmp_path)
+
+
+def test_the_command_takes_marks_both_ways(tmp_path: Path, run: Callable[..., Any]) -> None:
+    own = project(tmp_path)
+    done = run("film", "marks", tmp_path, "--out", tmp_path / "micmac")
+    assert done.exit_code == 0, done.output
+    assert {path.name for path in (tmp_path / "micmac").iterdir()} == {"Ori-InterneScan", "id_fiducial.txt"}
+    done = run("film", "marks", tmp_path / "micmac", "--name", "rc10", "--out", tmp_path / "tables")
+    assert done.exit_code == 0, done.output
+    assert "y of the camera is taken to count down" in done.output
+    for table in ("fiducials", "fiducial_images"):
+        content = (tmp_path / "tables" / f"{table}.csv").read_text()
+        assert content.startswith("# y of the camera is taken to count down")
+        (tmp_path / f"{table}.csv").write_text(content)
+    assert "sd" not in (tmp_path / "fiducial_images.csv").read_text().splitlines()[-1]
+    again = read(tmp_path, wishes=Wishes(settings=["sd.fiducial_images=0.2"]))
+    assert len(again.block.observations) == len(own.block.observations)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import Attitudes, Result, adjust
+from photogram import Attitudes, Result, adjust, diagnose
 from photogram.cli import app
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.adjusted import table_files
+from photogram.network.refined import as_seen, camera_images
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 PHOTOS = ("photo", "x", "y", "z", "omega", "phi", "kappa")
@@ -87,3 +88,25 @@ def test_refined_images_are_written_and_formats_without_films_name_them(tmp_path
     refused = CliRunner().invoke(app, ["convert", str(tmp_path), str(tmp_path / "b.im"), "--to", "bingo"])
     assert refused.exit_code != 0
     assert "refined.csv" in refused.output
+
+
+def test_checks_see_films_as_their_marks_have_them(tmp_path: Path) -> None:
+    """What looks at rays alone has images of films that have changed as their marks say."""
+    two = archive(tmp_path, "film.interior=before")
+    block = read(tmp_path).block
+    seen = as_seen(block)
+    assert np.abs(camera_images(block) - two.refined[0]).max() > 0.04
+    assert np.abs(seen.image_xy - two.refined[0]).max() < 0.001
+    numbers = diagnose(block).sections[-1]
+    assert numbers.title == "Key numbers"
+    assert numbers.findings == []
+
+
+def test_marks_that_are_wrong_move_no_images(tmp_path: Path) -> None:
+    archive(tmp_path)
+    table = tmp_path / "fiducial_images.csv"
+    own = next(line for line in table.read_text().splitlines() if line.startswith("83-1,ur,"))
+    table.write_text(table.read_text().replace(own, "83-1,ur,11290.0,741.22"))
+    block = read(tmp_path).block
+    of_photo = block.image_photos == block.photo_ids.index("83-1")
+    np.testing.assert_array_equal(as_seen(block).image_xy[of_photo], camera_images(block)[of_photo])

@@ -30,7 +30,7 @@ def readings(places: np.ndarray, shifts: np.ndarray, *, mirrored: bool) -> np.nd
         FilmSize("p", (3e-4, -1e-4, 5e-5)),
         Scanner("s"),
         COUNTED,
-        pattern=Reseau("p", GRID, (0.01, 0.01), shifts=shifts),
+        pattern=Reseau("p", GRID, (0.01, 0.01)).with_shifts(shifts),
         mirrored=mirrored,
     )
     vectors = np.array([each.position for each in film.unknowns])

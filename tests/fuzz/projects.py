@@ -17,6 +17,7 @@ import numpy as np
 import photogram
 from photogram import Block, formats
 from photogram.cli import adjust as adjusting
+from photogram.cli import choices
 from photogram.cli.components import UnitVarianceName
 from photogram.distributed import Division
 from photogram.formats.additions import self_calibrated, with_control
@@ -157,8 +158,8 @@ def _command(
     quiet: bool,
 ) -> list[str]:
     chosen = {
-        "datum": options["datum"] and adjusting.DatumName(options["datum"]),
-        "loss": options["loss"] and adjusting.LossName(options["loss"]),
+        "datum": options["datum"] and choices.DatumName(options["datum"]),
+        "loss": options["loss"] and choices.LossName(options["loss"]),
         "unit_variance": options["unit_variance"],
     }
     if control is not None:

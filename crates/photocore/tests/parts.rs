@@ -270,6 +270,44 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
     }
 }
 
+/// The chord to equations elsewhere, of a system that is cut against that of one piece.
+fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
+    let elsewhere = whole(all.layout.clone(), all.seed.wrapping_add(1));
+    let system = System::new(all.layout.clone(), ordering).unwrap();
+    let factor = done(system.factor(threads, all, &all.prior, &FactorOptions::default(), &mut go));
+    assert!(factor.has_cached());
+    let of = (&elsewhere as &dyn Equations, &elsewhere.prior);
+    let (expected, decrease) = done(system.chord(threads, &factor, of, &mut go));
+    let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let nodes = upward(all, cut, ordering, threads);
+    let mut found: Vec<(Piece<'_>, ReducedRights<1>)> = vec![];
+    for (p, (_, system, factor)) in nodes.iter().enumerate() {
+        let (own, piece) = (system.layout(), piece(&elsewhere, cut, p));
+        let mut rights = piece.prior.right.clone();
+        for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
+            let left = found[child].1.left();
+            own.unknowns_of(blocks).zip(left).for_each(|(unknown, value)| rights[unknown] += value);
+        }
+        let of = (&piece as &dyn Equations, &piece.prior);
+        let reduced = done(system.reduce_chord(threads, factor, of, &rights, &mut go));
+        found.push((piece, reduced));
+    }
+    let sum: f64 = found.iter().map(|(_, reduced)| reduced.products[0]).sum();
+    assert_close(sum, decrease, 1e-9 * decrease, "decrease of a chord");
+    let mut handed: Vec<Vec<f64>> = vec![vec![]; nodes.len()];
+    for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
+        let (own, outer) = (system.layout(), std::mem::take(&mut handed[p]));
+        let (of, (_, reduced)) = ((&piece as &dyn Equations, &piece.prior), found.remove(p));
+        let chord = done(system.solve_reduced_rights(threads, &factor, of, reduced, &outer, &mut go));
+        for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
+            handed[child] = own.unknowns_of(blocks).map(|unknown| chord[unknown]).collect();
+        }
+        for (x, unknown) in chord.iter().zip(unknowns_of(all, &piece)) {
+            assert_close(*x, expected[unknown], 1e-9 * largest, "chord");
+        }
+    }
+}
+
 /// Solution, sums and cofactors of a system that is cut against those of one piece.
 fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u64, ordering: Ordering) {
     let threads = threads(2);
@@ -282,6 +320,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let cofactors =
         done(system.invert(&threads, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
     compare_rights(&all, &cut, ordering, &threads);
+    compare_chord(&all, &cut, ordering, &threads);
     let nodes = upward(&all, &cut, ordering, &threads);
     let sums = nodes.iter().map(|(.., factor)| factor.sum_of_squares).sum();
     assert_close(sums, sum, 1e-12 * sum, "sum of squares");

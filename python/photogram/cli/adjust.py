@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from photogram.cli.components import UnitVarianceName
+from photogram.cli.choices import AS_SAID, Choices
 from photogram.cli.console import ON_TOP, output, print_remark, print_sections
 from photogram.cli.division import WHOLE, Parts
 from photogram.cli.documents import NONE_ASKED, Documents
@@ -41,7 +40,7 @@ from photogram.cli.projects import (
     with_options,
 )
 from photogram.cli.stating import stated, statement_files
-from photogram.declared import dataclass, replace
+from photogram.declared import replace
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result
@@ -54,90 +53,6 @@ if TYPE_CHECKING:
     from photogram.show.page import Section
 
 __all__ = ["adjust", "adjusted_block", "started_block"]
-
-
-class DatumName(StrEnum):
-    """What coordinates refer to."""
-
-    CONTROL = "control"
-    MINIMUM = "minimum"
-    INNER = "inner"
-
-
-class LossName(StrEnum):
-    """What is minimised."""
-
-    NONE = "none"
-    HUBER = "huber"
-    CAUCHY = "cauchy"
-
-
-@dataclass(frozen=True)
-class Choices:
-    """What a user chooses where a project says it otherwise, or not at all, with the options that say it."""
-
-    datum: Annotated[
-        DatumName | None,
-        typer.Option(
-            help="What coordinates refer to. Default: what PATH says, else control, or minimum constraints.",
-            show_default=False,
-        ),
-    ] = None
-    hold: Annotated[
-        str | None,
-        typer.Option(
-            metavar="POINT=AXES,...",
-            help="Held coordinates, in the place of control: A=XYZ,B=YZ,C=Z (3-2-1).",
-            show_default=False,
-        ),
-    ] = None
-    loss: Annotated[
-        LossName | None,
-        typer.Option(help="Robust loss of image coordinates. Default: what PATH says.", show_default=False),
-    ] = None
-    unit_variance: Annotated[
-        UnitVarianceName | None,
-        typer.Option(
-            metavar="NAME",
-            help="What the variance of unit weight is based on: `constrained` (all weighted values),"
-            " `redundancy` (numbers), or `unity`: 1. Default: what PATH says, else constrained.",
-            show_default=False,
-        ),
-    ] = None
-    self_calibrate: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Parameters of cameras that are unknown (f,cx,cy,k1 ...), or `all`.",
-            show_default=False,
-        ),
-    ] = None
-
-    def datum_of(self, project: Project) -> str | None:
-        """Return the name of the datum: what is chosen, else that of the project."""
-        return self.datum.value if self.datum is not None else project.options.datum
-
-    def loss_of(self, project: Project) -> Loss | None:
-        """Return the robust loss: what is chosen, else that of the project; None for least squares."""
-        if self.loss is None:
-            return project.options.loss
-        losses: dict[LossName, Loss | None] = {LossName.HUBER: "huber", LossName.CAUCHY: "cauchy"}
-        return losses.get(self.loss)
-
-    def of(self, project: Project) -> Project:
-        """Return the project with what is chosen of cameras, coordinates and the variance of unit weight."""
-        from photogram.formats.additions import held_points, self_calibrated
-
-        wanted = [name.strip() for name in self.self_calibrate.split(",")] if self.self_calibrate else []
-        project = self_calibrated(project, wanted)
-        project = held_points(project, [each.strip() for each in self.hold.split(",")] if self.hold else [])
-        if self.unit_variance is None:
-            return project
-        return project.replace(options=replace(project.options, unit_variance=self.unit_variance.value))
-
-
-AS_SAID = Choices()
-"""As the project says."""
 
 
 @with_job
@@ -188,7 +103,7 @@ def adjust(
     with job:
         pictures = documents.pictures(job, target)
         division = divided.division
-        if added == NOTHING and adjusted_on_disk(job, path, target, divided, choices.unit_variance, threads):
+        if added == NOTHING and adjusted_on_disk(job, path, target, divided, choices, threads):
             return
         project = read_project(job, path, added)
         check_maps(documents.map)  # now that all inputs are known, which it must not be

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.adjust import LossName
+from photogram.cli.choices import LossName
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job

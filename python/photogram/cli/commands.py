@@ -87,6 +87,10 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
         "certificate.certificate",
     ),
+    "film": (
+        "Adjust a block on film in one step and in two; take marks from MicMac.",
+        {"compare": "film.film", "marks": "film_marks.marks"},
+    ),
     "giant": (
         "Adjust or check a GIANT project.",
         {"adjust": "giant.giant", "check": "check.check"},

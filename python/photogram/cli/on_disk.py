@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -12,15 +12,14 @@ from photogram.cli.job import Job
 from photogram.cli.progress import shown
 
 if TYPE_CHECKING:
-    from photogram.adjustment.adjustment import UnitVariance
-    from photogram.cli.components import UnitVarianceName
+    from photogram.cli.choices import Choices
     from photogram.cli.division import Parts
 
 __all__ = ["adjusted_on_disk"]
 
 TAKEN = frozenset(
     (
-        *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--keep-all"),
+        *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--loss", "--keep-all"),
         *("--cluster", "--workers", "--parts", "--memory", "--run", "--plan"),
     )
 )
@@ -32,7 +31,7 @@ def adjusted_on_disk(
     path: Path,
     target: Path,
     divided: Parts,
-    unit_variance: UnitVarianceName | None,
+    choices: Choices,
     threads: int | None,
 ) -> bool:
     """Plan or adjust a project that is read batch by batch; False where it has to be read whole."""
@@ -48,16 +47,19 @@ def adjusted_on_disk(
     from photogram.formats import in_parts
 
     wishes, folder = Wishes(), divided.run or target / "run"
-    chosen: UnitVariance | None = None if unit_variance is None else unit_variance.value
+    chosen: Any = {
+        "unit_variance": choices.unit_variance and choices.unit_variance.value,
+        "loss": choices.loss and choices.loss.value,
+    }
     if divided.plan:
-        plan = in_parts.planned_on_disk(path, wishes, folder, division, unit_variance=chosen)
+        plan = in_parts.planned_on_disk(path, wishes, folder, division, **chosen)
         output.print("\n".join(plan.lines()))
         plan.check()
         return True
     with job.status("adjusting") as status:
         told = shown(status, "weighted sum of squares", 1.0) if status is not None else None
         found = in_parts.adjusted_on_disk(
-            path, wishes, folder, division, unit_variance=chosen, threads=threads, progress=told
+            path, wishes, folder, division, **chosen, threads=threads, progress=told
         )
     lines = [*found.lines(), f"what was found of each node: {folder / 'results'}"]
     report = {target / "report.txt": ("\n".join(lines) + "\n").encode()}

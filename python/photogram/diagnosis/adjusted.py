@@ -77,14 +77,15 @@ def remarks(result: Result) -> list[Message]:
     if not (result.converged and (result.unknowns or result.block.observations)):
         return []
     from photogram.diagnosis.clocks import known_offsets
+    from photogram.diagnosis.film_axes import axis_hints
     from photogram.diagnosis.film_lenses import lens_hints
     from photogram.diagnosis.film_lines import line_hints
     from photogram.diagnosis.film_marks import mark_hints
     from photogram.diagnosis.film_scans import seam_hints
     from photogram.diagnosis.shutters import backward_readouts
 
-    # A film in two pieces makes marks fail, too.
-    films = seam_hints(result) or mark_hints(result)
+    # A film in two pieces makes marks fail, too, and so does one that has changed along one axis.
+    films = seam_hints(result) or axis_hints(result) or mark_hints(result)
     films += [*lens_hints(result), *line_hints(result)]
     return [*backward_readouts(result), *known_offsets(result), *films]
 

@@ -63,8 +63,12 @@ def mark_hints(result: Result) -> list[Message]:
         for each in order
         if not each.photo
     ]
+    several = len(named) >= FEWEST and all(film.pattern is None for _, film in result.films)
+    pattern = ", or films have a pattern that was left out (`pattern` of the table films)" if several else ""
     return [
-        Message(f"{listed(named, 5)}: where it fails on all photos its place in the certificate is wrong")
+        Message(
+            f"{listed(named, 5)}: where it fails on all photos its place in the certificate is wrong{pattern}"
+        )
     ]
 
 

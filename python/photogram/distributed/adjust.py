@@ -27,7 +27,7 @@ from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
 from photogram.distributed.files import alone
 from photogram.distributed.merging import merged
-from photogram.distributed.parts import films_of, incidence_of, vertices_of
+from photogram.distributed.parts import alone_of, incidence_of, vertices_of
 from photogram.distributed.planned import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, opened
@@ -40,7 +40,7 @@ from photogram.network.datum import (
     MinimumConstraints,
     check_datum,
 )
-from photogram.network.films import Reseau, Scan
+from photogram.network.films import Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
 
@@ -158,19 +158,8 @@ def _ready(
     check_datum(datum)
     refuse_trajectories(block, "blocks in parts")
     refuse_passages(block, "blocks in parts", but=Scan)
-    _check_films(block)
     block = started(block)
     return block, *with_datum(block, options, datum)
-
-
-def _check_films(block: Block) -> None:
-    """Refuse films whose photos have many unknowns that do not stand in the blocks of these."""
-    for each in block.passages:
-        if isinstance(each, Scan) and isinstance(each.film.pattern, Reseau):
-            raise InputError(
-                f"blocks in parts: the film of the photo {each.photo} has a reseau of its own (pattern"
-                " local), which is not taken there"
-            )
 
 
 def _fits(block: Block, room: int | None) -> bool:
@@ -208,9 +197,9 @@ def _run(
 def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
-    films = films_of(block)
-    of_films = sum(len(each.deviations) for each in block.unknowns if id(each) in films and not each.is_held)
-    unknowns = UNKNOWNS + of_films / len(block.photo_ids)
+    alone = alone_of(block)
+    own = sum(len(each.deviations) for each in block.unknowns if id(each) in alone and not each.is_held)
+    unknowns = UNKNOWNS + own / len(block.photo_ids)
     return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]
 
 

@@ -22,7 +22,8 @@ class Course:
     """How far the iterations have come.
 
     `curved`: whether the second-order term of a loss is taken in at the state; `near`: whether from there on.
-    `ending`, when they are over: the status, the state whose equations give cofactors, and the state reached.
+    `chord`: the length of the chord that followed the last step, where one did. `ending`, when they are over:
+    the status, the state whose equations give cofactors, and the state reached.
     """
 
     state: str = "0"
@@ -33,6 +34,7 @@ class Course:
     best: float = math.nan
     initial: float = math.nan
     refused: float | None = None
+    chord: float | None = None
     ending: tuple[str, str, str] | None = None
     trials: int = 0
     formations: int = 0

@@ -40,6 +40,18 @@ class FormedNode(Protocol):
     def solve(self, outer: Floats, *, threads: int) -> Floats:
         """Return the step of all unknowns, given that of the outer ones."""
 
+    @property
+    def has_chord(self) -> bool:
+        """Whether the right-hand side of a chord was reduced, and is not solved for."""
+
+    def reduce_chord(
+        self, state: Floats, left: Sequence[Floats], *, threads: int
+    ) -> tuple[Floats, float] | None:
+        """Reduce the right-hand side of a chord at a state; return what is left, and the decrease."""
+
+    def solve_chord(self, outer: Floats, *, threads: int) -> Floats:
+        """Return the chord of all unknowns, given that of the outer ones."""
+
     def reduce(self, rights: Floats, *, threads: int) -> tuple[Floats, Floats]:
         """Reduce right-hand sides; return what is left for the outer unknowns, and their products."""
 
@@ -70,6 +82,10 @@ class Node(Protocol):
     @property
     def counts(self) -> tuple[int, int, int]:
         """Observations, weighted unknowns, unknowns."""
+
+    @property
+    def ends_slowly(self) -> bool:
+        """Whether the last steps may fall slowly, so that a chord pays."""
 
     @property
     def initial(self) -> Floats:

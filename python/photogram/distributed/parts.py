@@ -19,7 +19,7 @@ from photogram.io.structure import Decoder, Encoder
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.chosen import IMAGES, PHOTOS
-from photogram.network.films import Film, Pattern, Readings, Scan
+from photogram.network.films import Film, Pattern, Readings, Reseau, Scan
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Observation
@@ -33,6 +33,7 @@ __all__ = [
     "Homes",
     "Names",
     "Part",
+    "alone_of",
     "assembled_part",
     "films_of",
     "homes_of",
@@ -182,10 +183,23 @@ def films_of(block: Block) -> dict[int, str]:
     return {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
 
 
-def _photos_of(observation: Observation, films: Mapping[int, str]) -> list[str]:
-    """Return the photos that an observation touches, by their poses or by their films."""
-    of_films = [films[id(each)] for each in observation.unknowns if id(each) in films]
-    return [*dict.fromkeys([*observation.photos, *of_films])]
+def alone_of(block: Block) -> dict[int, str]:
+    """Return the photos of what they alone have, by the identity of the unknowns: films, nodes of reseaus.
+
+    A node of a reseau is a block by itself, which images in its cells touch; it goes where its photo goes.
+    """
+    found: dict[int, set[str]] = {}
+    for each in block.passages:
+        if isinstance(each, Scan) and each.film.pattern is not None:
+            for own in each.film.pattern.weights:
+                found.setdefault(id(own), set()).add(each.photo)
+    return films_of(block) | {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+
+
+def _photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:
+    """Return the photos that an observation touches, by their poses or by what they alone have."""
+    own = [alone[id(each)] for each in observation.unknowns if id(each) in alone]
+    return [*dict.fromkeys([*observation.photos, *own])]
 
 
 def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
@@ -198,13 +212,13 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
     photos = {name: row for row, name in enumerate(block.photo_ids)} if block.observations else {}
     tied = [tuple(points[name] for name in each.points) for each in block.observations]
     edges = joined(len(block.point_ids), (each for each in tied if len(each) > 1))
-    own_edges, others, of_observations, films = [], [], [], films_of(block)
+    own_edges, others, of_observations, alone = [], [], [], alone_of(block)
     count = len(block.point_ids)
     for each, members in zip(block.observations, tied, strict=True):
         edge = int(edges[members[0]]) if members else count
         count += not members
         of_observations.append(edge)
-        for name in _photos_of(each, films):
+        for name in _photos_of(each, alone):
             own_edges.append(edge)
             others.append(int(vertices[photos[name]]))
     incidence = Incidence(
@@ -324,17 +338,17 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
     )
 
 
-def names_above(part: Part, below: Names, shared: Indices, films: Mapping[int, str], *, root: bool) -> Names:
-    """Return what a part hands up: photos of nodes above, cameras and unknowns that belong to the root.
+def names_above(part: Part, below: Names, whole: Block, shared: Indices, *, root: bool) -> Names:
+    """Return what a part hands up: photos of nodes above with what they alone have, and what is of the root.
 
     Parameters
     ----------
     part, below
         The part, and what nodes below it hand up.
+    whole
+        The block, or all of it but points and images.
     shared
-        The cameras that have unknown parameters and several photos in the whole block.
-    films
-        Of the whole block (:func:`films_of`): these unknowns are handed up with their photos.
+        Its cameras that have unknown parameters and several photos.
     root
         Whether it is the root, which hands nothing up.
     """
@@ -345,8 +359,13 @@ def names_above(part: Part, below: Names, shared: Indices, films: Mapping[int, s
     photos = part.photos[(part.owners != part.node) & free]
     cameras = part.block.photo_cameras
     used = set() if cameras is None else set(cameras.tolist()) & set(shared.tolist())
-    known = zip(part.unknowns.tolist(), part.common, strict=True)
-    unknowns = sorted(row for row, each in known if not (each.is_held or id(each) in films))
+    films, alone = films_of(whole), alone_of(whole)
+    at_home = {part.block.photo_ids[row] for row in np.flatnonzero(part.owners == part.node)}
+    unknowns = sorted(
+        row
+        for row, each in zip(part.unknowns.tolist(), part.common, strict=True)
+        if not (each.is_held or id(each) in films or alone.get(id(each)) in at_home)
+    )
     return Names(photos.tolist(), sorted(used | set(below.cameras)), unknowns)
 
 
@@ -363,9 +382,9 @@ def _touch(block: Block, touched: Bools, observations: list[Observation]) -> Non
     """Add the photos of observations, and of the frames that photos are on."""
     if not (observations or block.mounts):
         return
-    rows, films = {name: row for row, name in enumerate(block.photo_ids)}, films_of(block)
+    rows, alone = {name: row for row, name in enumerate(block.photo_ids)}, alone_of(block)
     for each in observations:
-        touched[[rows[name] for name in _photos_of(each, films)]] = True
+        touched[[rows[name] for name in _photos_of(each, alone)]] = True
     vertices = vertices_of(block)
     touched[vertices[np.flatnonzero(touched)]] = True
 
@@ -441,8 +460,8 @@ def read_part(folder: Path, sealed: str) -> Part:
 
 
 def _classes() -> list[type]:
-    alone = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Spheroid)
-    return [*alone, *_below(Observation), *_below(Passage), *_below(Unknown)]
+    single = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Reseau, Spheroid)
+    return [*single, *_below(Observation), *_below(Passage), *_below(Unknown)]
 
 
 def _below(base: type) -> Iterator[type]:

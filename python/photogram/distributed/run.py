@@ -17,7 +17,7 @@ from photogram.distributed.files import read_json, write_json
 from photogram.distributed.parts import (
     Names,
     Part,
-    films_of,
+    alone_of,
     homes_of,
     incidence_of,
     names_above,
@@ -205,7 +205,7 @@ def divided(
     AdjustmentError
         The folder cannot be written to.
     """
-    shared, films = shared_cameras(block), films_of(block)
+    shared, alone = shared_cameras(block), alone_of(block)
     outer: list[Names] = []
     seals: list[str] = []
     counts: list[tuple[int, int, int, int]] = []
@@ -215,12 +215,12 @@ def divided(
             below = below.union(outer[child])
         part = part_at(node, below)
         root = node == tree.root
-        outer.append(names_above(part, below, shared, films, root=root))
+        outer.append(names_above(part, below, block, shared, root=root))
         folder = part_folder(run, node)
         folder.mkdir(parents=True, exist_ok=True)
         seals.append(write_part(folder, part))
         own = np.flatnonzero(part.owners == node)
-        stations = _weighted(part.block, own, shared, films, part.common if root else None)
+        stations = _weighted(part.block, own, shared, alone, part.common if root else None)
         counts.append((stations, len(own), len(part.points), len(part.images)))
     weighted, photos, points, images = (list(column) for column in zip(*counts, strict=True))
     middle = np.median(block.photo_positions, axis=0)
@@ -247,13 +247,13 @@ def _weighted(
     block: Block,
     own: Indices,
     shared: Indices,
-    films: Mapping[int, str],
+    alone: Mapping[int, str],
     common: Sequence[Unknown] | None,
 ) -> int:
     """Count the weighted unknowns of photos, cameras and common unknowns that are at home in a node.
 
-    `common` are those of the whole block, in the root; None elsewhere. Unknowns of `films` are at home where
-    their photos are.
+    `common` are those of the whole block, in the root; None elsewhere. What photos have `alone` is at home
+    where they are.
     """
     names = {block.photo_ids[row] for row in own.tolist()}
     sd = [np.hstack([block.photo_position_sd[own], block.photo_attitude_sd[own]]).ravel()]
@@ -261,8 +261,8 @@ def _weighted(
     cameras -= set(shared.tolist())
     if common is not None:
         cameras |= set(shared.tolist())
-        sd += [each.deviations for each in common if id(each) not in films]
-    sd += [each.deviations for each in block.unknowns if films.get(id(each)) in names]
+        sd += [each.deviations for each in common if id(each) not in alone]
+    sd += [each.deviations for each in block.unknowns if alone.get(id(each)) in names]
     sd += [block.cameras[row].deviations for row in sorted(cameras)]
     return sum(int(np.count_nonzero(np.isfinite(each) & (each > 0))) for each in sd)
 

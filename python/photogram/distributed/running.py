@@ -17,7 +17,8 @@ from photogram.distributed.driver import Driver, Outcome, Stop
 from photogram.distributed.executors import Executor, Serial
 from photogram.distributed.planned import SHARE, PartsPlan, measured_rates
 from photogram.distributed.run import MANIFEST, Manifest, read_manifest
-from photogram.distributed.tasks import Job, predicted, shelf
+from photogram.distributed.shelf import shelf
+from photogram.distributed.tasks import Job, predicted
 from photogram.distributed.workers import Workers, check_workers, connected
 from photogram.errors import InputError
 from photogram.memory import resident_memory

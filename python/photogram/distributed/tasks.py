@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import threading
 import time
-from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +22,12 @@ from photogram.declared import dataclass
 from photogram.distributed.datum import InDatum, rights_of, with_columns
 from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
 from photogram.distributed.files import read_arrays, write_arrays
+from photogram.distributed.shelf import shelf
 from photogram.errors import InputError
-from photogram.memory import give_back, resident_memory
+from photogram.memory import give_back
 
 __all__ = [
+    "Chord",
     "Contribution",
     "Formed",
     "Inverted",
@@ -43,11 +43,12 @@ __all__ = [
     "located",
     "lost",
     "predicted",
+    "reduced_chord",
     "redundancies",
     "relocated",
     "settled",
-    "shelf",
     "solved",
+    "solved_chord",
     "state_path",
     "write_state",
 ]
@@ -137,93 +138,19 @@ class Contribution:
 
 
 @dataclass(frozen=True, eq=False)
+class Chord:
+    """(S,) what a node leaves of the right-hand side of a chord, and what it lowers the sum of squares by."""
+
+    left: Floats
+    decrease: float
+
+
+@dataclass(frozen=True, eq=False)
 class Inverted:
     """The cofactors that the children of a node go on with, in their order, and W = Q B of a datum."""
 
     children: list[Floats]
     columns: list[Floats] | None = None
-
-
-class Shelf:
-    """The nodes and factors that a process keeps."""
-
-    def __init__(self) -> None:
-        self.lock = threading.RLock()
-        self._kept: OrderedDict[tuple[Any, ...], tuple[Any, float]] = OrderedDict()
-
-    def get(self, key: tuple[Any, ...]) -> Any:
-        """Return what is kept under a key; None where nothing is."""
-        if key not in self._kept:
-            return None
-        self._kept.move_to_end(key)
-        return self._kept[key][0]
-
-    def put(self, key: tuple[Any, ...], value: object, size: float) -> None:
-        """Keep something of so many bytes."""
-        self._kept[key] = value, size
-        self._kept.move_to_end(key)
-
-    def take(self, key: tuple[Any, ...]) -> Any:
-        """Return what is kept under a key, and keep it no longer."""
-        return self._kept.pop(key, (None, 0.0))[0]
-
-    def make_room(self, needed: float, memory: int | None, spared: tuple[Any, ...]) -> None:
-        """Give up so much that a process which may hold so many bytes can take more.
-
-        What the process holds is asked of the system: messages and what Dask keeps are in it.
-
-        Parameters
-        ----------
-        needed
-            Bytes that it will take.
-        memory
-            Bytes that it may hold; None for any number.
-        spared
-            Run and node that the room is for.
-        """
-        if memory is None:
-            return
-        held = resident_memory()
-        over = (sum(size for _, size in self._kept.values()) if held is None else held) + needed - memory
-        given_up = False
-        for key in self._expendable(spared):
-            if over <= 0:
-                break
-            over -= self._kept.pop(key)[1]
-            given_up = True
-        if given_up:
-            give_back()
-
-    def _expendable(self, spared: tuple[Any, ...]) -> list[tuple[Any, ...]]:
-        """Return what can be given up, in this order: nodes, which are read again, before factors.
-
-        Of each what was used last comes first: walks over the tree come round, so that it is asked for
-        last.
-        """
-        others = [key for key in reversed(self._kept) if key[1:3] != spared]
-        return sorted(others, key=lambda key: key[0] != "node")
-
-    def drop(self, of: Callable[[tuple[Any, ...]], bool]) -> None:
-        """Give up what some keys stand for."""
-        for key in [key for key in self._kept if of(key)]:
-            del self._kept[key]
-
-    def clear(self) -> None:
-        """Give up everything."""
-        self._kept.clear()
-
-    def clear_unless_used(self) -> None:
-        """Give up what an earlier run has left, unless a task is at work here: it needs what it has."""
-        if self.lock.acquire(blocking=False):
-            try:
-                self.clear()
-                give_back()
-            finally:
-                self.lock.release()
-
-
-shelf = Shelf()
-"""Of this process. Its lock lets one task work at a time: memory is planned for that."""
 
 
 def state_path(folder: Path, number: int, state: str) -> Path:
@@ -296,6 +223,69 @@ def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[
         state = node.advance(_state(job, node, number, at.state), step)
         write_state(job, number, after, {"values": state})
         return [step[rows] for rows in node.children]
+
+
+def reduced_chord(
+    job: Job, number: int, at: Point, after: str, below: Sequence[Chord | None]
+) -> Chord | None:
+    """Reduce the right-hand side that the equations of a node have after a step; its factor is of before.
+
+    Parameters
+    ----------
+    job, number, at
+        As in :func:`formed`.
+    after
+        The state after the step.
+    below
+        What the children have left.
+
+    Returns
+    -------
+    What is left; None where a factor is lost, or has not kept what this takes: no chord is worth another one.
+    """
+    left = [each.left for each in below if each is not None]
+    with shelf.lock:
+        factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
+        if factor is None or len(left) < len(below):
+            return None
+        state = _state(job, _node(job, number), number, after)
+        found = factor.reduce_chord(state, [_plain(each) for each in left], threads=job.threads)
+        return None if found is None else Chord(*found)
+
+
+def solved_chord(
+    job: Job,
+    number: int,
+    at: Point,
+    after: str,
+    outer: Floats,
+    further: str,
+    below: Sequence[Chord | None],
+) -> list[Floats] | Lost:
+    """Solve a node for a chord, given that of the outer unknowns, and write the state `further` after it.
+
+    Parameters
+    ----------
+    job, number, at, after, below
+        As in :func:`reduced_chord`.
+    outer, further
+        As `outer` and `after` in :func:`solved`.
+
+    Returns
+    -------
+    The chords of what each child is over; or that its factor is lost.
+    """
+    with shelf.lock:
+        factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
+        if factor is None:
+            return Lost(number)
+        node = _node(job, number)
+        if not factor.has_chord:  # it was formed again since
+            reduced_chord(job, number, at, after, below)
+        chord = factor.solve_chord(_plain(outer), threads=job.threads)
+        state = node.advance(_state(job, node, number, after), chord)
+        write_state(job, number, further, {"values": state})
+        return [chord[rows] for rows in node.children]
 
 
 def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, float]:
@@ -393,18 +383,18 @@ def settled(job: Job, number: int, variance: float | None) -> None:
         job.engine.settle(job.folder, number, variance)
 
 
-def counted(job: Job, number: int) -> tuple[int, int, int, int, int]:
+def counted(job: Job, number: int) -> tuple[int, int, int, int, int, int]:
     """Return how many observations and unknowns are at home in a node.
 
     Returns
     -------
     Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
-    unknowns, fixed ones too.
+    unknowns, fixed ones too; 1 where its last steps may fall slowly, so that a chord pays.
     """
     with shelf.lock:
         node = _node(job, number)
         size = len(node.initial) - len(node.outer)
-        return *node.counts, job.engine.stations(job.folder, number), size
+        return *node.counts, job.engine.stations(job.folder, number), size, int(node.ends_slowly)
 
 
 def located(job: Job, number: int, state: str) -> tuple[Indices, Floats]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from photogram import _photocore
 from photogram.arguments.arrays import shown
-from photogram.distributed.tasks import shelf
+from photogram.distributed.shelf import shelf
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import resident_memory
 

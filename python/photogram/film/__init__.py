@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
     from photogram.film.interior import Affine, Interior, interior_orientation
     from photogram.film.lens_table import Curve, LensParameters, RadialTable
-    from photogram.film.steps import compare_steps
+    from photogram.film.steps import StepsCompared, compare_steps
     from photogram.film.which import FilmWay, WhichMark, which_mark
     from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
@@ -35,6 +35,7 @@ __all__ = [
     "MarkDistance",
     "RadialTable",
     "RightAngle",
+    "StepsCompared",
     "Tangential",
     "WhichMark",
     "adjust_distances",
@@ -65,6 +66,7 @@ _HOMES = {
     "MarkDistance": "distances",
     "RadialTable": "lens_table",
     "RightAngle": "distances",
+    "StepsCompared": "steps",
     "Tangential": "decentring",
     "which_mark": "which",
     "WhichMark": "which",
@@ -72,10 +74,10 @@ _HOMES = {
 """The module of each name, loaded when it is first asked for: most blocks are not on film."""
 
 WAYS = {
-    "document_of": ("certificate_document",),
-    "findings_of": ("certificate_findings",),
-    "page_of": ("certificate_page",),
-    "report_of": ("certificate_report",),
+    "document_of": {"Certificate": ("certificate_document",), "StepsCompared": ("steps_told",)},
+    "findings_of": {"Certificate": ("certificate_findings",)},
+    "page_of": {"Certificate": ("certificate_page",), "StepsCompared": ("steps_told",)},
+    "report_of": {"Certificate": ("certificate_report",), "StepsCompared": ("steps_told",)},
 }
 """The files that show a result, by the names of the ways: see `photogram.show.ways`."""
 

@@ -17,7 +17,7 @@ from photogram.formats.images import from_corner, to_corner
 from photogram.formats.intersection import intersected
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
-from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.settings import WITH_SD, Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.planes import plane_remarks
@@ -55,19 +55,19 @@ def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
     Raises
     ------
     InputError
-        Other words, a table that has none, numbers that are no standard deviations.
+        Other words, a table that has none in plain projects, numbers that are no standard deviations.
     """
     found = {}
     for each in given:
         name, equals, numbers = each.partition("=")
         name = name.strip()
-        if name not in ("images", "control", "check", "gnss"):
-            raise InputError(f"--sd {each}: images=.., control=.., check=.. or gnss=..")
+        if name not in WITH_SD:
+            raise InputError(f"--sd {each}: one of {', '.join(WITH_SD)}, as images=0.5")
         try:
             values = tuple(float(number) for number in numbers.split(","))
         except ValueError:
             raise InputError(f"--sd {each}: what follows the = is no number, or three with commas") from None
-        counts = (1, 2) if name == "images" else (1, 3)
+        counts = WITH_SD[name]
         if not equals or len(values) not in counts or not all(0 <= value < np.inf for value in values):
             raise InputError(f"--sd {each}: {' or '.join(map(str, counts))} standard deviations")
         if name == "images" and not all(values):

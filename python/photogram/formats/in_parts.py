@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Literal
 
 from photogram.adjustment.adjustment import Progress, UnitVariance, core_options
+from photogram.adjustment.robust import LossName
 from photogram.declared import dataclass
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
@@ -74,6 +76,7 @@ def adjusted_on_disk(
     division: Division,
     *,
     unit_variance: UnitVariance | None = None,
+    loss: Literal["none", LossName] | None = None,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
@@ -87,8 +90,8 @@ def adjusted_on_disk(
         Of the run, on a disk that all workers see: a run that died is taken up there.
     division
         Cluster, workers, parts and memory.
-    unit_variance
-        What the variance of unit weight is based on; None: as the project says.
+    unit_variance, loss
+        What the variance of unit weight is based on, and what is minimised; None: as the project says.
     threads, progress
         As of :func:`photogram.adjust_in_parts`.
 
@@ -97,7 +100,7 @@ def adjusted_on_disk(
     RankError, AdjustmentError, OutOfMemoryError, InputError
         As of :func:`photogram.adjust_in_parts`, and as of projects that are read whole.
     """
-    with _run(path, wishes, folder, division, unit_variance, threads) as run:
+    with _run(path, wishes, folder, division, (unit_variance, loss), threads) as run:
         outcome = run.adjust(progress)
         found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
         return OnDisk(outcome, run.manifest, found)
@@ -110,9 +113,10 @@ def planned_on_disk(
     division: Division,
     *,
     unit_variance: UnitVariance | None = None,
+    loss: Literal["none", LossName] | None = None,
 ) -> PartsPlan:
     """Plan the same: its parts are written, and wait in the folder for the adjustment."""
-    with _run(path, wishes, folder, division, unit_variance, None) as run:
+    with _run(path, wishes, folder, division, (unit_variance, loss), None) as run:
         return run.plan()
 
 
@@ -122,15 +126,16 @@ def _run(
     wishes: Wishes,
     folder: Path,
     division: Division,
-    unit_variance: UnitVariance | None,
+    chosen: tuple[UnitVariance | None, Literal["none", LossName] | None],
     threads: int | None,
 ) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(alone(folder))
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
-        given = streamed.project.options
-        options = core_options(unit_variance or given.unit_variance, given.loss)
+        given, (unit_variance, loss) = streamed.project.options, chosen
+        minimised = given.loss if loss is None else None if loss == "none" else loss
+        options = core_options(unit_variance or given.unit_variance, minimised)
         source = streamed.source(options)
         with opened(
             folder,

@@ -20,7 +20,7 @@ from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.files import read_lines
 from photogram.messages import listed
 
-__all__ = ["MicmacMarks", "read_marks", "write_marks"]
+__all__ = ["MicmacMarks", "has_marks", "read_marks", "write_marks"]
 
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
 SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
@@ -71,6 +71,17 @@ class MicmacMarks:
         }
 
 
+def has_marks(folder: Path) -> bool:
+    """Whether a folder has readings of marks by MicMac."""
+    return bool(_of_images(folder)[1])
+
+
+def _of_images(folder: Path) -> tuple[Path, list[Path]]:
+    """Return where the readings of marks are, and the files of the images."""
+    scans = folder / SCANS if (folder / SCANS).is_dir() else folder
+    return scans, sorted(scans.glob("MeasuresIm-*.xml"))
+
+
 def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     """Read the marks of a folder of MicMac.
 
@@ -91,8 +102,7 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
         Files that are missing, cannot be read, or are of something else; a mark that is there twice, that the
         camera has not, or that `id_fiducial.txt` names and the camera has not, or the other way round.
     """
-    scans = folder / SCANS if (folder / SCANS).is_dir() else folder
-    files = sorted(scans.glob("MeasuresIm-*.xml"))
+    scans, files = _of_images(folder)
     if not files:
         raise InputError("has no MeasuresIm-*.xml", file=scans)
     beside = [path for path in (scans / CAMERA, folder / CAMERA, scans.parent / CAMERA) if path.is_file()]

@@ -48,6 +48,8 @@ FORMATS: dict[str, Format] = {
 }
 """By name, in the order in which help lists them."""
 _TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
+SD = ("images", "control", "check", "gnss")
+"""What of any format may have standard deviations that its files do not say."""
 MOST = 200
 """Files of a folder that are looked at where the folder itself has no format."""
 
@@ -123,6 +125,8 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
             wishes = wishes or Wishes()
             if wishes.settings and chosen.name != "plain":
                 raise InputError(f"is no plain project but {chosen.title}, which has no settings: --set")
+            if (own := [each for each in wishes.sd if each not in SD]) and chosen.name != "plain":
+                raise InputError(f"is no plain project but {chosen.title}, which has no {own[0]}: --sd")
             project = chosen.read(path, wishes)
             if wishes.photos is not None or "settings" in project.details:
                 from photogram.formats.metadata.adding import with_wished_photos

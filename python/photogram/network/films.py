@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
+from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
@@ -177,8 +177,8 @@ class Reseau(Pattern):
         (2,) standard deviations of a shift in x and in y, mm.
     smooth
         That of second differences along rows and columns, mm; infinite: shifts do not know each other.
-    shifts
-        (n, 2) of nodes, row by row; errorless where they are given.
+    weights
+        The shifts of its nodes, row by row; none: they are made, free.
 
     Raises
     ------
@@ -186,6 +186,7 @@ class Reseau(Pattern):
         More unknowns than a photo should have, or deviations that are none.
     """
 
+    kind: str = field(default="grid", init=False)
     photo: str
     sd: ArrayLike
     smooth: float
@@ -196,7 +197,7 @@ class Reseau(Pattern):
         numbers: ArrayLike,
         sd: ArrayLike,
         smooth: float = np.inf,
-        shifts: ArrayLike | None = None,
+        weights: Sequence[Weights] = (),
     ) -> None:
         own = shaped("numbers of the reseau", numbers, (6,))
         nodes = int(np.prod(own[4:]))
@@ -211,14 +212,12 @@ class Reseau(Pattern):
         object.__setattr__(self, "photo", photo)
         object.__setattr__(self, "sd", deviations)
         object.__setattr__(self, "smooth", float(smooth))
-        given = np.zeros((nodes, 2)) if shifts is None else shaped("shifts of the reseau", shifts, (nodes, 2))
-        known = np.inf if shifts is None else 0.0
-        weights = [Weights(f"{photo} node {k}", shift, known) for k, shift in enumerate(given, 1)]
-        super().__init__("grid", own, weights)
+        super().__init__("grid", own, weights or _nodes(photo, np.zeros((nodes, 2)), np.inf))
 
-    def with_shifts(self, shifts: Floats) -> Reseau:
-        """Return it with known shifts."""
-        return Reseau(self.photo, self.numbers, self.sd, self.smooth, shifts)
+    def with_shifts(self, shifts: ArrayLike) -> Reseau:
+        """Return it with (n, 2) shifts of its nodes, row by row, that are errorless."""
+        given = shaped("shifts of the reseau", shifts, (len(self.weights), 2))
+        return Reseau(self.photo, self.numbers, self.sd, self.smooth, _nodes(self.photo, given, 0.0))
 
     @property
     def covariance(self) -> Floats:
@@ -232,6 +231,10 @@ class Reseau(Pattern):
             found[k::2, k::2] = np.linalg.inv(np.eye(rows * columns) / sd**2 + stiff)
         symmetric: Floats = (found + found.T) / 2
         return symmetric
+
+
+def _nodes(photo: str, shifts: Floats, sd: float) -> list[Weights]:
+    return [Weights(f"{photo} node {k}", shift, sd) for k, shift in enumerate(shifts, 1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -374,8 +377,8 @@ def check_scans(
         if photo_cameras is None:
             continue
         camera = cameras[int(photo_cameras[rows[each.photo]])]
-        if camera.unit != "mm" or camera.image_y == "down":
-            raise InputError(f"the photo {each.photo} is a scanned film: its camera is in mm, y up")
+        if camera.unit != "mm" or (camera.image_y == "down" and camera.model != "plate"):
+            raise InputError(f"the photo {each.photo} is a scanned film: its camera is in mm, y up, or plate")
         if camera.model.startswith("on_comparator"):
             raise InputError(
                 f"the photo {each.photo} is a scanned film, and its camera is on_comparator, which has a"

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import shaped
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -66,7 +65,10 @@ def projected(
         A scanner on a trajectory that has one record, or with a factor of line rates and no time.
     """
     places = shaped("points", points, (len(np.asarray(points)), 3))
-    seen = partial(standing, own, trajectory, camera, places, values=values)
+
+    def seen(times: Floats, rows: Indices | slice = slice(None)) -> Floats:
+        return standing(own, trajectory, camera, places[rows], times, values=values)
+
     offset = 0.0 if own.offset is None else float(values(own.offset)[0][0])
     rate = 1.0 if own.readout is None else float(values(own.readout)[0][0])
     if own.rate is not None and own.time is None:
@@ -145,34 +147,41 @@ def camera_of(block: Block, photo: int) -> Camera:
 
 
 def _crossed(
-    own: Timed, ends: tuple[float, float], seen: Callable[[Floats], Floats], count: int
+    own: Timed, ends: tuple[float, float], seen: Callable[[Floats, Indices], Floats], count: int
 ) -> tuple[Floats, Floats]:
     """Return the times at which images of points cross the line of sensors, and their samples there."""
     sensor, lines = own.line_sensor, own.lines
     if sensor is None or lines is None or not np.isfinite(ends).all():
         raise InputError(f"the scanner {own.photo} needs a trajectory with more than one record")
 
-    def past(times: Floats) -> tuple[Floats, Floats]:
+    def past(times: Floats, rows: Indices) -> tuple[Floats, Floats]:
         """Return how far the image of each point is from the line of sensors, and its sample."""
-        samples, apart = sensor.abreast(seen(times))
+        samples, apart = sensor.abreast(seen(times, rows))
         return apart, samples
 
+    rows: Indices = np.arange(count)
+    low: Floats
+    high: Floats
     low, high = (np.full(count, end) for end in ends)
-    (below, _), (above, _) = past(low), past(high)
-    crossed = below * above <= 0
+    (below, _), (above, _) = past(low, rows), past(high, rows)
+    times, samples = np.full((2, count), np.nan)
     seconds = np.abs(np.asarray(lines.table)[:, 2]).min()
     close = max(CLOSE_LINES * seconds, 4 * np.spacing(np.abs(ends).max()))
+    going = below * above <= 0
     for _ in range(STEPS):
+        rows = rows[going]
+        low, high, below, above = (each[going] for each in (low, high, below, above))
+        if not len(rows):
+            break
         with np.errstate(divide="ignore", invalid="ignore"):
             middle = high - above * (high - low) / (above - below)
         middle = np.where(np.isfinite(middle), middle, 0.5 * (low + high))
-        found, samples = past(middle)
+        found, samples[rows] = past(middle, rows)
         left = found * above > 0
         # The end that stays counts half, so that it does not stay for ever.
         below = np.where(left, 0.5 * below, above)
         low = np.where(left, low, high)
-        moved = np.abs(middle - high)
-        high, above = middle, found
-        if not (moved[crossed] > close).any():
-            break
-    return np.where(crossed, high, np.nan), np.where(crossed, samples, np.nan)
+        going = np.abs(middle - high) > close
+        times[rows] = high = middle
+        above = found
+    return times, samples

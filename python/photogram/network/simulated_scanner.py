@@ -27,6 +27,10 @@ _PERIODS = 8.0, 30.0
 """Seconds, of the three waves that roll and pitch are made of."""
 _BEYOND = 2
 """Lines beyond the first and the last, to which trajectories reach."""
+_SURE = 5.0
+"""Standard deviations within which the measurement of a line stays: where the ground moves slowly past the
+line, an error in the focal plane is one of many lines.
+"""
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,8 @@ class Flown:
         The camera: its lines of sensors are as long as the frame; millimetres.
     height, crab, tilt
         Above the mean terrain, metres; largest deviations from the heading and from the vertical, radians.
+    image_sd
+        Of measurements in the focal plane, millimetres.
     errors, sd
         Standard deviations of the coefficients of positions and rotations, and of their observations, in
         metres and radians.
@@ -54,6 +60,7 @@ class Flown:
     height: float
     crab: float
     tilt: float
+    image_sd: float
     errors: tuple[float, float]
     sd: tuple[float, float]
     origin: Floats
@@ -128,7 +135,7 @@ def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Gene
             ids.append(each.name if len(cameras) == 1 else f"{each.name} {name}")
             for photos, trajectory in zip(timed, both, strict=True):
                 photos.append(Timed(ids[-1], trajectory, lines=lines, line_sensor=sensor))
-            found.append(_images(each, timed[0][-1], camera, ground))
+            found.append(_images(each, timed[0][-1], camera, ground, flown.image_sd))
             poses.append(pose)
     of = np.repeat(np.arange(len(ids)), [len(points) for points, _, _ in found])
     points, xy, per_error = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -234,7 +241,9 @@ def _records(
     return parts
 
 
-def _images(each: _Pass, own: Timed, camera: Camera, ground: Floats) -> tuple[Indices, Floats, Floats]:
+def _images(
+    each: _Pass, own: Timed, camera: Camera, ground: Floats, sd: float
+) -> tuple[Indices, Floats, Floats]:
     """Return points that an image of a pass shows, their samples and lines, and these by errors."""
     assert own.trajectory is not None
     assert own.lines is not None
@@ -251,4 +260,8 @@ def _images(each: _Pass, own: Timed, camera: Camera, ground: Floats) -> tuple[In
     by = np.empty((len(points), 2, 2))
     by[:, :, 0] = own.line_sensor.pitch
     by[:, :, 1] = before - after
-    return points, xy, np.asarray(np.linalg.inv(by), dtype=np.float64)
+    per_error = np.asarray(np.linalg.inv(by), dtype=np.float64)
+    # What may be measured beyond the image is not in it.
+    apart = _SURE * sd * np.linalg.norm(per_error[:, 1], axis=1) - _BEYOND
+    inside = (xy[:, 1] >= apart) & (xy[:, 1] <= extent[1] - apart)
+    return points[inside], xy[inside], per_error[inside]

@@ -244,6 +244,7 @@ def simulate(
             height=flying_height,
             crab=crab,
             tilt=tilt,
+            image_sd=image_sd,
             errors=(position_error, attitude_error),
             sd=(position_sd, attitude_sd),
             origin=centre,

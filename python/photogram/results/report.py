@@ -195,7 +195,7 @@ def _adjustment(result: Result) -> list[str]:
         ("weighted sum of squares, total", f"{sums.total:.6f}"),
         *size_of(result),
     ]
-    return [f"{name:<36}{value}" for name, value in rows]
+    return [f"{name:<35} {value}" for name, value in rows]
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:

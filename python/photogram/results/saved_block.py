@@ -15,7 +15,7 @@ from photogram.messages import Message, Undetermined
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.core import CoreOptions
-from photogram.network.films import Film, Pattern, Readings
+from photogram.network.films import Film, Pattern, Readings, Reseau
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.motion import scanners
@@ -58,6 +58,7 @@ _CLASSES = (
     Film,
     Pattern,
     Readings,
+    Reseau,
     Camera,
     CoreOptions,
     Feature,

@@ -133,7 +133,7 @@ def fact_lines(facts: Sequence[Fact]) -> list[str]:
     for each in facts:
         said = f" ({each.note})" if each.note else ""
         name = each.name if each.name[1:2].isupper() else each.name[:1].lower() + each.name[1:]
-        lines.append(f"{name:<36}{f'{each.value} {each.unit}'.rstrip()}{said}")
+        lines.append(f"{name:<35} {f'{each.value} {each.unit}'.rstrip()}{said}")
     return lines
 
 

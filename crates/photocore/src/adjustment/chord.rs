@@ -9,18 +9,10 @@
 use std::time::Instant;
 
 use super::equations::ObservationEquations;
-use super::method::NEGLIGIBLE;
+use super::history::History;
 use super::options::{Iteration, Phase};
 use super::result::{AdjustError, unless_stopped};
 use super::run::{Run, State, between};
-
-/// Steps that change the unknowns by less than this multiple of their standard deviations leave the normal equations as they are, to much
-/// less than what a chord gains.
-const CLOSE: f64 = 30.0;
-/// And by more than this one: after a shorter step the next one is the last.
-const NOT_YET: f64 = 10.0 * NEGLIGIBLE;
-/// A step so small a part of the one before is on the way to the end, and so is a chord after it.
-const FALLING: f64 = 0.1;
 
 impl<'a> Run<'a, '_> {
     /// The values that a step leads to, and a chord after it where that pays.
@@ -40,13 +32,11 @@ impl<'a> Run<'a, '_> {
         let equations = ObservationEquations::evaluated(problem, at, &self.datum, None);
         let prior = problem.prior_equations(&problem.terms(&values), &self.datum);
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let chord = problem.system.chord(self.threads, factor, &equations, &prior, &mut between);
+        let chord = problem.system.chord(self.threads, factor, (&equations, &prior), &mut between);
         self.seconds.solve += start.elapsed().as_secs_f64();
         let (chord, decrease) = unless_stopped(chord)?;
         let change = decrease.sqrt();
-        // What is not a number does not fall.
-        let falls = change <= FALLING * iteration.largest_change;
-        if !falls {
+        if !History::is_chord(change, iteration.largest_change) {
             return Ok(values);
         }
         self.chord = Some(change);
@@ -54,12 +44,15 @@ impl<'a> Run<'a, '_> {
     }
 
     fn is_for_chord(&self, step: &Iteration) -> bool {
-        let full = |iteration: &&Iteration| iteration.damping == 0.0;
-        let before = self.iterations.last().filter(full);
-        full(&step)
+        step.damping == 0.0
             && self.options.loss.is_none()
             && self.problem.model.ends_slowly()
-            && (NOT_YET..CLOSE).contains(&step.largest_change)
-            && before.is_some_and(|before| step.largest_change <= FALLING * before.largest_change)
+            && self.history().is_for_chord(step.largest_change)
+    }
+
+    /// What the steps so far say of the next.
+    pub(super) fn history(&self) -> History<'_> {
+        let unknowns = self.problem.layout().unknowns();
+        History { iterations: &self.iterations, chord: self.chord, unknowns }
     }
 }

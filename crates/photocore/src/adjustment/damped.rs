@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::method::{self, IN_THE_MEAN, NEGLIGIBLE, Stop, leaves_cofactors};
+use super::method::{self, NEGLIGIBLE, Stop};
 use super::options::{Iteration, Status};
 use super::result::AdjustError;
 use super::run::{End, NEAR, Run, State};
@@ -12,9 +12,6 @@ const ROUNDING: f64 = 1e-12;
 /// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
 /// hundredth of a standard deviation of the combination of unknowns that they follow.
 const STILL: f64 = 1e-4;
-/// So many full steps, the last of which is longer than this part of the first, do not fall any more.
-const ALIKE: usize = 5;
-const FALLING: f64 = 0.9;
 /// A step that changes the unknowns by more than this multiple of their standard deviations, in the mean, is so long that local
 /// unknowns are better computed afresh than linearized.
 const FAR: f64 = 30.0;
@@ -48,15 +45,12 @@ const MOST_FAILURES: usize = 4;
 const SHORT: f64 = 1e-2;
 
 /// The constants of these rules by name, for whoever controls the steps of a problem in parts (see [`super::Linearized::of_part`]).
-pub fn step_rules() -> [(&'static str, f64); 11] {
+pub fn step_rules() -> [(&'static str, f64); 8] {
     [
         ("rounding", ROUNDING),
         ("negligible", NEGLIGIBLE),
-        ("in_the_mean", IN_THE_MEAN),
         ("far", FAR),
         ("still", STILL),
-        ("alike", ALIKE as f64),
-        ("falling", FALLING),
         ("first_damping", FIRST_DAMPING),
         ("least_damping", LEAST_DAMPING),
         ("most_damping", MOST_DAMPING),
@@ -144,7 +138,7 @@ impl<'a> Run<'a, '_> {
         let iteration = Iteration { number, sum_of_squares: control.best, largest_change, damping };
         let is_last = damping == 0.0
             && (self.is_last(control.stop, largest_change) || self.is_foreseen(control, &state, &step));
-        let rests = damping == 0.0 && !is_last && self.falls_no_more(largest_change);
+        let rests = damping == 0.0 && !is_last && self.history().falls_no_more(largest_change);
         if rests {
             self.weak = state.moved(&step);
         }
@@ -335,26 +329,9 @@ impl<'a> Run<'a, '_> {
         Ok(None)
     }
 
-    /// Whether a step leaves cofactors as they are and, the steps falling at the rate of the last two, chords counted, all further ones together
-    /// would not exceed a limit (Hairer and Wanner 1996, section IV.8).
+    /// Whether all further steps together would not exceed a limit; secants say nothing of a rate.
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
-        let before = self.iterations.last().filter(|iteration| iteration.damping == 0.0);
-        let rate = before.map_or(1.0, |before| change / self.chord.unwrap_or(before.largest_change));
-        let unknowns = self.problem.layout().unknowns();
-        !self.secants.correct()
-            && leaves_cofactors(change, unknowns)
-            && rate < 1.0
-            && rate / (1.0 - rate) * change <= limit
-    }
-
-    /// Whether full steps are negligible and have long been as long as this one: what still moves, the observations do not determine
-    /// beyond the rounding of its equations.
-    fn falls_no_more(&self, change: f64) -> bool {
-        let last = self.iterations.len().checked_sub(ALIKE).map(|first| &self.iterations[first..]);
-        last.is_some_and(|last| {
-            let negligible = |step: &Iteration| step.damping == 0.0 && step.largest_change <= NEGLIGIBLE;
-            change <= NEGLIGIBLE && last.iter().all(negligible) && change > FALLING * last[0].largest_change
-        })
+        !self.secants.correct() && self.history().leaves_less_than(limit, change)
     }
 
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.

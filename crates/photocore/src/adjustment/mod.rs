@@ -69,6 +69,7 @@ mod ended;
 mod equations;
 mod group_step;
 mod group_test;
+mod history;
 mod in_datum;
 mod leverages;
 mod linearized;
@@ -101,6 +102,7 @@ pub use distributions::{
     student_limit,
 };
 pub use group_test::{Few, GroupTest, VISIBLE, canonical_correlation};
+pub use history::History;
 pub use leverages::{Leverages, TieCofactors};
 pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;

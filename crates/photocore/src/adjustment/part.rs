@@ -114,30 +114,61 @@ impl Linearized {
     pub fn reduce_rights(
         &self,
         problem: &AnyProblem<'_>,
-        mut rights: Vec<f64>,
+        rights: Vec<f64>,
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<ReducedRights, PartError> {
-        // What is held or fixed stands in the normal equations by itself.
-        let unknowns = problem.layout().unknowns();
-        let fixed: Vec<usize> = (0..unknowns).filter(|&unknown| !self.is_free(problem, unknown)).collect();
-        for right in rights.chunks_exact_mut(unknowns.max(1)) {
-            fixed.iter().for_each(|&unknown| right[unknown] = 0.0);
-        }
+        let rights = self.of_free(problem, rights);
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
         let equations = self.equations(problem, threads);
         let of = (&equations as &dyn Equations, &self.prior);
         Ok(unless_stopped(problem.system.reduce_rights(threads, &self.factor, of, &rights, &mut between))?)
     }
 
+    /// Reduces the right-hand side that the equations of a part have at other values, `left` of the parts below in it: a chord, over all parts.
+    /// None where the factor has not cached what that takes.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
+    pub fn reduce_chord(
+        &self,
+        problem: &AnyProblem<'_>,
+        values: &[f64],
+        left: Vec<f64>,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Option<ReducedRights<1>>, PartError> {
+        if !self.factor.has_cached() {
+            return Ok(None);
+        }
+        let equations = ObservationEquations::new(problem, None, values, &self.held, threads);
+        let prior = problem.prior_equations(&problem.terms(values), &self.held);
+        let mut rights = self.of_free(problem, left);
+        rights.iter_mut().zip(&prior.right).for_each(|(right, own)| *right += own);
+        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        let of = (&equations as &dyn Equations, &prior);
+        let found = problem.system.reduce_chord(threads, &self.factor, of, &rights, &mut between);
+        Ok(Some(unless_stopped(found)?))
+    }
+
+    /// Right-hand sides, zero where unknowns are held or fixed: these stand in the normal equations by themselves.
+    fn of_free(&self, problem: &AnyProblem<'_>, mut rights: Vec<f64>) -> Vec<f64> {
+        let unknowns = problem.layout().unknowns();
+        let fixed: Vec<usize> = (0..unknowns).filter(|&unknown| !self.is_free(problem, unknown)).collect();
+        for right in rights.chunks_exact_mut(unknowns.max(1)) {
+            fixed.iter().for_each(|&unknown| right[unknown] = 0.0);
+        }
+        rights
+    }
+
     /// Solves where right-hand sides were reduced, the solutions for the outer unknowns being given.
     ///
     /// # Errors
     /// An interruption, no memory.
-    pub fn solve_reduced_rights(
+    pub fn solve_reduced_rights<const C: usize>(
         &self,
         problem: &AnyProblem<'_>,
-        reduced: ReducedRights,
+        reduced: ReducedRights<C>,
         outer: &[f64],
         threads: &Threads,
         watch: Watch<'_>,

@@ -96,12 +96,12 @@ impl Network {
         let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
         let mut placed: Vec<PlacedCommon> = self.commons.iter().map(place).collect();
         let time = |image: usize| times.get(image).copied().unwrap_or(AT_PHOTO);
-        let of_image = |(image, own): (usize, &Image)| mounts.commons(own.photo, Some(time(image)));
+        let of_image = |(image, own): (usize, &Image)| mounts.commons(own.photo, time(image));
         images.iter().enumerate().flat_map(of_image).for_each(|common| placed[common].uses += 1);
         for Touches { photos, commons, .. } in
             selected.observations.iter().map(|&k| self.observations[k].touches())
         {
-            let of_poses = photos.into_iter().flat_map(|photo| mounts.commons(photo, Some(AT_PHOTO)));
+            let of_poses = photos.into_iter().flat_map(|photo| mounts.commons(photo, AT_PHOTO));
             let own = commons.into_iter().map(|(common, _)| common);
             own.chain(of_poses).for_each(|common| placed[common].uses += 1);
         }

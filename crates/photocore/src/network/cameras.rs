@@ -99,12 +99,13 @@ impl Bundle {
     }
 
     /// The places of the common unknowns that have blocks: the medians of those of the photos and points that they belong to; `tied`
-    /// are those of the points that are not local.
+    /// are those of the points that are not local. Those of a trajectory that count at some times only are where it is then.
     pub(super) fn places_of_commons(&self, photos: &[[f64; 3]], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut of_commons: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.commons.len()];
         for (photo, &place) in photos.iter().enumerate() {
-            self.mounts.commons(photo, None).into_iter().for_each(|common| of_commons[common].push(place));
+            self.mounts.always(photo).for_each(|common| of_commons[common].push(place));
         }
+        self.mounts.places_of_coefficients().for_each(|(common, place)| of_commons[common].push(place));
         for (common, photo) in self.passages.own() {
             of_commons[common].push(photos[photo]);
         }

@@ -28,7 +28,7 @@ impl Bundle {
     /// The retained blocks that a pose is made of: the main one, then those of common unknowns that are not known.
     pub(super) fn blocks_of_pose(&self, photo: usize, at: f64) -> impl Iterator<Item = usize> {
         let main = self.main_block_of_pose(photo);
-        let commons = self.mounts.commons(photo, Some(at)).into_iter();
+        let commons = self.mounts.commons(photo, at).into_iter();
         let others = commons.filter_map(|common| Some(self.blocks.of_common[common]?.block));
         let mut seen: SmallVec<[usize; 16]> = smallvec![main];
         let once = move |&own: &usize| {

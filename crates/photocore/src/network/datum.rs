@@ -68,9 +68,17 @@ impl Bundle {
             let own = touches.photos.iter().map(|&photo| self.carrier(photo));
             joined.join(own.chain(touches.points.iter().map(|&point| of_point(point))).chain(commons));
         }
+        let mut on_trajectories = vec![];
+        for own in self.mounts.trajectories() {
+            let coefficients = own.position.iter().chain(&own.rotation).copied().filter(moves);
+            let nodes: Vec<usize> = coefficients.map(of_common).collect();
+            on_trajectories.push(nodes.first().copied());
+            joined.join(nodes);
+        }
         for photo in 0..photos {
-            let commons = self.mounts.commons(photo, None).into_iter().filter(moves);
-            joined.join(std::iter::once(self.carrier(photo)).chain(commons.map(of_common)));
+            let commons = self.mounts.always(photo).filter(moves).map(of_common);
+            let flown = self.mounts.trajectory_of(photo).and_then(|own| on_trajectories[own]);
+            joined.join(std::iter::once(self.carrier(photo)).chain(commons).chain(flown));
         }
         let mut images_on = vec![0; photos];
         self.images_on.iter().enumerate().for_each(|(photo, n)| images_on[self.carrier(photo)] += n);

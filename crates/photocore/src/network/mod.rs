@@ -67,6 +67,7 @@ pub mod mounts;
 mod naming;
 mod neighbourhood;
 mod node;
+mod node_chord;
 mod node_datum;
 pub mod observations;
 mod parts;

@@ -30,6 +30,8 @@ pub struct FormedNode {
     pub(super) part: Linearized,
     /// Right-hand sides for a datum of the larger network, on their way.
     pub(super) reduced: Option<ReducedRights>,
+    /// The right-hand side of a chord, on its way.
+    pub(super) chord: Option<ReducedRights<1>>,
 }
 
 /// What a node takes, from its pattern alone.
@@ -270,7 +272,7 @@ impl Node {
         let loss = self.options.adjustment.loss;
         let options = PartOptions { held: self.held.clone(), damping, loss, curved };
         let part = Linearized::of_part(problem, state.to_vec(), contributions, options, threads, watch);
-        Ok(FormedNode { part: part.map_err(|error| self.named(error))?, reduced: None })
+        Ok(FormedNode { part: part.map_err(|error| self.named(error))?, reduced: None, chord: None })
     }
 
     /// What the observations leave undetermined of what is at home here.
@@ -352,7 +354,7 @@ impl Node {
         threads.install(make)
     }
 
-    fn check(&self, states: &[&[f64]]) -> Result<(), NetworkError> {
+    pub(super) fn check(&self, states: &[&[f64]]) -> Result<(), NetworkError> {
         let fit = states.iter().all(|state| state.len() == self.size());
         if fit { Ok(()) } else { Err(NetworkError::State) }
     }

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use super::columns::ReducedRights;
 use super::eliminated::Reduced;
 use super::equations::{Equations, Prior, TieRows};
 use super::factor::Factor;
@@ -12,35 +13,49 @@ use crate::{Stopped, Threads, parallel};
 
 impl System {
     /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
-    /// that the factor comes from: a chord step; and by how much it lowers the sum of squares of the equations there. The local blocks are
-    /// eliminated from the right-hand sides by the equations given; the others are solved, and the local blocks from them, with the factor and
-    /// what it has cached. The same bits for any number of threads.
+    /// that the factor comes from: a chord step; and by how much it lowers the sum of squares of the equations there.
     ///
-    /// For a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]). What systems below a part of
-    /// a larger one have left is not in it.
+    /// For a whole system, and a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]).
     pub fn chord(
         &self,
         threads: &Threads,
         factor: &Factor,
-        equations: &dyn Equations,
-        prior: &Prior,
+        of: (&dyn Equations, &Prior),
         between: Between<'_>,
     ) -> ControlFlow<Stopped, (Vec<f64>, f64)> {
+        let reduced = self.reduce_chord(threads, factor, of, &of.1.right, &mut *between)?;
+        let decrease = reduced.products[0];
+        let step = self.solve_reduced_rights(threads, factor, of, reduced, &[], between)?;
+        ControlFlow::Continue((step, decrease))
+    }
+
+    /// The right-hand side A^T l of equations and priors at other values than those that the factor comes from, with `rights` over all unknowns,
+    /// reduced. The local blocks are eliminated from it by the equations given, the others by the factor. The same bits for any number of
+    /// threads. For a factor that has cached what the elimination of the local blocks has left.
+    ///
+    /// `rights`: of a whole system those of priors; of a part also what the parts below it have left, and zero for outer unknowns.
+    pub fn reduce_chord(
+        &self,
+        threads: &Threads,
+        factor: &Factor,
+        (equations, prior): (&dyn Equations, &Prior),
+        rights: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, ReducedRights<1>> {
         watched(threads, between, |control| {
-            let mut others = control.allocated(self.of_others(&prior.right))?;
+            let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
+            let mut others = control.allocated(self.of_others(rights))?;
             self.add_rights_of_ties(equations, &mut others);
             let at_node = |index: usize| self.rights_at_node(equations, prior, index, control);
             let found: Vec<Reduced<1>> = parallel::map_each((0..factor.eliminated.len()).collect(), &at_node);
             // One after the other in a fixed order, whichever thread has found them.
-            found.iter().for_each(|found| found.add_to(&mut others, self.symbolic.unknowns()));
-            let reduced = others.clone();
-            factor.solve_columns(&mut others);
+            found.iter().for_each(|found| found.add_to(&mut others, counts.0));
+            factor.forward_columns(&mut others);
             let own: Vec<Vec<[f64; 1]>> = found.into_iter().map(|found| found.own).collect();
-            // With N = L L^T, r^T x is the square of L^-1 r, of which the local blocks have their parts.
-            let squares = own.iter().map(|own| dot(own.as_flattened(), own.as_flattened()));
-            let decrease = dot(&reduced, &others) + squares.sum::<f64>();
-            let elimination = self.elimination(factor, equations, prior, control);
-            Some((elimination.complete(Some(own), &others, 1)?, decrease))
+            let square = |values: &[f64]| dot(values, values);
+            let of_locals = own.iter().map(|own| square(own.as_flattened())).sum::<f64>();
+            let products = vec![of_locals + square(&others[..counts.0 - counts.1])];
+            Some(ReducedRights { own, others, products, counts })
         })
     }
 

@@ -10,20 +10,20 @@ use super::vectorised::LANES;
 use super::watch::{Between, watched};
 use crate::{Stopped, Threads};
 
-/// Right-hand sides of a part, reduced by the unknowns that it eliminates: y = L^-1 r.
+/// Right-hand sides of a part, reduced by the unknowns that it eliminates, C at a time: y = L^-1 r.
 #[derive(Debug)]
-pub struct ReducedRights {
+pub struct ReducedRights<const C: usize = LANES> {
     /// Those of the local blocks, as [`Elimination::reduce`] has them.
-    own: Vec<Vec<[f64; LANES]>>,
+    pub(super) own: Vec<Vec<[f64; C]>>,
     /// Those of the others in the order of elimination, one right-hand side after the other; of outer unknowns what is left for them.
-    others: Vec<f64>,
+    pub(super) others: Vec<f64>,
     /// y^T y of every two of them, outer unknowns not counted: over all parts that is r^T N^-1 r.
     pub products: Vec<f64>,
     /// How many unknowns are not local, and how many of them are outer ones.
-    counts: (usize, usize),
+    pub(super) counts: (usize, usize),
 }
 
-impl ReducedRights {
+impl<const C: usize> ReducedRights<C> {
     /// What is left for the outer unknowns, one right-hand side after the other.
     pub fn left(&self) -> Vec<f64> {
         let (all, outer) = self.counts;
@@ -65,12 +65,12 @@ impl System {
     }
 
     /// Solves for all unknowns of a part where right-hand sides were reduced, solutions for the outer ones being given.
-    pub fn solve_reduced_rights(
+    pub fn solve_reduced_rights<const C: usize>(
         &self,
         threads: &Threads,
         factor: &Factor,
         (equations, prior): (&dyn Equations, &Prior),
-        mut reduced: ReducedRights,
+        mut reduced: ReducedRights<C>,
         outer: &[f64],
         between: Between<'_>,
     ) -> ControlFlow<Stopped, Vec<f64>> {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::Threads;
-use photocore::adjustment::{DatumOfPart, Watch};
+use photocore::adjustment::{DatumOfPart, History, Iteration, Watch};
 use photocore::network::{
     BlockOf, FormedNode as Formed, Network, NetworkError as Failure, Node as Core, NodePrediction, Options,
     Surroundings,
@@ -28,6 +28,8 @@ use crate::work::{Workers, watched};
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Node>()?;
     module.add_class::<FormedNode>()?;
+    module.add_function(wrap_pyfunction!(judge_full_step, module)?)?;
+    module.add_function(wrap_pyfunction!(is_chord, module)?)?;
     module.add_function(wrap_pyfunction!(step_rules, module)?)
 }
 
@@ -36,6 +38,40 @@ fn step_rules() -> BTreeMap<&'static str, f64> {
     let mut rules = BTreeMap::from(photocore::adjustment::step_rules());
     rules.insert("least_redundancy", photocore::network::LEAST_REDUNDANCY);
     rules
+}
+
+/// What a full step is by its length and by the damping and length of those before.
+#[pyfunction]
+#[pyo3(signature = (taken, change, *, chord, unknowns, tolerance))]
+fn judge_full_step(
+    taken: Vec<(f64, f64)>,
+    change: f64,
+    chord: Option<f64>,
+    unknowns: usize,
+    tolerance: f64,
+) -> &'static str {
+    let row = |(number, (damping, largest_change))| Iteration {
+        number,
+        sum_of_squares: f64::NAN,
+        largest_change,
+        damping,
+    };
+    let iterations: Vec<Iteration> = taken.into_iter().enumerate().map(row).collect();
+    let history = History { iterations: &iterations, chord, unknowns };
+    if change <= tolerance || history.leaves_less_than(tolerance, change) {
+        "last"
+    } else if history.falls_no_more(change) {
+        "rests"
+    } else if history.is_for_chord(change) {
+        "before a chord"
+    } else {
+        "one of many"
+    }
+}
+
+#[pyfunction]
+fn is_chord(chord: f64, change: f64) -> bool {
+    History::is_chord(chord, change)
 }
 
 type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -113,6 +149,11 @@ impl Node {
     fn counts(&self) -> (usize, usize, usize) {
         let counts = self.node.counts();
         (counts.observations, counts.weighted, counts.unknowns)
+    }
+
+    #[getter]
+    fn ends_slowly(&self) -> bool {
+        self.node.ends_slowly()
     }
 
     #[getter]
@@ -341,6 +382,44 @@ impl FormedNode {
             self.node.solve(formed, &outer, pool, watch)
         })?;
         Ok(PyArray1::from_vec(py, step))
+    }
+
+    #[getter]
+    fn has_chord(&self) -> bool {
+        lock(&self.formed).as_ref().is_some_and(Formed::has_chord)
+    }
+
+    #[pyo3(signature = (state, left, *, threads, progress = None))]
+    fn reduce_chord<'py>(
+        &self,
+        py: Python<'py>,
+        state: Numbers<'py>,
+        left: Vec<Numbers<'py>>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Option<(Vector<'py>, f64)>> {
+        let state = numbers("state", &state)?;
+        let left =
+            left.iter().map(|left| slice("what a child has left", left)).collect::<PyResult<Vec<_>>>()?;
+        let found = self.asked(py, (threads, progress), |formed, pool, watch| {
+            self.node.reduce_chord(formed, &state, &left, pool, watch)
+        })?;
+        Ok(found.map(|(left, decrease)| (PyArray1::from_vec(py, left), decrease)))
+    }
+
+    #[pyo3(signature = (outer, *, threads, progress = None))]
+    fn solve_chord<'py>(
+        &self,
+        py: Python<'py>,
+        outer: Numbers<'py>,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Vector<'py>> {
+        let outer = numbers("outer", &outer)?;
+        let chord = self.asked(py, (threads, progress), |formed, pool, watch| {
+            self.node.solve_chord(formed, &outer, pool, watch)
+        })?;
+        Ok(PyArray1::from_vec(py, chord))
     }
 
     #[pyo3(signature = (rights, *, threads, progress = None))]

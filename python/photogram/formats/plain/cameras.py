@@ -100,7 +100,7 @@ def _of_camera(
     certificate = certificates.get(own.name)
     if certificate is None or certificate.c is None:
         return None
-    if own.values or own.deviations:
+    if own.values or own.deviations or own.calibration:
         c = abs(own.values.get("c", certificate.c))
         if abs(c - certificate.c) > OTHER_LENS:
             message = f"the camera {own.name} has c {c:g} mm, and its certificate {certificate.c:g} mm"
@@ -121,6 +121,7 @@ class _Row:
     each: str
     model: str
     weights: str
+    calibration: str
     width: float | None
     height: float | None
     pixel_mm: float | None
@@ -150,7 +151,7 @@ class _Row:
 
 def _rows(table: ColumnTable) -> Iterator[_Row]:
     """Yield the rows, from columns that are read once: a project may have a camera for each photo."""
-    words = [table.texts(name) for name in ("for_each", "model", "weights")]
+    words = [table.texts(name) for name in ("for_each", "model", "weights", "calibration")]
     texts = [table.names_once("camera"), *words]
     facts = [_present(table.numbers(name)) for name in ("width", "height", "pixel_mm")]
     values = {name: _present(table.numbers(name)) for name in table.columns if name in _ALL}
@@ -160,14 +161,14 @@ def _rows(table: ColumnTable) -> Iterator[_Row]:
         if name.startswith("sd_")
     }
     for row in range(table.count):
-        name, each, model, weights = (column[row] for column in texts)
+        name, each, model, weights, calibration = (column[row] for column in texts)
         width, height, pixel_mm = (column[row] for column in facts)
         own, sd = (
             {key: value for key, column in columns.items() if (value := column[row]) is not None}
             for columns in (values, deviations)
         )
         kinds = (each or "all").lower(), model.lower(), (weights or "corrected").lower()
-        yield _Row(name, *kinds, width, height, pixel_mm, own, sd)
+        yield _Row(name, *kinds, calibration, width, height, pixel_mm, own, sd)
 
 
 def _present(values: Floats) -> list[float | None]:
@@ -183,7 +184,30 @@ def _size(table: ColumnTable, row: int, own: _Row) -> Size | None:
     return int(own.width), int(own.height)
 
 
+def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Camera:
+    """Return a camera as its calibration by stars has it, with the covariance.
+
+    Raises
+    ------
+    InputError
+        What says the same beside it, a file that cannot be read, or is in another unit than images.
+    """
+    from photogram.stellar.cameras import camera_from
+
+    beside = given.model or given.values or given.deviations
+    if beside or read_covariances(tables).names("camera", given.name):
+        raise table.error(row, f"the camera {given.name} has a calibration, which says model and parameters")
+    found = camera_from(table.path.parent / given.calibration, given.name)
+    if (found.unit == "px") != (tables.settings.image == "px"):
+        raise table.error(
+            row, f"the calibration of the camera {given.name} is in {found.unit}, and [units] image is not"
+        )
+    return found
+
+
 def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None) -> Camera:
+    if given.calibration:
+        return _calibrated(tables, table, row, given)
     known = given.values
     model = given.model or ("brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole")
     if model not in _MODELS:

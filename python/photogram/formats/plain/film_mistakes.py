@@ -12,6 +12,7 @@ from photogram.errors import InputError
 from photogram.film.interior import conformal
 from photogram.film.which import DECIDED, which_mark
 from photogram.formats.plain.film_readings import ScannedPhoto
+from photogram.messages import listed
 from photogram.network.cameras import Camera
 
 if TYPE_CHECKING:
@@ -103,10 +104,16 @@ def mark_remarks(
         Of each photo whether its marks alone say that it is mirrored; None where nobody asked them.
     """
     said = []
-    if (mirrored := sum(map(bool, found))) > max(1.0, len(photos) / 2):
+    mirrored = [photo.name for photo, side in zip(photos, found, strict=True) if side]
+    if len(mirrored) > max(1.0, len(photos) / 2):
         said.append(
-            f"{mirrored} of {len(photos)} photos are mirrored, and nobody has said so: scanned from the other"
-            " side, or negatives; or rows count the other way than rows_down of the scanner says"
+            f"{len(mirrored)} of {len(photos)} photos are mirrored, and nobody has said so: scanned from the"
+            " other side, or negatives; or rows count the other way than rows_down of the scanner says"
+        )
+    elif mirrored:
+        said.append(
+            f"the film of {listed(mirrored, 5)} was seen from the other side, as marks or images show:"
+            " mirrored is not said there"
         )
     said += _resampled(photos)
     return said + list(_round(photos, places))

@@ -126,6 +126,7 @@ class _Reader:
         self.tables, self.table, self.covariances = tables, photos.table, covariances
         self.before = before
         machines = read_scanners(tables, covariances)
+        self.comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
         self.fiducials = read_fiducials(tables, set(photos.taken), certificates)
         self.places = self.fiducials.places
@@ -144,7 +145,7 @@ class _Reader:
         if not name and len(machines) == 1:
             own = next(iter(machines.values()))
         elif not name and not machines:
-            own = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
+            own = self.comparator
         elif name not in machines:
             raise self.table.error(row, f"column scanner: there is no scanner {quoted(name)}")
         else:
@@ -210,6 +211,7 @@ class _Reader:
                 Message(
                     f"photo {photo.name}: {len(photo.marks)} fiducials, fewer than the {LEAST[model]} of the"
                     f" {model} film: its unknowns stand on what is known of films beforehand, and on images"
+                    + ("" if len(photo.marks) > 1 else "; where it lay, its images know as far as its pose")
                 )
             )
 
@@ -227,8 +229,10 @@ class _Reader:
                 q = self.marks.places_of(photo)
                 start = np.array(conformal(q, photo.true, mirrored=mirrored)[:3])
             found.append((mirrored, start))
+        # The frame of a camera of stars is that of the plate as it was measured.
+        stars = {each.name for each in self.seen.cameras.cameras if each.image_y == "down"}
         told = [
-            None if self.marks.given_side(photo) is not None else side
+            None if photo.camera in stars or self.marks.given_side(photo) is not None else side
             for photo, (side, _) in zip(self.photos, found, strict=True)
         ]
         self.tables.messages.extend(
@@ -349,7 +353,7 @@ def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[M
     found = list(cameras.cameras)
     for row in used:
         camera = found[row]
-        if camera.parameters.get("c", -1.0) > 0:
+        if camera.image_y == "up" and camera.parameters.get("c", -1.0) > 0:
             found[row] = camera = _positive(camera)
             messages.append(
                 Message(

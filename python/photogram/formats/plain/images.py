@@ -106,7 +106,7 @@ def image_coordinates(
     """
     sd = images.sd if images.sd is None or settings.image != "um" else images.sd * 1e-3
     pixels = settings.image == "px" and settings.image_y == "down"
-    found = in_unit(settings, images.xy, pixels=pixels)
+    found = in_unit(settings, images.xy, pixels=pixels).copy()
     of_images = photo_cameras[images.photos]
     for row, camera in enumerate(cameras.cameras):
         own = of_images == row

@@ -281,7 +281,8 @@ def _reseau(table: ColumnTable, row: int) -> Callable[..., Reseau]:
     smooth = float(table.numbers("sd_smooth", np.inf, infinite=True)[row])
 
     def own(photo: str, shifts: Floats | None = None) -> Reseau:
-        return made(table, row, partial(Reseau, photo, values, sd, smooth, shifts))
+        free = made(table, row, partial(Reseau, photo, values, sd, smooth))
+        return free if shifts is None else free.with_shifts(shifts)
 
     return own
 

@@ -126,7 +126,7 @@ _COMMON = tuple(
 TABLES: Mapping[str, Schema] = {
     "cameras": Schema(
         ("camera",),
-        ("camera", "model", "for_each", "weights", "shutter", "readout_direction"),
+        ("camera", "model", "for_each", "weights", "calibration", "shutter", "readout_direction"),
         (
             *("width", "height", "pixel_mm", *_PARAMETERS, *deviation_columns(_PARAMETERS)),
             *("readout", "sd_readout", "readout_begin", "readout_end", "pitch_x", "pitch_y"),
@@ -134,7 +134,9 @@ TABLES: Mapping[str, Schema] = {
         "`camera`; `model` (default `brown` with `c`, else `pinhole`), `width`, `height`, `pixel_mm`, `f` or"
         " `fx`, `fy` or `c` (positive for the positive plane), all other parameters by the names of the"
         " model, `sd_NAME` (0 held, `inf` unknown), `for_each` (`all`, `photo`, `group`), `weights`"
-        " (`corrected`, `measured`) of backward models; of a [rolling shutter](#what-moves) `readout` (s),"
+        " (`corrected`, `measured`) of backward models; or `calibration` (`camera.json` of `photogram"
+        " stellar-camera`: model and parameters with their covariance); of a [rolling"
+        " shutter](#what-moves) `readout` (s),"
         " `sd_readout` (s; 0: known), `readout_direction` (`down`, `up`, `right`, `left`), `readout_begin`,"
         " `readout_end` (image coordinates; default: the edges of the picture), `shutter` (a name that"
         " cameras share; default: the camera's); of a [line of sensors](#what-moves) `pitch_x`, `pitch_y` (0;"

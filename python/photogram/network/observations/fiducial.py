@@ -199,7 +199,7 @@ class KnownTogether(Observation):
     @property
     def name(self) -> str:
         """Its title and the unknowns."""
-        return f"{self.title} {listed(list(self.of))}"
+        return f"{self.title} {listed(list(self.of), 4)}"
 
     @property
     def label(self) -> str:

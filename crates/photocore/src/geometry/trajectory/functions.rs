@@ -36,6 +36,11 @@ pub trait BasisModel: Sized {
         ALWAYS
     }
 
+    /// The time that a function is about; None where it is not zero at any time.
+    fn middle(&self, _k: usize) -> Option<f64> {
+        None
+    }
+
     /// How far a time may be from another whose functions are at hand as well; None where they are the same at all times.
     fn reach(&self) -> Option<f64> {
         None

@@ -96,6 +96,14 @@ macro_rules! bases {
                     $(Self::$name(own) => own.reach(),)*
                 }
             }
+
+            /// See [`BasisModel::middle`].
+            pub fn middle(&self, k: usize) -> Option<f64> {
+                match self {
+                    Self::None => None,
+                    $(Self::$name(own) => own.middle(k),)*
+                }
+            }
         }
     };
 }
@@ -200,6 +208,13 @@ impl Trajectory {
             rotations: self.rotations,
             turn,
         }
+    }
+
+    /// Where it is at a time, or at the end that is nearest to that, by its table alone.
+    pub fn place(&self, time: f64) -> Vector3 {
+        let (first, last) = self.span();
+        let nothing = |_: usize| Vector3::zeros();
+        self.at(time.max(first).min(last), &nothing, &nothing).motion.pose.position
     }
 
     /// The same with its coordinates counted from an origin.

@@ -88,6 +88,12 @@ impl BasisModel for Spline {
         (self.knots[self.degree.min(last)], self.knots[last])
     }
 
+    /// The mean of the knots inside (Greville).
+    fn middle(&self, k: usize) -> Option<f64> {
+        let inside = self.knots.get(k + 1..=k + self.degree)?;
+        Some(inside.iter().sum::<f64>() / self.degree as f64)
+    }
+
     /// A tenth of the mean distance between knots.
     fn reach(&self) -> Option<f64> {
         let (first, last) = self.span();

@@ -62,8 +62,11 @@ pub trait MountModel {
     /// The common unknowns that it is given, with their types.
     fn unknowns(&self) -> Vec<(usize, CommonKind)>;
 
-    /// All that poses at a time are made of, in the order of [`MountModel::compose`]; None for those at all times.
-    fn commons(&self, at: Option<f64>, known: &Mounts) -> Vec<usize>;
+    /// The common unknowns that a pose at a time is made of, in the order of [`MountModel::compose`].
+    fn commons(&self, at: f64, known: &Mounts) -> Vec<usize>;
+
+    /// Those that poses at all times are made of.
+    fn always(&self, known: &Mounts) -> Vec<usize>;
 
     /// Whether the pose that it begins with, and the six unknowns of that, count for nothing.
     fn replaces(&self) -> bool {
@@ -205,14 +208,47 @@ impl Mounts {
         own.map_or(carrier, |own| own.block)
     }
 
-    /// The common unknowns that a pose is made of, each once; None for all of a photo.
+    /// All trajectories.
+    pub(super) fn trajectories(&self) -> &[Trajectory] {
+        &self.trajectories
+    }
+
+    /// The trajectory that a photo is on.
+    pub(super) fn trajectory_of(&self, photo: usize) -> Option<usize> {
+        [photo, self.carrier(photo)]
+            .iter()
+            .find_map(|&photo| self.of(photo).iter().find_map(|own| own.trajectory()))
+    }
+
+    /// The common unknowns that all poses of a photo are made of.
+    pub(super) fn always(&self, photo: usize) -> impl Iterator<Item = usize> {
+        let carrier = Some(self.carrier(photo)).filter(|&carrier| carrier != photo);
+        let photos = carrier.into_iter().chain([photo]);
+        photos.flat_map(|photo| self.of(photo)).flat_map(|mount| mount.always(self))
+    }
+
+    /// The coefficients of functions that are zero at most times, each with the place of its trajectory in the middle of the others.
+    pub(super) fn places_of_coefficients(&self) -> impl Iterator<Item = (usize, [f64; 3])> {
+        self.trajectories.iter().flat_map(|Trajectory { course, position, rotation }| {
+            [(&course.position, position), (&course.rotation, rotation)].into_iter().flat_map(
+                move |(basis, all)| {
+                    let placed = move |(k, &common): (usize, &usize)| {
+                        Some((common, course.place(basis.middle(k)?).into()))
+                    };
+                    all.iter().enumerate().filter_map(placed)
+                },
+            )
+        })
+    }
+
+    /// The common unknowns that a pose is made of, each once.
     #[inline]
-    pub(super) fn commons(&self, photo: usize, at: Option<f64>) -> Vec<usize> {
+    pub(super) fn commons(&self, photo: usize, at: f64) -> Vec<usize> {
         // It is asked of every image.
         if self.is_empty() { vec![] } else { self.commons_of_mounts(photo, at) }
     }
 
-    fn commons_of_mounts(&self, photo: usize, at: Option<f64>) -> Vec<usize> {
+    fn commons_of_mounts(&self, photo: usize, at: f64) -> Vec<usize> {
         let carrier = self.carrier(photo);
         let mut all = if carrier == photo { vec![] } else { self.commons_of_mounts(carrier, at) };
         for common in self.of(photo).iter().flat_map(|mount| mount.commons(at, self)) {

@@ -28,7 +28,11 @@ impl MountModel for OnFrame {
         vec![(self.sensor, CommonKind::Sensor)]
     }
 
-    fn commons(&self, _: Option<f64>, _: &Mounts) -> Vec<usize> {
+    fn commons(&self, _: f64, known: &Mounts) -> Vec<usize> {
+        self.always(known)
+    }
+
+    fn always(&self, _: &Mounts) -> Vec<usize> {
         vec![self.sensor]
     }
 

@@ -85,9 +85,13 @@ impl MountModel for OnTrajectory {
         Some((self.trajectory, self.time_of(at, |common| known.given(common).0)))
     }
 
-    fn commons(&self, at: Option<f64>, known: &Mounts) -> Vec<usize> {
+    fn always(&self, known: &Mounts) -> Vec<usize> {
+        self.everywhere(known).chain(self.scalars()).collect()
+    }
+
+    fn commons(&self, at: f64, known: &Mounts) -> Vec<usize> {
         let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
-        let [p, r] = at.map_or([0..position.len(), 0..rotation.len()], |at| self.active(at, known));
+        let [p, r] = self.active(at, known);
         position[p].iter().chain(&rotation[r]).copied().chain(self.scalars()).collect()
     }
 

@@ -86,6 +86,6 @@ fn agrees_at(
     let columns: usize = parts.iter().map(|(_, steps)| steps.ncols()).sum();
     let main = mounts.main_block(0, &|common| Some(InBlock::whole(2 + common, widths[2 + common])));
     let own = if main < 2 { 6 } else { 0 };
-    let of_commons = mounts.commons(0, Some(at)).into_iter().map(|common| widths[2 + common]);
+    let of_commons = mounts.commons(0, at).into_iter().map(|common| widths[2 + common]);
     assert_eq!(columns, own + of_commons.sum::<usize>(), "all that it is made of");
 }

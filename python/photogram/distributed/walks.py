@@ -1,0 +1,264 @@
+"""Walks over the tree of a block in parts: up to form and eliminate, down to solve and invert.
+
+What a walk adds up it adds in the order of the numbers of the nodes, whoever has been faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from photogram.adjustment.adjustment import Progress
+from photogram.arguments.types import Floats
+from photogram.declared import dataclass
+from photogram.distributed.cut import Tree
+from photogram.distributed.datum import InDatum
+from photogram.distributed.executors import Executor, Handle
+from photogram.distributed.reforming import Reforming
+from photogram.distributed.tasks import Formed, Job, Lost, Point, about, formed, inverted, lost, state_path
+from photogram.errors import AdjustmentError, PhotogramError
+from photogram.results.iteration import Iteration
+
+__all__ = ["LostFactorError", "Up", "Walks"]
+
+ATTEMPTS = 20
+"""So often is a node formed again that a worker has taken with it."""
+
+
+@dataclass
+class Up:
+    """Normal equations that are formed: what every node leaves, and the sums."""
+
+    at: Point
+    contributions: dict[int, Handle]
+    sum_of_squares: float
+    decrease: float
+    products: Floats | None
+    """B^T Q B, where the block was moved to a datum."""
+
+
+class LostFactorError(PhotogramError):
+    """The factor of a node is lost: it has to be formed again.
+
+    Parameters
+    ----------
+    number
+        The node.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"the factor of node {number} is lost")
+        self.number = number
+
+
+class Walks:
+    """Walks over the tree.
+
+    Parameters
+    ----------
+    job
+        What tasks are told.
+    tree
+        The tree of the nodes.
+    executor
+        Does the tasks.
+    progress
+        Told of parts done.
+    """
+
+    def __init__(
+        self,
+        job: Job,
+        tree: Tree,
+        executor: Executor,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> None:
+        self.job, self.tree, self.executor = job, tree, executor
+        self._progress = progress
+        # Neighbours to one worker: less is sent. Later, where nodes were last: they need not be read again.
+        places, parts = executor.places(), int(tree.spans[:, 1].max())
+        self._places = [places[first * len(places) // parts] for first in tree.spans[:, 0].tolist()]
+        self.nodes = range(len(tree))
+        heights = np.zeros(len(tree))
+        for node in range(tree.root - 1, -1, -1):
+            heights[node] = heights[tree.parents[node]] + 1
+        # Deep nodes first: what waits for them waits longest.
+        self._costs = heights.tolist()
+
+    def all(self, function: Callable[..., Any], *given: Any, phase: str) -> list[Any]:
+        """Return what a task gives of each node."""
+        return self.sums([self.do(function, node, *given) for node in self.nodes], phase)
+
+    def climb(self, function: Callable[..., Any], *given: Any) -> dict[int, Handle]:
+        """Do a task of every node, children before parents: it is given what those of its children leave."""
+        handles: dict[int, Handle] = {}
+        for node in self.nodes:
+            below = [handles[child] for child in self.tree.children[node]]
+            handles[node] = self.do(function, node, *given, below)
+        return handles
+
+    def up(self, at: Point) -> Up:
+        """Form all nodes, children before parents."""
+        handles = self.climb(formed, at)
+        told = [self.executor.submit(about, handles[node]) for node in self.nodes]
+        try:
+            found: list[Formed] = self.sums(told, "form")
+        except BaseException:
+            self.executor.forget([*told, *handles.values()])
+            raise
+        self._places = [each.place for each in found]
+        return Up(
+            at,
+            handles,
+            sum(each.sum_of_squares for each in found),
+            sum(each.decrease for each in found),
+            _added([each.products for each in found if each.products is not None]),
+        )
+
+    def substitute(self, up: Up, task: Callable[[int, Floats], Handle]) -> None:
+        """Do a task of every node that takes what outer unknowns are, and gives those of its children."""
+        wanted: dict[int, Floats] = {self.tree.root: np.zeros(0)}
+
+        def then(node: int, handle: Handle) -> None:
+            wanted.update(zip(self.tree.children[node], self.found(handle), strict=True))
+            self.executor.forget([handle])
+
+        self._down(up, lambda node: task(node, wanted[node]), then, "solve")
+
+    def invert(self, up: Up, after: str, variance: float | None, datum: InDatum | None) -> None:
+        """Invert from the root down; every node writes what has become of it.
+
+        What a node has handed down, and what its children have left, stays until all below it is done: they
+        are needed again where a worker is lost.
+        """
+        done: dict[int, Handle] = {}
+        left = [1 + sum(1 for other in self.nodes if node in self.tree.above(other)) for node in self.nodes]
+
+        def task(node: int) -> Handle:
+            parent = int(self.tree.parents[node])
+            place = 0 if parent < 0 else self.tree.children[parent].index(node)
+            above = None if parent < 0 else done[parent]
+            return self.do(inverted, node, up.at, after, variance, above, place, datum)
+
+        def then(node: int, handle: Handle) -> None:
+            # Cofactors stay where they are: this asks only whether they are there.
+            self.found(self.executor.submit(lost, handle))
+            if node in done:
+                self.executor.forget([done[node]])
+            else:
+                for each in (node, *self.tree.above(node)):
+                    left[each] -= 1
+                    if not left[each] and each != node:
+                        below = [up.contributions[child] for child in self.tree.children[each]]
+                        self.executor.forget([done[each], *below])
+            done[node] = handle
+            if not self.tree.children[node]:
+                self.executor.forget([handle])
+
+        self._down(up, task, then, "invert")
+
+    def _down(
+        self, up: Up, task: Callable[[int], Handle], then: Callable[[int, Handle], None], phase: str
+    ) -> None:
+        """Do a task of every node, parents before children.
+
+        A node whose factor was lost with its worker is formed again from what its children have left. What a
+        parent has handed down may be lost too, and Dask cannot make it again without that factor: then the
+        parent goes first, and what waits for it after it.
+        """
+        parents = self.tree.parents.tolist()
+        waiting: dict[Handle, tuple[int, int]] = {}
+        reforming = Reforming(lambda node: self._form_again(up, node), lambda node: self._places[node])
+        rounds = [0] * (len(self.tree) + 1)
+        again: dict[int, list[int]] = {}
+        failures = 0
+
+        def begin(node: int) -> None:
+            waiting[task(node)] = node, rounds[parents[node]]
+
+        begin(self.tree.root)
+        while waiting or reforming.handles:
+            handle = self.executor.first([*waiting, *reforming.handles])
+            if handle in reforming.handles:
+                node = reforming.handles.pop(handle)
+                self._places[node] = self.executor.value(handle).place
+                begin(node)
+                continue
+            node, since = waiting.pop(handle)
+            parent = parents[node]
+            reforming.over(node)
+            try:
+                then(node, handle)
+            except LostFactorError as missed:
+                failures += 1
+                if failures > ATTEMPTS * len(self.tree):
+                    raise AdjustmentError(
+                        "workers were lost too often; the run can be taken up again"
+                    ) from None
+                if missed.number == node:
+                    reforming.begin(node)
+                elif parent in again:
+                    again[parent].append(node)
+                elif rounds[parent] > since:
+                    begin(node)
+                else:
+                    again[parent] = [node]
+                    begin(parent)
+                continue
+            rounds[node] += 1
+            if rounds[node] == 1:
+                self.tell(phase, sum(map(bool, rounds)), len(self.tree))
+            for each in again.pop(node, []) if rounds[node] > 1 else self.tree.children[node]:
+                begin(each)
+
+    def _form_again(self, up: Up, node: int) -> Handle:
+        """Have a node formed again whose factor was lost; return the handle of what tells of it."""
+        below = [up.contributions[child] for child in self.tree.children[node]]
+        old = up.contributions[node]
+        up.contributions[node] = self.do(formed, node, up.at, below)
+        self.executor.forget([old])
+        return self.executor.submit(about, up.contributions[node])
+
+    def do(self, function: Callable[..., Any], node: int, *given: Any) -> Handle:
+        """Have a task of a node done, where it was last."""
+        near, cost = self._places[node], self._costs[node]
+        return self.executor.submit(function, self.job, node, *given, near=near, cost=cost)
+
+    def found(self, handle: Handle) -> Any:
+        """Return what a task has given that needs a factor; raises LostFactorError."""
+        found = self.executor.value(handle)
+        if isinstance(found, Lost):
+            raise LostFactorError(found.number)
+        return found
+
+    def sums(self, handles: list[Handle], phase: str) -> list[Any]:
+        """Return what tasks of all nodes give, in the order of the nodes, however they arrive."""
+        waiting = dict(zip(handles, self.nodes, strict=True))
+        found: dict[int, Any] = {}
+        while waiting:
+            handle = self.executor.first(waiting)
+            found[waiting.pop(handle)] = self.executor.value(handle)
+            self.tell(phase, len(found), len(handles))
+        self.executor.forget(handles)
+        return [found[node] for node in self.nodes]
+
+    def forget(self, up: Up) -> None:
+        """Give normal equations up."""
+        self.executor.forget(list(up.contributions.values()))
+
+    def remove(self, state: str) -> None:
+        """Remove a state of all nodes."""
+        for node in self.nodes:
+            state_path(self.job.folder, node, state).unlink(missing_ok=True)
+
+    def tell(self, phase: str, done: int, total: int, iteration: Iteration | None = None) -> None:
+        """Tell of parts done."""
+        if self._progress is not None:
+            self._progress(Progress(phase, done, total, iteration))
+
+
+def _added(products: list[Floats]) -> Floats | None:
+    """Return a sum in the order of the nodes; None of nothing."""
+    return np.sum(products, axis=0) if products else None
