@@ -18,3 +18,18 @@ pub(crate) fn order(count: usize, compare: &dyn Fn(usize, usize) -> Ordering) ->
     order.sort_by(|&a, &b| compare(a, b));
     order
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn items_that_compare_equal_stay_in_their_order() {
+        let mut items: Vec<(usize, String)> = (0..50).map(|k| (k * 7 % 5, k.to_string())).collect();
+        let mut expected = items.clone();
+        expected.sort_by_key(|item| item.0);
+        sort_by(&mut items, &|a, b| a.0.cmp(&b.0));
+        assert_eq!(items, expected);
+        assert_eq!(order(3, &|a, b| b.cmp(&a)), [2, 1, 0]);
+    }
+}
