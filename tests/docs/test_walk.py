@@ -11,7 +11,7 @@ COMMANDS = {
     "index.md": 1,
     "tutorials/aerial-block.md": 6,
     "tutorials/archive.md": 18,
-    "tutorials/calibration.md": 7,
+    "tutorials/calibration.md": 8,
     "tutorials/drone.md": 7,
     "tutorials/metrology.md": 5,
     "tutorials/planetary.md": 11,

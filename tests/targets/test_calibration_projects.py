@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from given_targets import left_table, rig_small
+from given_targets import DATA, left_table, rig_small
 
 from photogram import InputError, formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
@@ -77,6 +77,59 @@ def test_an_adjusted_calibration_begins_where_it_has_ended(tmp_path):
     camera = adjusted.cameras[0]
     moved = np.abs(restarted.cameras[0].values - camera.values)[camera.estimated]
     assert (moved < 1e-5 * camera.sd[camera.estimated]).all()
+
+
+@pytest.mark.parametrize("sd0", [None, 0.3])
+def test_corners_that_are_left_out_stay_and_are_marked(tmp_path, sd0):
+    given = rig_small().replace(sd0=sd0)
+    use = given.corners.use.copy()
+    use[[3, 700]] = False
+    corners = given.corners.replace(use=use)
+    found = again(project_of(given.replace(corners=corners)), tmp_path)
+    assert "2 images are not used" in [each.text for each in found.messages]
+    *_, first, second = (tmp_path / "images.csv").read_text().splitlines()
+    assert first.endswith(",off")
+    assert second.endswith(",off")
+    calibration = calibration_of(found)
+    left = np.flatnonzero(~calibration.corners.use)
+    assert len(left) == 2
+    for row, old in zip(left.tolist(), [3, 700], strict=True):
+        own = calibration.corners
+        assert own.title(row) == corners.title(old)
+        assert own.xy[row] == pytest.approx(corners.xy[old], abs=1e-9)
+        assert own.sd[row] == pytest.approx(corners.sd[old], rel=1e-12)
+    # Written once more, by `convert` or after an adjustment, they are still there.
+    (tmp_path / "more").mkdir()
+    assert calibration_of(again(project_of(calibration), tmp_path / "more")).corners == calibration.corners
+
+
+def test_corners_that_snooping_takes_out_are_marked(tmp_path):
+    given = rig_small()
+    xy = given.corners.xy.copy()
+    xy[5] += 20.0
+    snooped = given.replace(corners=given.corners.replace(xy=xy)).snoop()
+    found = calibration_of(again(adjusted_project(snooped), tmp_path))
+    left = np.flatnonzero(~found.corners.use).tolist()
+    assert given.corners.title(5) in [found.corners.title(row) for row in left]
+    assert len(left) == np.count_nonzero(~snooped.calibration.corners.use)
+
+
+def test_a_calibration_of_mrcal_is_the_same_after_a_plain_project(tmp_path):
+    """With the priors of its lens, which have no other place, and its three outliers."""
+    given = read(DATA / "opencv8-0.cameramodel")
+    assert "3 corners not used, as the file says" in [each.text for each in given.messages]
+    adjusted = given.adjust()
+    found = calibration_of(again(adjusted_project(adjusted), tmp_path))
+    assert found.regularise == "mrcal"
+    assert np.count_nonzero(~found.corners.use) == 3
+    restarted = found.adjust()
+    assert restarted.result.sums_of_squares.total == pytest.approx(
+        adjusted.result.sums_of_squares.total, rel=1e-10
+    )
+    boards = tmp_path / "boards.csv"
+    boards.write_text(boards.read_text().replace(",mrcal,", ",other,"))
+    with pytest.raises(InputError, match="column regularise: other is none of mrcal"):
+        formats.read(tmp_path)
 
 
 @pytest.mark.parametrize(

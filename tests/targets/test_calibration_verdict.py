@@ -96,6 +96,13 @@ def test_a_lens_that_is_too_stiff_is_named():
     )
 
 
+def test_what_to_try_is_freer_than_what_was_tried():
+    stiff = Camera("simple_radial", {"f": 900.0, "cx": 511.5, "cy": 383.5, "k": -0.2})
+    (told,) = [line for line in calibrated(camera=stiff).verdict.next if line.startswith("Try ")]
+    assert "`--model opencv8`, `opencv12` or `splined_stereographic`, or a board" in told
+    assert not [line for line in calibrated().verdict.next if line.startswith("Try ")]
+
+
 def test_snooping_has_the_same_words():
     corners, poses = seen(BOARD, TRUTH, SIZE, views=8, seed=3, sd=0.2)
     xy = corners.xy.copy()

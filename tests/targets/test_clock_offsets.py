@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from photogram import InputError, RankError, adjust, formats
 from photogram.cli import app
-from photogram.formats.targets.calibrations import adjusted_project, calibration_of
+from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
 from photogram.network.cameras import Camera
 from photogram.targets import Board, Calibrated, Calibration, Corners, cross_validate, read, simulate_corners
 from photogram.targets.motion import errors_of_speeds, moving
@@ -145,10 +145,10 @@ def test_a_project_goes_on_where_it_ended(tmp_path):
 def test_an_offset_is_weighed_in_the_table_of_rigs(tmp_path):
     for name, content in formats.to_files(adjusted_project(rig().adjust()), "plain").items():
         (tmp_path / name).write_bytes(content)
-    photos, rigs = tmp_path / "photos.csv", tmp_path / "rigs.csv"
-    clock = ["clock", "time_offset", "sd_time_offset"]
-    pandas.read_csv(photos).drop(columns=clock).to_csv(photos, index=False)
+    assert "time_offset" not in (tmp_path / "photos.csv").read_text()
+    rigs = tmp_path / "rigs.csv"
     table = pandas.read_csv(rigs)
+    assert table.time_offset[1] == pytest.approx(LATE, abs=1e-4)
     table.assign(time_offset=[None, 0.0121], sd_time_offset=[None, 1e-5]).to_csv(rigs, index=False)
     again = calibration_of(formats.read(tmp_path))
     assert again.offsets.tolist() == [0.0, 0.0121]
@@ -158,6 +158,34 @@ def test_an_offset_is_weighed_in_the_table_of_rigs(tmp_path):
     frames.to_csv(tmp_path / "frames.csv", index=False)
     with pytest.raises(InputError, match="has a time_offset of b: its photos are on trajectories"):
         formats.read(tmp_path)
+
+
+def test_what_is_known_of_an_offset_is_written(tmp_path):
+    found = rig().with_offsets({"b": (0.0119, 1e-5)}).adjust()
+    for name, content in formats.to_files(adjusted_project(found), "plain").items():
+        (tmp_path / name).write_bytes(content)
+    again = calibration_of(formats.read(tmp_path))
+    assert (again.offsets[1], again.sd_offsets[1]) == (0.0119, 1e-5)
+    second = again.adjust().offsets["b"]
+    assert second.values[0] == pytest.approx(found.offsets["b"].values[0], abs=1e-8)
+    assert second.sd[0] == pytest.approx(found.offsets["b"].sd[0], rel=1e-3)
+
+
+def test_times_of_a_synchronised_rig_are_written_for_whoever_doubts_it(tmp_path):
+    known = rig().replace(sync="known", motion=None)
+    for name, content in formats.to_files(project_of(known), "plain").items():
+        (tmp_path / name).write_bytes(content)
+    assert (tmp_path / "frames.csv").read_text().startswith("frame,rig,photo,time\n")
+    again = calibration_of(formats.read(tmp_path))
+    assert again.corners.times == pytest.approx(known.corners.times)
+    found = again.replace(sync="offset").adjust()
+    assert found.offsets["b"].values[0] == pytest.approx(LATE, abs=5e-4)
+    done = CliRunner().invoke(
+        app,
+        ["calibrate", str(tmp_path), "--sync", "offset", "--out", str(tmp_path / "out"), "--no-html"],
+    )
+    assert done.exit_code in (0, 4), done.output
+    assert "clock of b" in (tmp_path / "out" / "report.txt").read_text()
 
 
 @pytest.fixture(scope="module")

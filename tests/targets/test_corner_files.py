@@ -119,6 +119,16 @@ def test_tables_that_are_wrong(tmp_path, lines, record, said):
     assert (found.value.file, found.value.record) == (path, record)
 
 
+def test_corners_that_a_table_calls_off_do_not_count(tmp_path):
+    lines = [
+        f"a,{k},{x},{y},{'off' if k == 4 else 'on' if k else ''}" for k, (x, y) in enumerate(XY.tolist())
+    ]
+    found = read_table(written(tmp_path / "c.csv", "image,point,x,y,use", *lines), SMALL)
+    assert np.flatnonzero(~found.use).tolist() == [4]
+    with pytest.raises(InputError, match="column use: 'maybe' is neither true nor false"):
+        read_table(written(tmp_path / "d.csv", "image,point,x,y,use", "a,0,1,2,maybe"), SMALL)
+
+
 def test_cameras_by_the_names_of_their_images(tmp_path):
     lines = rows("left07.jpg", "right07.jpg", "left02.jpg", "other.jpg")
     found = read_table(written(tmp_path / "c.csv", "image,point,x,y", *lines), SMALL)

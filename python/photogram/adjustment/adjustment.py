@@ -58,6 +58,8 @@ Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissectio
 
 AS_PUBLISHED = 4
 """Iterations of the 1987 program, where nobody says how many."""
+OF_KNOTS = 400
+"""Iterations at the most with the knots of a splined lens: few views leave many of them to their priors."""
 NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
 
@@ -146,7 +148,8 @@ def adjust(
         weight), or until the rate of convergence shows that none would by more than a tenth of it. A step
         that raises the sum of squares is damped (Levenberg-Marquardt). Or as the 1987 program did.
     max_iterations
-        Iterations at the most. When None, 50; 200 with a loss, as reweighting takes more of them; 4 as the
+        Iterations at the most. When None, 50; 200 with a loss, as reweighting takes more of them; 400 with a
+        splined lens, whose knots few images leave to their priors, and steps along these are short; 4 as the
         1987 program did.
     ordering
         How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
@@ -184,6 +187,8 @@ def adjust(
     if not (keep or isinstance(covariance, bool | np.bool_)):
         raise InputError(f"covariance is True, False or 'verdict', not {shown(covariance)}")
     check_datum(datum)
+    if max_iterations is None and any(each.knot_unknowns for each in block.cameras):
+        max_iterations = OF_KNOTS
     options = core_options(
         unit_variance, loss, bool(covariance), tolerance, max_iterations, ordering=ordering
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -12,17 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.choices import LossName
+from photogram.cli.components import COMPONENTS
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option, pair
+from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
+from photogram.cli.planned import UNPLANNED, Planned
 from photogram.cli.progress import shown
-from photogram.cli.projects import Deviations, OriginName, with_options
+from photogram.cli.projects import with_options
+from photogram.cli.seen import AS_FOUND, PriorName, Seen
 from photogram.cli.uncertainty import AS_USUAL, Uncertainty
-from photogram.declared import dataclass
+from photogram.declared import replace
 
 if TYPE_CHECKING:
-    from photogram.targets import Board, Calibrated, Calibration
+    from photogram.results.components import VarianceComponents
+    from photogram.show.page import Page
+    from photogram.targets import Calibrated, Calibration
 
 __all__ = ["calibrate"]
 
@@ -31,235 +34,20 @@ EXAMPLE = ("board",)
 """The packaged example, a directory of photogram.examples."""
 
 
-class ShapeName(StrEnum):
-    """What of a board is unknown."""
+class CornerBasisName(StrEnum):
+    """What groups of corners are made by."""
 
-    HELD = "held"
-    BEND = "bend"
-    POINTS = "points"
-
-
-class ViewName(StrEnum):
-    """What tells which images are of one view."""
-
-    NAME = "name"
-    TIME = "time"
-
-
-class SyncName(StrEnum):
-    """Whether images of one view were taken at one time."""
-
-    KNOWN = "known"
-    NONE = "none"
-    OFFSET = "offset"
-
-
-class PriorName(StrEnum):
-    """Whose priors cameras have."""
-
-    MRCAL = "mrcal"
-
-
-PLAIN_GOES = "--shape, --sd, --regularise, --offset alone"
-"""Options that go with a plain project."""
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What a user says of the board, of images and of the lens, with the options that say it."""
-
-    board: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CxR|FILE",
-            help="Corners along x and y of a chessboard, or its description: board.toml, Kalibr's target."
-            " Default: what lies in PATH.",
-            show_default=False,
-        ),
-    ] = None
-    spacing: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="With --board CxR: from corner to corner.", show_default=False),
-    ] = None
-    unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="Unit of the board. Default: m.", show_default=False)
-    ] = None
-    shape: Annotated[
-        ShapeName | None,
-        typer.Option(
-            help="What of the board is unknown. Default: points with 8 views or more, else held.",
-            show_default=False,
-        ),
-    ] = None
-    cameras: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="PATTERN",
-            help="Names of the images of a camera, 'left*.jpg'; again for each camera. What is left of a name"
-            " is its view.",
-            show_default=False,
-        ),
-    ] = None
-    size: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WxH", help="Width and height of the pictures, where no file says it.", show_default=False
-        ),
-    ] = None
-    views: Annotated[ViewName, typer.Option(help="What tells the images of one view.")] = ViewName.NAME
-    within: Annotated[
-        float, typer.Option(min=0.0, metavar="S", help="With --views time: seconds between them at most.")
-    ] = 0.005
-    sync: Annotated[
-        SyncName,
-        typer.Option(
-            help="Whether images of one view were taken at one time; offset: by clocks of their cameras,"
-            " whose offsets are unknown."
-        ),
-    ] = SyncName.KNOWN
-    offsets: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--offset",
-            metavar="CAMERA=S[,SD]",
-            help="What is known of the offset of a camera's clock, s; SD 0: held. Again for each.",
-            show_default=False,
-        ),
-    ] = None
-    pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
-        OriginName.CENTER
-    )
-    model: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="The lens: opencv4, opencv5, opencv8, opencv12, or a model of docs/cameras.md. Default:"
-            " opencv5 below 90 degrees of field, opencv8 above.",
-            show_default=False,
-        ),
-    ] = None
-    knots: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CxR",
-            help="With --model splined_stereographic: knots along columns and rows. Default: 30x20.",
-            show_default=False,
-        ),
-    ] = None
-    knot_sd: Annotated[
-        str | None,
-        typer.Option(
-            metavar="R,T",
-            help="Standard deviations with which knots are 0, radial and tangential, in units of the"
-            " stereographic image. Default: 1,0.1.",
-            show_default=False,
-        ),
-    ] = None
-    sd: Deviations = None
-    regularise: Annotated[
-        PriorName | None,
-        typer.Option(
-            help="Weak priors of the lens and of its centre, as mrcal has them.", show_default=False
-        ),
-    ] = None
-
-    def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
-        """Read what lies at a path; `progress` is told which photograph is searched."""
-        from photogram.targets import read
-
-        if (path / "project.toml").exists():
-            return self._of_project(path)
-        given: dict[str, Any] = {
-            "views": self.views.value,
-            "sync": self.sync.value,
-            "pixel_origin": self.pixel_origin.value,
-            "shape": self.shape and self.shape.value,
-            "regularise": self.regularise and self.regularise.value,
-        }
-        return read(
-            path,
-            board=self._board(),
-            unit=self.unit,
-            model=self.model,
-            knots=None if self.knots is None else pair(self.knots, "--knots"),
-            knot_sd=None if self.knot_sd is None else _deviations(self.knot_sd),
-            cameras=self.cameras or [],
-            within=self.within,
-            size=None if self.size is None else pair(self.size, "--size"),
-            sd0=self._sd0(),
-            offsets=_offsets(self.offsets or []),
-            progress=progress,
-            **given,
-        )
-
-    def _of_project(self, path: Path) -> Calibration:
-        """Return the calibration that a plain project is, with what a user says otherwise."""
-        from photogram import formats
-        from photogram.formats.targets.calibrations import calibration_of
-
-        found = calibration_of(formats.read(path))
-        if self != Seen(shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets):
-            raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
-        changes: dict[str, Any] = {"regularise": self.regularise and self.regularise.value}
-        if self.shape is not None:
-            changes["board"] = found.board.replace(shape=self.shape.value)
-        if self.sd is not None:
-            changes["sd0"] = self._sd0()
-        found = found.replace(**changes)
-        return found.with_offsets(_offsets(self.offsets)) if self.offsets else found
-
-    def _board(self) -> Board | Path | None:
-        """Return the board of `--board` and `--spacing`, or the file that describes it."""
-        from photogram.targets import Board
-
-        if self.board is None or Path(self.board).is_file():
-            if self.spacing is not None:
-                raise typer.BadParameter("goes with --board CxR", param_hint="--spacing")
-            return None if self.board is None else Path(self.board)
-        columns, rows = pair(self.board, "--board")
-        if self.spacing is None:
-            raise typer.BadParameter("needs --spacing", param_hint="--board")
-        return Board(columns=columns, rows=rows, spacing=self.spacing)
-
-    def _sd0(self) -> float | None:
-        from photogram.formats.additions import deviations
-
-        found = deviations(self.sd or [])
-        if found.keys() - {"images"} or len(found.get("images", (1.0,))) > 1:
-            raise typer.BadParameter("is images=S here: of a corner in x and y", param_hint="--sd")
-        return found["images"][0] if found else None
-
-
-AS_FOUND = Seen()
-"""As the files say."""
-
-
-def _deviations(text: str) -> tuple[float, float]:
-    """Return two standard deviations with a comma between them."""
-    try:
-        radial, tangential = map(float, text.split(","))
-    except ValueError:
-        raise typer.BadParameter(f"is two numbers, 1,0.1, not {text}", param_hint="--knot-sd") from None
-    return radial, tangential
-
-
-def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
-    """Return offsets of clocks with their standard deviations by cameras, from words as `right=0,0.01`."""
-    found = {}
-    for each in given:
-        camera, _, numbers = each.rpartition("=")
-        try:
-            offset, sd = map(float, (numbers if "," in numbers else f"{numbers},inf").split(","))
-        except ValueError:
-            offset = sd = math.nan
-        if not (camera and math.isfinite(offset) and sd >= 0):
-            raise typer.BadParameter(f"is CAMERA=S or CAMERA=S,SD, not {each}", param_hint="--offset")
-        found[camera] = offset, sd
-    return found
+    KIND = "kind"
+    CAMERA = "camera"
+    LEVEL = "level"
+    PHOTO = "photo"
+    COMPONENT = "component"
+    RAYS = "rays"
 
 
 @with_job
 @with_options("snooping", Snooping)
+@with_options("planned", Planned)
 @with_options("uncertainty", Uncertainty)
 @with_options("seen", Seen)
 @with_options("documents", Documents, *OF_NETWORKS)
@@ -300,7 +88,16 @@ def calibrate(
             show_default=False,
         ),
     ] = None,
+    components: Annotated[
+        list[CornerBasisName] | None,
+        typer.Option(
+            help="Estimate variance components of corners: by which factors their standard deviations are"
+            " wrong. Given more than once: of all combinations; level goes with camera alone.",
+            show_default=False,
+        ),
+    ] = None,
     uncertainty: Uncertainty = AS_USUAL,
+    planned: Planned = UNPLANNED,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -308,9 +105,12 @@ def calibrate(
     """Calibrate cameras and rigs with pictures of a board: cameras with their uncertainty.
 
     Needs no start values. The report, tables of views, points, corners and cameras, and the adjusted project
-    go to --out.
+    go to --out. With --plan it says which pictures to take, before there is one.
     """
     with job:
+        if planned.asked:
+            planned.run(job, seen, uncertainty, documents, out)
+            return
         if path is None:
             path = job.packaged(*EXAMPLE)
         target = out or (Path("example-calibrated") if example else default_out(path, "-calibrated"))
@@ -332,13 +132,15 @@ def calibrate(
             _adjusted(job, calibration, how, threads, snooping),
             lambda other: seen.read(other).adjust(**how, threads=threads),
         )
+        weights = _weights(job, found, components or [], threads)
         files = _files(found) | _cameras(found, to or [], uncertainty.need)
-        page = documents.page(job, "calibrate", target, partial(_page, found))
+        files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
+        page = documents.page(job, "calibrate", target, partial(_page, found, weights))
         drawn = pictures.of(found.result) | pictures.of_worth(found.worth)
         job.finish(
             {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
-            summary=lambda: _summarise(found),
+            summary=lambda: _summarise(found, weights),
             code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
         )
 
@@ -390,13 +192,37 @@ def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[
     return made | {FILE: cameras_covariance(found)}
 
 
-def _page(found: Calibrated) -> Any:
+def _weights(
+    job: Job, found: Calibrated, bases: list[CornerBasisName], threads: int | None
+) -> VarianceComponents | None:
+    """Estimate the variance components that are asked for."""
+    if not bases:
+        return None
+    from photogram.targets import corner_components
+
+    by: list[Any] = [each.value for each in bases]
+    with job.status("variance components") as status:
+
+        def tell(number: int, _: object) -> None:
+            if status is not None:
+                status.update(f"variance components, adjustment {number + 1}")
+
+        return corner_components(found, by, threads=threads, progress=tell)
+
+
+def _page(found: Calibrated, weights: VarianceComponents | None) -> Page:
+    from photogram.results.page.weights import components_section
     from photogram.show.ways import page_of
 
-    return page_of(found)
+    page = page_of(found)
+    more = [] if weights is None else [components_section(weights)]
+    return replace(page, sections=[*page.sections[:1], *more, *page.sections[1:]])
 
 
-def _summarise(found: Calibrated) -> None:
+def _summarise(found: Calibrated, weights: VarianceComponents | None) -> None:
+    from photogram.results.components import statement_lines
     from photogram.targets.report import calibration_summary
 
-    print_sections(calibration_summary(found), "report.txt")
+    sections = calibration_summary(found)
+    more = [] if weights is None else [("Variance components", statement_lines(weights))]
+    print_sections([*sections[:1], *more, *sections[1:]], "report.txt")

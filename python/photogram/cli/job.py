@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Job", "Reads", "Writes", "roles", "with_job"]
 
+STANDS = {"example": "--example", "plan_views": "--plan"}
+"""Options that stand for the first argument of a command, by their parameters."""
 LARGEST = 2**53
 """What integers of options may be at most: beyond it numbers are not counts."""
 
@@ -314,7 +316,7 @@ def _holds_path(kind: object) -> bool:
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
 
-    Where it has an option `--example`, that stands for its first argument.
+    Where it has an option `--example`, that stands for its first argument, as `--plan` of views does.
 
     Raises
     ------
@@ -378,7 +380,7 @@ def _check_value(parameter: Parameter, values: Mapping[str, Any]) -> None:
 
 
 def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
-    """Give arguments their values: with `--example` the first one goes without."""
+    """Give arguments their values: with what stands for the first one, that goes without."""
     arguments = {
         parameter.name: mark.metavar
         for parameter in parameters
@@ -386,13 +388,14 @@ def _arrange(parameters: Iterable[Parameter], values: dict[str, Any]) -> None:
         if isinstance(mark, ArgumentInfo)
     }
     given = [values[name] for name in arguments if values[name]]
-    example = bool(values["example"])
+    stands = [word for name, word in STANDS.items() if name in values]
+    instead = sum(bool(values.get(name)) for name in STANDS)
     first, *others = arguments.values()
-    if len(given) + example > len(arguments) or not (given or example):
-        raise typer.BadParameter(f"give {first}, or --example", param_hint=first)
-    if len(given) + example < len(arguments):
+    if len(given) + instead > len(arguments) or not (given or instead):
+        raise typer.BadParameter(f"give {first}, or {', or '.join(stands)}", param_hint=first)
+    if len(given) + instead < len(arguments):
         raise typer.BadParameter("is missing", param_hint=others[-1])
-    if example:
+    if instead:
         values.update(zip(arguments, [None, *given], strict=True))
 
 

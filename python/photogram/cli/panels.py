@@ -23,6 +23,7 @@ PANELS = {
     " together calibrate radius distances intrinsics_only knot_grid",
     "Gross errors": "snoop level fdr unit_weight outliers",
     "Uncertainty": "map_distance map_datum noise_only need cross_validate compare_with suggest",
+    "Planned views": "plan_views view_field focal away",
     "Features": "distance line plane circle sphere cylinder k coverage",
     "Statement": "standard class_h class_v class_3d area without independent language text budget project"
     " client firm surveyor statement",

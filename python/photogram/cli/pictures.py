@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from photogram.cli.options import PictureFormat
 
 if TYPE_CHECKING:
     from photogram.results.network import AdjustedNetwork
+    from photogram.show.page import Drawing
     from photogram.targets.worth import Worth
 
 __all__ = ["Pictures"]
@@ -60,8 +62,17 @@ class Pictures:
 
     def of_worth(self, worth: Worth | None) -> dict[Path, bytes]:
         """Return the pictures of what a calibration is worth as files."""
-        if self._out is None or worth is None:
+        if worth is None:
             return {}
-        from photogram.targets.worth_files import worth_pictures
+        from photogram.targets.worth_page import drawings
 
-        return {self._out / name: content for name, content in worth_pictures(worth, self._ending).items()}
+        return self.of_drawings(lambda: drawings(worth))
+
+    def of_drawings(self, make: Callable[[], Sequence[Drawing]]) -> dict[Path, bytes]:
+        """Return pictures that a page has, too, as files."""
+        if self._out is None:
+            return {}
+        from photogram.show.pictures import drawn
+
+        made = {self._out / f"{each.name}.{self._ending}": each.draw() for each in make()}
+        return {path: drawn(figure, path) for path, figure in made.items() if figure is not None}

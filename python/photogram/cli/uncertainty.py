@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from photogram.targets.cross_validation import Into
     from photogram.targets.worth import WorthOptions
 
-__all__ = ["AS_USUAL", "Uncertainty"]
+__all__ = ["AS_USUAL", "NOT_GOOD_ENOUGH", "Uncertainty", "distances_of"]
 
 NOT_GOOD_ENOUGH = 4
 """Exit code, as of results that should not be used."""
@@ -83,23 +83,17 @@ class Uncertainty:
         from photogram.targets.worth import WorthOptions
 
         return WorthOptions(
-            distances=self._distances(),
+            distances=self.distances,
             datum=self.map_datum.value,
             noise_only=self.noise_only,
             cross_validate=self._split(),
             suggest=self.suggest,
         )
 
-    def _distances(self) -> list[float]:
-        try:
-            found = [float(each) for each in (self.map_distance or "").split(",") if each.strip()]
-        except ValueError:
-            found = [math.nan]
-        if not all(each > 0 for each in found):
-            raise typer.BadParameter(
-                f"is a list of distances, 1,inf, not {self.map_distance}", param_hint="--distance"
-            )
-        return found
+    @property
+    def distances(self) -> list[float]:
+        """Of maps; none: the usual ones."""
+        return distances_of(self.map_distance, "--distance")
 
     def _split(self) -> Into | None:
         if self.cross_validate == "none":
@@ -132,7 +126,7 @@ class Uncertainty:
         if self.compare_with is None:
             return judged(found, own)
         other = calibrated(self.compare_with)
-        distances = self._distances() or [math.inf]
+        distances = self.distances or [math.inf]
         apart = [
             difference(found, other, distances, camera=number)
             for number in range(min(len(found.cameras), len(other.cameras)))
@@ -145,6 +139,17 @@ class Uncertainty:
         if self.need is None or worth is None or code:
             return code
         return code if worth.largest <= self.need else NOT_GOOD_ENOUGH
+
+
+def distances_of(text: str | None, option: str) -> list[float]:
+    """Return distances with commas between them."""
+    try:
+        found = [float(each) for each in (text or "").split(",") if each.strip()]
+    except ValueError:
+        found = [math.nan]
+    if not all(each > 0 for each in found):
+        raise typer.BadParameter(f"is a list of distances, 1,inf, not {text}", param_hint=option)
+    return found
 
 
 AS_USUAL = Uncertainty()

@@ -28,7 +28,7 @@ from photogram.results.features import Definition
 from photogram.show.brief import Brief
 from photogram.targets.board import Board
 
-__all__ = ["DatumName", "Frame", "Options", "Project", "Size", "assembled"]
+__all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]
 
 DatumName = Literal["control", "minimum", "inner"]
 Size = tuple[int, int]
@@ -71,6 +71,24 @@ class Repeated:
     xy: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
+@dataclass(frozen=True, eq=False)
+class Unused:
+    """Images of a board that were left out (`use` = `off`), which stay with the project.
+
+    Attributes
+    ----------
+    photos, points
+        Their k names.
+    xy, sd
+        (k, 2) image coordinates and their standard deviations, in the unit of the block.
+    """
+
+    photos: tuple[str, ...] = ()
+    points: tuple[str, ...] = ()
+    xy: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    sd: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Project(Brief):
     """A block with what files say of it beyond.
@@ -110,6 +128,8 @@ class Project(Brief):
         What is asked of its accuracy statement, as :meth:`photogram.Result.statement` takes it.
     boards
         What its control is the points of, where photos show a board: by name.
+    unused
+        Images of the board that were left out.
     """
 
     block: Block
@@ -128,6 +148,7 @@ class Project(Brief):
     features: Mapping[str, Definition] = field(default_factory=dict)
     statement: Mapping[str, Any] = field(default_factory=dict)
     boards: Mapping[str, Board] = field(default_factory=dict)
+    unused: Unused = field(default_factory=Unused)
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)

@@ -43,7 +43,10 @@ _SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)
 """What Excel writes before a table."""
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
-TRUE, FALSE = frozenset({"true", "yes", "1", "t", "y"}), frozenset({"false", "no", "0", "f", "n"})
+TRUE, FALSE = (
+    frozenset({"true", "yes", "on", "1", "t", "y"}),
+    frozenset({"false", "no", "off", "0", "f", "n"}),
+)
 
 
 @dataclass(frozen=True)
@@ -291,7 +294,7 @@ class ColumnTable:
             raise self.error(row, f"column {columns[column]}: {why}")
 
     def flags(self, column: str, default: bool = True) -> Bools:
-        """Return (rows,) a column of true and false (yes, no, 1, 0).
+        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0).
 
         Raises
         ------

@@ -21,7 +21,13 @@ if TYPE_CHECKING:
 
     from photogram.plots.panels import Where
 
-__all__ = ["VarianceComponents", "component_lines", "component_sections", "statement"]
+__all__ = [
+    "VarianceComponents",
+    "component_lines",
+    "component_sections",
+    "statement",
+    "statement_lines",
+]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -168,8 +174,12 @@ def _report(found: VarianceComponents) -> str:
 
 def component_sections(found: VarianceComponents) -> list[Section]:
     """Return what a reader wants first, as titled sections: verdict, what to do next, components."""
-    lines = [*statement(found), *component_lines(found)]
-    return [*verdict_sections(found.verdict), ("Variance components", lines)]
+    return [*verdict_sections(found.verdict), ("Variance components", statement_lines(found))]
+
+
+def statement_lines(found: VarianceComponents) -> list[str]:
+    """Return what to do, and the components."""
+    return [*statement(found), *component_lines(found)]
 
 
 def statement(found: VarianceComponents) -> list[str]:

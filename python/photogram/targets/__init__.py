@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from photogram.targets.grouping import residual_groups
     from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
     from photogram.targets.new_views import Candidate, NewView, Suggestions
+    from photogram.targets.nominal import nominal_camera
     from photogram.targets.output.formats import camera_files
+    from photogram.targets.planned import PlannedView, ViewPlan
     from photogram.targets.reading import read
     from photogram.targets.simulation import simulate_corners
     from photogram.targets.stereo import distance_uncertainty, triangulate
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
         uncertainty_against_distance,
         uncertainty_map,
     )
+    from photogram.targets.view_plan import plan_views
+    from photogram.targets.weighing import corner_components
     from photogram.targets.worth import Worth, WorthOptions
 
 __all__ = [
@@ -46,19 +50,24 @@ __all__ = [
     "CrossValidation",
     "FirstCalibration",
     "NewView",
+    "PlannedView",
     "Suggestions",
     "Triangulated",
     "UncertaintyCurve",
     "UncertaintyMap",
+    "ViewPlan",
     "Worth",
     "WorthOptions",
     "appraise",
     "camera_files",
     "convert_lens",
+    "corner_components",
     "cross_validate",
     "difference",
     "distance_uncertainty",
     "first_values",
+    "nominal_camera",
+    "plan_views",
     "projection_uncertainty",
     "read",
     "residual_groups",
@@ -76,10 +85,12 @@ _MADE = {
     "CrossValidation",
     "FirstCalibration",
     "NewView",
+    "PlannedView",
     "Suggestions",
     "Triangulated",
     "UncertaintyCurve",
     "UncertaintyMap",
+    "ViewPlan",
     "Worth",
 }
 """What functions make, and users do not."""
@@ -94,6 +105,7 @@ _HOMES = {
     "Candidate": "new_views",
     "Conversion": "conversion",
     "convert_lens": "conversion",
+    "corner_components": "weighing",
     "Corners": "corners",
     "cross_validate": "cross_validated",
     "CrossValidation": "cross_validation",
@@ -102,6 +114,9 @@ _HOMES = {
     "first_values": "first",
     "FirstCalibration": "first",
     "NewView": "new_views",
+    "nominal_camera": "nominal",
+    "plan_views": "view_plan",
+    "PlannedView": "planned",
     "projection_uncertainty": "uncertainty",
     "read": "reading",
     "residual_groups": "grouping",
@@ -114,16 +129,17 @@ _HOMES = {
     "uncertainty_map": "uncertainty",
     "UncertaintyCurve": "maps",
     "UncertaintyMap": "maps",
+    "ViewPlan": "planned",
     "Worth": "worth",
     "WorthOptions": "worth",
 }
 """The module of each name, loaded when it is first asked for: most blocks are no boards."""
 
 WAYS = {
-    "document_of": ("document",),
+    "document_of": {"Calibrated": ("document",), "ViewPlan": ("plan_shown",)},
     "findings_of": ("findings",),
-    "page_of": ("page",),
-    "report_of": ("report",),
+    "page_of": {"Calibrated": ("page",), "ViewPlan": ("plan_shown",)},
+    "report_of": {"Calibrated": ("report",), "ViewPlan": ("plan_shown",)},
 }
 """The files that show a result, by the names of the ways: see `photogram.show.ways`."""
 

@@ -23,7 +23,7 @@ from photogram.targets.regularisation import regularised
 from photogram.targets.start import Start
 from photogram.targets.vision import photo_poses
 
-__all__ = ["adjusted_start", "snooped_start"]
+__all__ = ["adjusted_start", "snooped_start", "weighted_block"]
 
 ROUNDS = 8
 """In which the standard deviation of corners is found, at the most, and the change that is none."""
@@ -49,7 +49,7 @@ def adjusted_start(
         # Knots that no image touches are determined by priors alone.
         free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
         if free is None:
-            result = adjust(_weighted(start), **how, covariance="verdict", tolerance=FINELY)
+            result = adjust(weighted_block(start), **how, covariance="verdict", tolerance=FINELY)
         else:
             result = _with_priors(start, free, threads)
         worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
@@ -108,7 +108,7 @@ def _has_knots(start: Start) -> bool:
     return any(each.knot_unknowns for each in start.cameras)
 
 
-def _weighted(start: Start) -> Block:
+def weighted_block(start: Start) -> Block:
     """Return the block of a calibration with the priors of its cameras."""
     if start.regularise is None:
         return start.block()
@@ -120,7 +120,7 @@ def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
     """Return the adjustment with the priors of cameras, from where that without them has ended."""
     if start.regularise is None:
         return free
-    found = adjusted_again(_weighted(start), free.options, free.state, threads=threads)
+    found = adjusted_again(weighted_block(start), free.options, free.state, threads=threads)
     assert isinstance(found, Result)
     return found
 
@@ -131,7 +131,7 @@ def snooped_start(start: Start, **options: Any) -> Calibrated:
         raise InputError("gross errors are taken out without priors of cameras: regularise is None")
     if start.sync == "offset":
         start = adjusted_start(start).calibration
-    found = snoop(_weighted(start), **options)
+    found = snoop(weighted_block(start), **options)
     result = found.judged
     assert isinstance(result, Result)
     own = start.with_images_of(result.block)

@@ -174,6 +174,11 @@ class Board(Valued, Brief):
         return f"{self.kind}, {size} points, spacing {apart} {self.unit}"
 
     @property
+    def found_whole(self) -> bool:
+        """Whether a picture must show all of its points for any to be found: they are not numbered."""
+        return self.kind in ("chessboard", "circles", "asymmetric_circles")
+
+    @property
     def grid(self) -> tuple[int, int]:
         """Points along x and y: twice the tags of an AprilGrid; of points anywhere their number, and 1."""
         if self.kind == "points":

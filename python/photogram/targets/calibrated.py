@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, fields
+from photogram.declared import dataclass, fields, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
 from photogram.network.trajectories import Clock
@@ -158,8 +158,13 @@ class Calibrated(Brief, Shown):
         late = np.array([found[each.name].values[0] if each.name in found else 0.0 for each in self.cameras])
         free = np.isinf(np.asarray(own.sd_sensors)).all(axis=1)[:, np.newaxis, np.newaxis]
         bends = own.bend if bend is None else np.where(np.isinf(own.sd_bend), bend.position[:2], own.bend)
+        # Priors as those of mrcal are added again to what is free; knots begin where they are in any case.
+        given = [
+            each if each.camera.knots is not None else replace(each, given=before)
+            for each, before in zip(self.cameras, own.cameras, strict=True)
+        ]
         return own.replace(
-            cameras=[each.restarted() for each in self.cameras],
+            cameras=[each.restarted() for each in given],
             poses=self.poses,
             sensors=np.where(free, self.sensors, np.asarray(own.sensors)),
             bend=(float(bends[0]), float(bends[1])),

@@ -28,6 +28,7 @@ __all__ = [
     "draw_cross_validation",
     "draw_difference",
     "draw_uncertainty",
+    "in_pixels",
     "steps_of_125",
 ]
 
@@ -129,7 +130,7 @@ def steps_of_125(low: float, high: float) -> Floats:
 
 def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
     with panels(ax, 1, 1, WIDTH, _height(found.size)) as (axes,):
-        _frame(axes, found.size)
+        in_pixels(axes, found.size)
         _contours(axes, found.columns, found.rows, found.sd, "px")
         _seen(axes, found.corners, found.coverage)
         said = found.model.replace("; ", "\n")
@@ -180,7 +181,7 @@ class _Apart:
 
     def draw(self, axes: Axes, title: str) -> None:
         """Draw lengths as contours, and some of the vectors, the longest as long as they are apart."""
-        _frame(axes, self.size)
+        in_pixels(axes, self.size)
         _contours(axes, self.columns, self.rows, self.lengths, "px")
         step = max(1, round(len(self.columns) / ARROWS))
         every = (slice(None, None, step), slice(None, None, step))
@@ -194,7 +195,7 @@ class _Apart:
 
     def beside(self, axes: Axes, chi2: Floats) -> None:
         """Draw what they are beside their covariances."""
-        _frame(axes, self.size)
+        in_pixels(axes, self.size)
         _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
         axes.set_title("beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it", fontsize=9.0)
 
@@ -252,9 +253,10 @@ def _seen(axes: Axes, corners: Floats, coverage: Floats) -> None:
     axes.plot(*np.vstack([coverage, coverage[:1]]).T, color=VERMILION, linewidth=1.2)
 
 
-def _frame(axes: Axes, size: tuple[int, int]) -> None:
+def in_pixels(axes: Axes, size: tuple[int, int]) -> None:
+    """Give axes the columns and rows of a picture."""
     axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
     axes.set(xlabel="column, px", ylabel="row, px")
 
 
-check_arguments(globals(), set(__all__) - {"steps_of_125"})
+check_arguments(globals(), [name for name in __all__ if name.startswith("draw")])

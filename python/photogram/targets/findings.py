@@ -6,6 +6,7 @@ from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from photogram.network.knots import KNOTTED
 from photogram.results.findings import block_findings
 from photogram.results.snooped import Snooped
 from photogram.show.ways import findings_of
@@ -13,6 +14,7 @@ from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
 from photogram.targets.calibrated import Calibrated, UnknownWeight, deviation_of_corners
 from photogram.targets.difference_test import EXPLAINED
+from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.showing import showings
 
 if TYPE_CHECKING:
@@ -21,10 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["findings", "judged"]
 
-OTHER_LENS = (
-    "Try a lens with more freedom, `--model opencv8`, `opencv12` or `splined_stereographic`, or a board whose"
-    " points are unknowns, `--shape points`: cross-validation says whether it is better."
-)
+FREER = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
+"""Lenses, and how many parameters of them are free."""
 
 
 @findings_of.register(UnknownWeight)
@@ -62,7 +62,7 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
     cross = () if worth is None else worth.cross
     wrong = [_systematic(each) for each in cross if not each.explained]
     stiff = bool(wrong) or any(each.significant for each in found.systematic)
-    other = [OTHER_LENS] if stiff else []
+    other = _other_model(calibrated) if stiff else []
     unknown = [_deviation_asked(calibrated)] if isinstance(calibrated.result, UnknownWeight) else []
     missing = [line for each in shown for line in each.next]
     agreeing = [f"{', '.join(each.cameras)}: {each.verdict}" for each in cross if each.explained]
@@ -75,6 +75,24 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
         if_usable=[*unknown, *other, *missing],
         if_withheld=[*unknown, *other, *missing],
     )
+
+
+def _other_model(calibrated: Calibrated) -> list[str]:
+    """Return what to try where the model is too stiff: lenses with more freedom, and a board with more."""
+    corners = calibrated.calibration.corners
+    free, wide = 0, False
+    for number, each in enumerate(calibrated.cameras):
+        free = max(free, len(each.estimated) if each.camera.knots is None else FREER[KNOTTED])
+        seen = corners.xy[corners.use & (corners.cameras[corners.picture] == number)]
+        wide = wide or (bool(len(seen)) and from_axis(each.camera, seen) >= WIDEST)
+    lenses = [f"`{name}`" for name, count in FREER.items() if count > free and (name == KNOTTED or not wide)]
+    tried = []
+    if lenses:
+        named = " or ".join(filter(None, (", ".join(lenses[:-1]), lenses[-1])))
+        tried.append(f"a lens with more freedom, `--model {named[1:]}")
+    if calibrated.calibration.shape != "points":
+        tried.append("a board whose points are unknowns, `--shape points`")
+    return [f"Try {', or '.join(tried)}: cross-validation says whether it is better."] if tried else []
 
 
 def _deviation_asked(calibrated: Calibrated) -> str:

@@ -18,7 +18,7 @@ from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
 from photogram.targets.sightings import Sightings
 from photogram.targets.small_block import Adjusted, adjusted_views
 
-__all__ = ["first_camera", "picture_size"]
+__all__ = ["NARROW", "WIDEST", "first_camera", "from_axis", "picture_size", "usual_models"]
 
 MANY = 62
 """Pictures that first values of a camera are adjusted by, at the most: the others would say the same."""
@@ -115,13 +115,12 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
 
 def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str | None) -> Sequence[str]:
     """Return the model that was asked for, if it can show all corners; else the usual ones, in order."""
-    farthest = _from_axis(family, seen.xy.reshape(-1, 2))
+    farthest = from_axis(family, seen.xy.reshape(-1, 2))
     if model is None:
         ends = np.array([[0.0, (size[1] - 1) / 2], [size[0] - 1.0, (size[1] - 1) / 2]])
-        field = float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1)))
-        if farthest >= WIDEST:
-            return ["opencv_fisheye"]
-        return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]
+        return usual_models(
+            float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1))), farthest
+        )
     if farthest >= math.pi / 2 and is_perspective(lens_of(model, family, size)):
         raise InputError(
             f"camera {family.name}: it sees corners {math.degrees(farthest):.0f} degrees off its axis, which"
@@ -130,7 +129,20 @@ def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str |
     return [model]
 
 
-def _from_axis(camera: Camera, xy: Floats) -> float:
+def usual_models(field: float, farthest: float) -> list[str]:
+    """Return the models that are usual at a horizontal field of view, in order.
+
+    Parameters
+    ----------
+    field, farthest
+        Radians; the latter is how far from the axis anything is seen.
+    """
+    if farthest >= WIDEST:
+        return ["opencv_fisheye"]
+    return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]
+
+
+def from_axis(camera: Camera, xy: Floats) -> float:
     """Return the largest angle (rad) of pixels from the axis of a camera; NaN are left out."""
     rays = camera.rays(xy)
     return float(np.nanmax(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), -rays[:, 2])))

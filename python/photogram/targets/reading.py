@@ -9,12 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.messages import counted, listed
+from photogram.messages import Message, counted, listed
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board, Shape
 from photogram.targets.board_files import picture_size, read_board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corner_files import Form, files_at, is_picture, sorted_files
+from photogram.targets.corners import Corners
 from photogram.targets.detection import detected
 from photogram.targets.first import first_values
 from photogram.targets.knot_weights import with_knot_sd
@@ -102,6 +103,7 @@ def read(
                 f"{models[0].name} says which pictures are of one view: --sync, --offset go without",
                 file=path,
             )
+        given = given.replace(messages=[*given.messages, *_not_used(given.corners)])
         return given if shape is None else given.replace(board=given.board.replace(shape=shape))
     how = Grouping(
         cameras, views, within, sync == "none", size, "corner" if pixel_origin == "corner" else "center"
@@ -133,9 +135,15 @@ def read(
         sd0=sd0,
         sync=sync,
         regularise=regularise,
-        messages=[*found.messages, *told, *start.remarks],
+        messages=[*found.messages, *told, *_not_used(seen), *start.remarks],
     )
     return calibration.with_offsets(offsets) if offsets else calibration
+
+
+def _not_used(corners: Corners) -> list[Message]:
+    """Return what is to be said of corners that whoever measured them has left out."""
+    left = int(np.count_nonzero(~corners.use))
+    return [Message(f"{counted(left, 'corner')} not used, as the file says")] if left else []
 
 
 def _only_board(boards: Sequence[Path]) -> Board | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Sequence
 from itertools import product
 
 import numpy as np
@@ -11,19 +11,21 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.network.cameras import Camera
+from photogram.targets.board import Board
 from photogram.targets.calibrated import Calibrated
 from photogram.targets.datums import datum_rows
-from photogram.targets.housing import Housing
+from photogram.targets.housing import Housing, transformed
 from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
 from photogram.targets.imaging import rays
 from photogram.targets.maps import image_grid
-from photogram.targets.new_views import Candidate, Suggestions, best_views
+from photogram.targets.new_views import Candidate, Suggestions, best_views, shown_of
 from photogram.targets.picture_parts import parts_of
 from photogram.targets.projection import common_partials, worst
 from photogram.targets.uncertainty import checked_distance
 from photogram.targets.vision import composed, inverted
 
-__all__ = ["candidate_views", "suggest_views"]
+__all__ = ["GRID", "TILTS", "candidate_views", "suggest_views", "views_over_picture", "views_towards"]
 
 DISTANCES = (0.1, 0.5, 0.9)
 """Quantiles of how far boards were, which are the distances of candidates."""
@@ -37,6 +39,8 @@ TILTS = {
     f"tilted {-TILT:g} degrees about y": (0.0, -TILT),
 }
 TURNS = {"": 0.0, f"turned by {TURN:g} degrees": TURN}
+INWARDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+"""Of the way to the middle of the picture: where a board is tried that must be seen as a whole."""
 GRID = (12, 8)
 """Pixels whose uncertainty is compared."""
 
@@ -59,7 +63,7 @@ def suggest_views(
         At which the map of uncertainty counts, in the unit of the board; infinite: directions.
     candidates
         Views that may be taken; None: the board in 5 x 4 places of the picture, at three distances as it was
-        seen, frontal and tilted by 30 degrees, upright and turned.
+        seen, frontal and tilted by 30 degrees, upright and turned; whole where it is only found so.
     camera
         Whose map counts: number or name. On a rig all cameras see the board.
     views
@@ -80,7 +84,7 @@ def suggest_views(
     common = housing.cofactors[: housing.common, : housing.common]
     before = worst(housing.variance * functions[known] @ common @ functions[known].transpose(0, 2, 1))
     if candidates is None:
-        candidates = candidate_views(housing, own, size_of(result, number), result.calibration.board.unit)
+        candidates = candidate_views(housing, own, size_of(result, number), result.calibration.board)
     found = best_views(
         housing, functions[known], list(candidates), sizes, float(housing.seen.sd.min()), views
     )
@@ -96,40 +100,100 @@ def suggest_views(
     )
 
 
-def candidate_views(housing: Housing, camera: int, size: tuple[int, int], unit: str) -> list[Candidate]:
+def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board: Board) -> list[Candidate]:
     """Return views of the board all over the picture of a camera, at three distances, tilted and turned.
 
     Parameters
     ----------
     housing, camera
         The cameras, and the number of the one to which the board is shown.
-    size, unit
-        Width and height of its pictures, and the unit of lengths.
+    size, board
+        Width and height of its pictures, and the board.
     """
-    middle = (housing.points.max(axis=0) + housing.points.min(axis=0)) / 2
     to_camera = housing.sensors[camera]
     own = np.unique(housing.seen.views[housing.seen.cameras == camera])
-    places = (to_camera @ housing.poses[own] @ [*middle, 1.0])[:, :3]
-    away = np.quantile(np.linalg.norm(places, axis=1), DISTANCES)
+    places = (to_camera @ housing.poses[own] @ [*middle_of(housing.points), 1.0])[:, :3]
+    away = np.quantile(np.linalg.norm(places, axis=1), DISTANCES).tolist()
     to_first = inverted(to_camera)
+    counts = np.unique(housing.seen.views[housing.seen.cameras == camera], return_counts=True)[1]
+    whole = board.found_whole and np.median(counts) == len(housing.points)
+    found = views_over_picture(housing.cameras[camera], size, board, away, whole=bool(whole))
+    return [Candidate(each.name, to_first @ each.pose) for each in found]
+
+
+def views_over_picture(
+    camera: Camera, size: tuple[int, int], board: Board, distances: Sequence[float], *, whole: bool
+) -> list[Candidate]:
+    """Return views, board -> camera, with the middle of the board in each part of the picture.
+
+    Parameters
+    ----------
+    camera, size
+        The camera, and width and height of its pictures.
+    board, distances
+        The board, and how far its middle is from the camera.
+    whole
+        Whether it is found as a whole, or not at all: it is held as near there as all of it is shown.
+    """
     found = []
-    for place, towards in _cells(housing, camera, size):
-        for distance, tilt, turn in product(
-            dict.fromkeys(f"{float(f'{each:.2g}'):g}" for each in away), TILTS, TURNS
-        ):
-            rotation = _facing(towards) @ _turned(*TILTS[tilt], TURNS[turn])
-            pose = composed(rotation, float(distance) * towards - rotation @ middle)
-            name = ", ".join(filter(None, (place, f"{distance} {unit}", tilt, turn)))
-            found.append(Candidate(name, to_first @ pose))
+    steps = INWARDS if whole else INWARDS[:1]
+    centre = (np.array(size) - 1) / 2
+    for part in parts_of(size):
+        tried = rays(camera, np.array([part.middle + step * (centre - part.middle) for step in steps]))
+        tried = tried[np.isfinite(tried).all(axis=1)]
+        held = zip(*(views_towards(each, part.name, board, distances) for each in tried), strict=True)
+        if whole:
+            found += [
+                own for way in held if (own := _first_whole(camera, size, board.places, way)) is not None
+            ]
+        else:
+            found += [way[0] for way in held]
     return found
 
 
-def _cells(housing: Housing, camera: int, size: tuple[int, int]) -> Iterator[tuple[str, Floats]]:
-    """Yield places of the picture in words, and where they look; none where nothing is seen."""
-    for part in parts_of(size):
-        towards = rays(housing.cameras[camera], np.array([part.middle]))[0]
-        if np.isfinite(towards).all():
-            yield part.name, towards
+def _first_whole(
+    camera: Camera, size: tuple[int, int], points: Floats, ways: Sequence[Candidate]
+) -> Candidate | None:
+    """Return the first of some views in which a picture shows all of (n, 3) points; None where none does."""
+    for each in ways:
+        if len(shown_of(camera, np.array(size), transformed(each.pose, points))[0]) == len(points):
+            return each
+    return None
+
+
+def views_towards(
+    towards: Floats,
+    place: str,
+    board: Board,
+    distances: Sequence[float],
+    tilts: Collection[str] = TILTS,
+    turns: Collection[str] = TURNS,
+) -> list[Candidate]:
+    """Return views, board -> camera, with the middle of the board in one direction.
+
+    Parameters
+    ----------
+    towards, place
+        (3,) the direction, and what it is called.
+    board, distances
+        As of :func:`views_over_picture`; distances in two figures.
+    tilts, turns
+        Names of `TILTS` and `TURNS`.
+    """
+    found, middle = [], middle_of(board.places)
+    for distance, tilt, turn in product(
+        dict.fromkeys(f"{float(f'{each:.2g}'):g}" for each in distances), tilts, turns
+    ):
+        rotation = _facing(towards) @ _turned(*TILTS[tilt], TURNS[turn])
+        pose = composed(rotation, float(distance) * towards - rotation @ middle)
+        words = (place, f"{distance} {board.unit}", tilt, turn)
+        found.append(Candidate(", ".join(filter(None, words)), pose))
+    return found
+
+
+def middle_of(points: Floats) -> Floats:
+    """Return (3,) the middle of (n, 3) points of a board."""
+    return np.asarray((points.max(axis=0) + points.min(axis=0)) / 2)
 
 
 def _facing(towards: Floats) -> Floats:

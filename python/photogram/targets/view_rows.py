@@ -22,11 +22,14 @@ class ViewRows:
         (n, 2) images, pixels.
     by_common, by_pose
         (n, 2, c) and (n, 2, 6) partials by the common unknowns and by the step (dt, w) of the pose.
+    by_point
+        (n, 2, 3) partials by the place of the point on the board.
     """
 
     xy: Floats
     by_common: Floats
     by_pose: Floats
+    by_point: Floats
 
 
 def view_rows(housing: Housing, pose: Floats, cameras: Indices, points: Indices) -> ViewRows:
@@ -39,7 +42,7 @@ def view_rows(housing: Housing, pose: Floats, cameras: Indices, points: Indices)
     cameras, points
         (n,) of each image.
     """
-    xy, by_pose = np.empty((len(points), 2)), np.empty((len(points), 2, 6))
+    xy, by_pose, by_point = (np.empty((len(points), 2, *more)) for more in ((), (6,), (3,)))
     by_common = np.zeros((len(points), 2, housing.common))
     turned = housing.points[points] @ pose[:3, :3].T
     for number in np.unique(cameras).tolist():
@@ -52,6 +55,7 @@ def view_rows(housing: Housing, pose: Floats, cameras: Indices, points: Indices)
         by_common[own, :, housing.parameters(number)] = images.by_parameters
         if number:
             by_common[own, :, housing.sensor(number)] = images.by_point @ motion_partials(in_camera)
-        by_common[own, :, housing.board] = in_first @ pose[:3, :3] @ housing.points_by_board[points[own]]
+        by_point[own] = in_first @ pose[:3, :3]
+        by_common[own, :, housing.board] = by_point[own] @ housing.points_by_board[points[own]]
         by_pose[own] = in_first @ motion_partials(turned[own])
-    return ViewRows(xy, by_common, by_pose)
+    return ViewRows(xy, by_common, by_pose, by_point)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from photogram.show.pictures import drawn
 from photogram.targets.compared import CameraDifference
 from photogram.targets.cross_validation import CrossValidation, changes_between
 from photogram.targets.maps import UncertaintyMap
 from photogram.targets.new_views import Suggestions
 from photogram.targets.worth import Worth
-from photogram.targets.worth_page import drawings
 
-__all__ = ["worth_files", "worth_members", "worth_pictures"]
+__all__ = ["worth_files", "worth_members"]
 
 
 def worth_files(worth: Worth) -> dict[str, bytes]:
@@ -26,16 +23,6 @@ def worth_files(worth: Worth) -> dict[str, bytes]:
         name = f"map-{each.camera}-{_distance(each.distance)}"
         files[f"{name}.csv"], files[f"{name}.npz"] = each.to_csv(), each.to_npz()
     return files
-
-
-def worth_pictures(worth: Worth, ending: str) -> dict[str, bytes]:
-    """Return all pictures in a format, by their names."""
-    found = {}
-    for each in drawings(worth):
-        figure = each.draw()
-        if figure is not None:
-            found[f"{each.name}.{ending}"] = drawn(figure, Path(f"{each.name}.{ending}"))
-    return found
 
 
 def worth_members(worth: Worth) -> dict[str, Any]:

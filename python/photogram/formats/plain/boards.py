@@ -14,11 +14,25 @@ from photogram.io.delimited import ColumnTable
 from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
 from photogram.targets.board import Board, BoardKind, Shape
+from photogram.targets.start import Regularisation
 
-__all__ = ["ASSUMED", "boards_table", "levels", "read_bends", "read_boards"]
+__all__ = [
+    "ASSUMED",
+    "REGULARISED",
+    "TIMES",
+    "boards_table",
+    "levels",
+    "read_bends",
+    "read_boards",
+    "read_regularised",
+]
 
 ASSUMED = "sd of corners assumed"
 """The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
+REGULARISED = "regularise"
+"""The detail, and the column of boards, of the weak priors that a calibration adds to its cameras."""
+TIMES = "times of photos on frames"
+"""The detail: seconds by the clocks of cameras, by the names of photos of a board."""
 BENDS = ("bend_x", "bend_y")
 _LENGTHS = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
 
@@ -61,6 +75,23 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
         raise table.error(row, error.message) from None
 
 
+def read_regularised(tables: Tables) -> str | None:
+    """Return whose weak priors a calibration adds to its cameras; None of a project without a board, or none.
+
+    Raises
+    ------
+    InputError
+        Another word.
+    """
+    table = tables.read("boards")
+    if table is None or not table.count:
+        return None
+    word = table.texts(REGULARISED)[0]
+    if word and word not in get_args(Regularisation):
+        raise table.error(0, f"column {REGULARISED}: {word} is none of {', '.join(get_args(Regularisation))}")
+    return word or None
+
+
 def read_bends(tables: Tables, boards: Mapping[str, Board], block: Block) -> Block:
     """Return a block whose boards bend, where the table says so.
 
@@ -82,8 +113,8 @@ def read_bends(tables: Tables, boards: Mapping[str, Board], block: Block) -> Blo
     return block.replace(passages=bends)
 
 
-def boards_table(boards: Mapping[str, Board], block: Block) -> dict[str, Any]:
-    """Return the columns of boards, with how a block lets them bend; none without boards."""
+def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | None) -> dict[str, Any]:
+    """Return the columns of boards, with their bend and the priors of their cameras; none without boards."""
     if not boards:
         return {}
     each = boards.values()
@@ -96,6 +127,8 @@ def boards_table(boards: Mapping[str, Board], block: Block) -> dict[str, Any]:
     for name in _LENGTHS[2:]:
         columns[name] = [getattr(own, name) for own in each]
     columns["shape"] = [own.shape or "" for own in each]
+    if regularise:
+        columns[REGULARISED] = [regularise] * len(boards)
     bends = {own.bend.name: own.bend for own in block.passages if isinstance(own, Figure)}
     if bends:
         found = [bends.get(name) for name in boards]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.declared import dataclass, replace
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.image_axes import from_tables, in_unit
 from photogram.formats.plain.photos import Photos
@@ -22,7 +22,7 @@ _SD = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 @dataclass(frozen=True)
 class Images:
-    """The table of images, as it is written."""
+    """The table of images, as it is written; `left` are those that it leaves out of photos there are."""
 
     table: ColumnTable
     photos: Indices
@@ -30,6 +30,7 @@ class Images:
     point_names: list[str]
     xy: Floats
     sd: Floats | None
+    left: Images | None = None
 
 
 def read_images(tables: Tables, photos: Photos) -> Images:
@@ -51,10 +52,20 @@ def read_images(tables: Tables, photos: Photos) -> Images:
     left = int(np.count_nonzero(~keep))
     if left:
         tables.messages.append(Message(f"{left} images are not used", table.path))
-    seen, points = np.unique(names.rows[keep], return_inverse=True)
-    kept_sd = sd if sd is None or np.ndim(sd) == 0 else sd[keep]
+    whole = Images(table, rows, names.rows, names.names, xy, sd)
+    return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))))
+
+
+def _some(images: Images, which: Bools) -> Images:
+    """Return some images, and the names of their points alone."""
+    seen, points = np.unique(images.points[which], return_inverse=True)
     return Images(
-        table, rows[keep], points.reshape(-1), [names.names[row] for row in seen], xy[keep], kept_sd
+        images.table,
+        images.photos[which],
+        points.reshape(-1),
+        [images.point_names[row] for row in seen.tolist()],
+        images.xy[which],
+        None if images.sd is None else images.sd[which],
     )
 
 

@@ -257,7 +257,7 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
             found[column] = ["" if each is None else each[k] for each in places]
     found["time"] = [None if each is None else each.time for each in own]
     found |= _motion_columns(own)
-    found |= clock_columns([None if each is None else each.offset for each in own])
+    found |= clock_columns([None if each is None or rigs.clock(each.sensor) else each.offset for each in own])
     rates = [None if each is None else each.rate for each in own]
     if any(rates):
         found["scan"] = ["" if each is None else each.name for each in rates]

@@ -10,12 +10,19 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
-from photogram.formats.plain.boards import ASSUMED, read_bends, read_boards
+from photogram.formats.plain.boards import (
+    ASSUMED,
+    REGULARISED,
+    TIMES,
+    read_bends,
+    read_boards,
+    read_regularised,
+)
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.film_sides import Seen
@@ -24,7 +31,7 @@ from photogram.formats.plain.images import Images, image_coordinates, read_image
 from photogram.formats.plain.moving import placed, read_timed
 from photogram.formats.plain.observed import read_observations
 from photogram.formats.plain.photos import Photos, read_photos
-from photogram.formats.plain.rigs import read_frames, read_rigs
+from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
@@ -33,7 +40,7 @@ from photogram.formats.plain.subjects import Subjects
 from photogram.formats.plain.tables import Tables, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.plain.transform import Transform
-from photogram.formats.project import Project, assembled
+from photogram.formats.project import Project, Unused, assembled
 from photogram.formats.rigging import Stand, mounted
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
@@ -143,10 +150,17 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         linear_unit=settings.length,
         spheroid=spheroid,
         photo_to_ground=settings.attitude == "omega_phi_kappa" and settings.rotation == "photo_to_object",
-        details={"settings": settings, ASSUMED: assumed, **scanned.details()},
+        details={
+            "settings": settings,
+            ASSUMED: assumed,
+            REGULARISED: read_regularised(tables),
+            TIMES: times_of_frames(tables) | _times(photos),
+            **scanned.details(),
+        },
     ).replace(
         sd_taken=True,
         boards=boards,
+        unused=_unused(settings, images, cameras, np.asarray(photo_cameras), photos) if boards else Unused(),
         features=settings.features,
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
@@ -158,6 +172,29 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         rows = np.array([places[name] for name in given.names], dtype=np.int64)
         check_systems(project, settings, control, rows, control.vectors(AXES), free=False)
     return project
+
+
+def _times(photos: Photos) -> dict[str, float]:
+    """Return when photos were taken, of those that say it."""
+    pairs = zip(photos.names, photos.times.tolist(), strict=True)
+    return {photo: time for photo, time in pairs if not math.isnan(time)}
+
+
+def _unused(
+    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, photos: Photos
+) -> Unused:
+    """Return the images of a board that the table leaves out."""
+    left = images.left
+    if left is None:
+        return Unused()
+    none = np.zeros(len(photos.names), dtype=bool)
+    xy, sd = image_coordinates(settings, left, cameras, photo_cameras, none)
+    return Unused(
+        photos=tuple(photos.names[row] for row in left.photos.tolist()),
+        points=tuple(left.point_names[row] for row in left.points.tolist()),
+        xy=xy,
+        sd=np.ones_like(xy) if sd is None else sd,
+    )
 
 
 def _check_features(settings: Settings, names: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.formats.plain.clocks import clocks
+from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
 from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables, angles_of, indices_of
@@ -21,7 +21,7 @@ from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
-__all__ = ["Rigs", "read_bases", "read_frames", "read_rigs"]
+__all__ = ["Rigs", "read_bases", "read_frames", "read_rigs", "times_of_frames"]
 
 _ANGLES = ANGLES["omega_phi_kappa"]
 FRAME = "frame itself"
@@ -123,6 +123,15 @@ def read_frames(
     return [FrameOf(name, rig, members) for name, (rig, members) in found.items()]
 
 
+def times_of_frames(tables: Tables) -> dict[str, float]:
+    """Return when photos on frames were taken, of those that say it."""
+    table = tables.read("frames")
+    if table is None:
+        return {}
+    pairs = zip(table.texts("photo"), table.numbers("time").tolist(), strict=True)
+    return {photo: time for photo, time in pairs if not math.isnan(time)}
+
+
 def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
     """Read distances between sensors of rigs.
 
@@ -172,6 +181,8 @@ class Rigs:
         The block.
     cameras
         The name of each photo's camera.
+    times
+        When photos on frames were taken, where that is known.
 
     Attributes
     ----------
@@ -179,10 +190,12 @@ class Rigs:
         Bases of sensors that took no photo: no frame says what they are on.
     """
 
-    def __init__(self, block: Block, cameras: Sequence[str]) -> None:
+    def __init__(self, block: Block, cameras: Sequence[str], times: Mapping[str, float]) -> None:
+        self._times = times
         self._cameras = dict(zip(block.photo_ids, cameras, strict=True))
         self._mounts = block.mounts
         self._flown = [each.sensor for each in block.timed if each.sensor is not None]
+        self._clocks = _clocks(block)
         self._by_camera = self._told_by_cameras()
         self._sensors: dict[str, dict[str, Sensor]] = {}
         self._references: dict[str, str] = {}
@@ -231,6 +244,10 @@ class Rigs:
             None,
         )
 
+    def clock(self, sensor: Sensor | None) -> Clock | None:
+        """Return the clock of a sensor, where all of its photos, and none on frames, have it."""
+        return self._clocks.get(id(sensor))
+
     def title(self, sensor: Sensor) -> str:
         """Return what reading the tables calls a sensor."""
         place = self.place(sensor)
@@ -268,10 +285,13 @@ class Rigs:
                 "rig": [row[0] for row in rows],
                 what: [row[1] for row in rows],
                 **_poses([row[2] for row in rows], block),
+                **clock_columns([self.clock(row[2]) for row in rows]),
             },
         }
         if frames:
             found["frames"] = {name: [row[k] for row in frames] for k, name in enumerate(columns)}
+            if self._times:
+                found["frames"]["time"] = [self._times.get(row[2]) for row in frames]
         if self._bases:
             names = ("rig", "from", "to")
             found["bases"] = {
@@ -280,6 +300,15 @@ class Rigs:
                 "sd": np.array([each.sd for each, _ in self._bases], dtype=float),
             }
         return found
+
+
+def _clocks(block: Block) -> dict[int, Clock]:
+    """Return the clocks of sensors by their identity: of those whose photos have one in common."""
+    found: dict[int, Clock | None] = {id(each.sensor): None for each in block.mounts}
+    for each in block.timed:
+        if each.sensor is not None and found.setdefault(id(each.sensor), each.offset) is not each.offset:
+            found[id(each.sensor)] = None
+    return {key: clock for key, clock in found.items() if clock is not None}
 
 
 def _poses(sensors: Sequence[Sensor | None], block: Block) -> dict[str, Any]:

@@ -467,21 +467,23 @@ TABLES: Mapping[str, Schema] = {
     ),
     "rigs": Schema(
         ("rig",),
-        ("rig", "camera", "sensor"),
+        ("rig", "camera", "sensor", "clock"),
         (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS, *_CLOCK),
         "`rig`, `camera` or `sensor`; `x`, `y`, `z`, angles, `sd_x` .., `sd_rotation_x` ..; the first row of"
         " a rig is its reference, a row with no numbers an unknown sensor; of sensors whose photos are on"
-        " trajectories and say none of their own `time_offset` (0; s), `sd_time_offset` (s; 0: known)",
+        " trajectories and say none of their own `time_offset` (0; s), `sd_time_offset` (s; 0: known),"
+        " `clock` (its name)",
     ),
     "frames": Schema(
         ("frame", "rig", "photo"),
         ("frame", "rig", "photo", "sensor"),
-        (),
-        "`frame`, `rig`, `photo`; `sensor`, where the photo's camera does not tell it",
+        ("time",),
+        "`frame`, `rig`, `photo`; `sensor`, where the photo's camera does not tell it; `time` (s) of the"
+        " photos of a board, where `photos` say none",
     ),
     "boards": Schema(
         ("board", "kind"),
-        ("board", "kind", "shape"),
+        ("board", "kind", "shape", "regularise"),
         (
             *("columns", "rows", "spacing_x", "spacing_y", "tag_size", "tag_spacing"),
             *("bend_x", "bend_y", "sd_bend_x", "sd_bend_y"),
@@ -489,7 +491,8 @@ TABLES: Mapping[str, Schema] = {
         "`board`, `kind` (`chessboard`, `charuco`, `aprilgrid`, `circles`, `asymmetric_circles`, `points`):"
         " what the control is the points of ([targets](targets.md)); `columns`, `rows`, `spacing_x`,"
         " `spacing_y`, or `tag_size`, `tag_spacing`; `shape` (`held`, `bend`, `points`);"
-        " of a `bend` the deflections `bend_x`, `bend_y` (0), `sd_bend_x`, `sd_bend_y` (`inf`)",
+        " of a `bend` the deflections `bend_x`, `bend_y` (0), `sd_bend_x`, `sd_bend_y` (`inf`); `regularise`"
+        " (`mrcal`): the weak priors that `photogram calibrate` adds to its cameras",
     ),
     "knots": Schema(
         ("camera", "i", "j", "dx", "dy"),

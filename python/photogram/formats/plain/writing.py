@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
-from photogram.formats.plain.boards import ASSUMED, boards_table, levels
+from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.image_axes import to_tables
@@ -48,7 +48,7 @@ def cannot_hold(project: Project) -> list[str]:
     if sums := lost_smoothness(block):
         found.append(f"{sums} sums of coefficients that are no neighbours, or too many")
     cameras, which = known_cameras(block)
-    lost = Rigs(block, [cameras[row].name for row in which]).lost
+    lost = Rigs(block, [cameras[row].name for row in which], {}).lost
     if lost:
         found.append(f"{lost} bases of sensors that took no photo")
     again = _second_positions(block)
@@ -100,7 +100,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     """
     block = project.block
     cameras, photo_cameras = known_cameras(block)
-    rigs = Rigs(block, [cameras[row].name for row in photo_cameras])
+    rigs = Rigs(block, [cameras[row].name for row in photo_cameras], _times_of(project))
     exposures = of_cameras(block, cameras, photo_cameras)
     films = WrittenFilms(project, [cameras[row].name for row in photo_cameras])
     lines = np.array([isinstance(each, LineSensor) for each in exposures])[photo_cameras]
@@ -114,15 +114,16 @@ def write(project: Project) -> Mapping[str, bytes]:
         "cameras": _with_exposures(
             camera_table(project, cameras), exposure_columns(cameras, exposures, *pictures, image_y)
         ),
-        "photos": _photos(block, [cameras[row].name for row in photo_cameras], rigs) | films.photo_columns(),
-        "images": _images(project, names, _written_xy(project, cameras, photo_cameras, plain, image_y)),
+        "photos": _photos(project, [cameras[row].name for row in photo_cameras], rigs)
+        | films.photo_columns(),
+        "images": _images(project, names, cameras, photo_cameras, plain, image_y),
         "points": _points(project),
         "control": control_table(project),
         **trajectory_tables(block),
         "smoothness": smoothness_table(block),
         "line_times": line_times_table(block),
         **observed_tables(block, cameras, rigs, films),
-        "boards": boards_table(project.boards, block),
+        "boards": boards_table(project.boards, block, project.details.get(REGULARISED)),
         "knots": knots_table(cameras),
         "lengths": lengths_table(project.statement.get("lengths", ())),
     }
@@ -170,14 +171,11 @@ def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[s
 
 
 def _written_xy(
-    project: Project, cameras: Sequence[Camera], photo_cameras: Sequence[int], plain: Bools, image_y: str
+    found: Floats, cameras: Sequence[Camera], sizes: Sequence[Size | None], which: Indices, image_y: str
 ) -> Floats:
-    """Return image coordinates as the table has them: samples and lines of scanners as they are."""
-    block = project.block
-    found, of_images = block.image_xy.copy(), np.array(photo_cameras)[block.image_photos]
-    sizes, _ = _pictures(project, cameras)
+    """Return image coordinates (m, 2) as the table has them, each of a camera (m,); -1: as they are."""
     for row, camera in enumerate(cameras):
-        own = (of_images == row) & ~plain[block.image_photos]
+        own = which == row
         if own.any():
             found[own] = to_tables(image_y, camera, sizes[row], found[own])
     return found
@@ -269,7 +267,8 @@ def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
     return columns
 
 
-def _photos(block: Block, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
+def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
+    block = project.block
     positions, sd = _given(block, "position")
     if block.geographic:
         positions = np.column_stack([np.degrees(positions[:, :2]), positions[:, 2]])
@@ -281,10 +280,17 @@ def _photos(block: Block, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
         if np.isfinite(values).any():
             columns |= {f"sd_{name}": column for name, column in zip(names, values.T, strict=True)}
     drifts = any(isinstance(each, Position) and each.drift is not None for each in block.observations)
-    if drifts and not block.timed:
+    times: Mapping[Any, float | None] = _times_of(project)
+    if drifts:
         times = {each.photo: each.time for each in block.observations if isinstance(each, Position)}
+    if times and not block.timed:
         columns["time"] = [times.get(photo) for photo in block.photo_ids]
     return columns | moving_columns(block, rigs)
+
+
+def _times_of(project: Project) -> Mapping[str, float]:
+    """Return when photos of a board were taken; others say it where it counts."""
+    return project.details.get(TIMES, {}) if project.boards else {}
 
 
 def _given(block: Block, what: str) -> tuple[Floats, Floats]:
@@ -294,16 +300,30 @@ def _given(block: Block, what: str) -> tuple[Floats, Floats]:
     return (initial if observed is None else np.where(np.isfinite(sd), observed, initial)), sd
 
 
-def _images(project: Project, names: list[str], xy: Floats) -> dict[str, Any]:
-    block = project.block
+def _images(
+    project: Project,
+    names: list[str],
+    cameras: Sequence[Camera],
+    photo_cameras: Sequence[int],
+    plain: Bools,
+    image_y: str,
+) -> dict[str, Any]:
+    """Return the columns of images, behind them those that are left out; samples of scanners as they are."""
+    block, left = project.block, project.unused
     photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
+    places = {name: row for row, name in enumerate(block.photo_ids)}
+    kept = [row for row, name in enumerate(left.photos) if name in places]
+    of_photos = np.append(block.image_photos, [places[left.photos[row]] for row in kept]).astype(np.int64)
+    which = np.where(plain, -1, photo_cameras)[of_photos]
+    xy = np.vstack([block.image_xy, left.xy[kept]])
+    xy = _written_xy(xy, cameras, _pictures(project, cameras)[0], which, image_y)
     columns: dict[str, Any] = {
-        "photo": photos[block.image_photos],
-        "point": points[block.image_points],
+        "photo": photos[of_photos],
+        "point": np.append(points[block.image_points], [left.points[row] for row in kept]),
         names[0]: xy[:, 0],
         names[1]: xy[:, 1],
     }
-    sd = block.image_sd
+    sd = np.vstack([block.image_sd, left.sd[kept]])
     level = levels(sd, assumed=bool(project.boards) and bool(project.details.get(ASSUMED)))
     if level is not None:
         columns["level"] = level.astype(np.int64)
@@ -311,6 +331,8 @@ def _images(project: Project, names: list[str], xy: Floats) -> dict[str, Any]:
         columns["sd"] = sd[:, 0]
     else:
         columns |= {f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)}
+    if kept:
+        columns["use"] = [""] * len(block.image_xy) + ["off"] * len(kept)
     return columns
 
 

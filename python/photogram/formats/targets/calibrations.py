@@ -10,8 +10,8 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
-from photogram.formats.plain.boards import ASSUMED
-from photogram.formats.project import Project
+from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES
+from photogram.formats.project import Project, Unused
 from photogram.formats.targets import TITLE
 from photogram.messages import listed
 from photogram.network.attitudes import Attitudes
@@ -67,7 +67,33 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
         lacks=tuple(lacks),
         messages=tuple(calibration.messages),
         boards={"board": calibration.board.replace(shape=calibration.shape)},
-        details={ASSUMED: calibration.sd0 is None},
+        unused=_unused(calibration),
+        details={
+            ASSUMED: calibration.sd0 is None,
+            REGULARISED: calibration.regularise,
+            TIMES: _times(calibration),
+        },
+    )
+
+
+def _times(calibration: Start) -> dict[str, float]:
+    """Return when pictures of frames were taken; those on trajectories say it themselves."""
+    corners = calibration.corners
+    if corners.times is None or calibration.sync == "offset":
+        return {}
+    return dict(zip(corners.pictures, corners.times.tolist(), strict=True))
+
+
+def _unused(calibration: Start) -> Unused:
+    """Return the corners that do not count as images that count from the corner of the first pixel."""
+    corners, names = calibration.corners, calibration.board.names
+    rows = np.flatnonzero(~corners.use).tolist()
+    sd = corners.sd[rows] * (calibration.sd0 or calibration.assumed)
+    return Unused(
+        photos=tuple(corners.pictures[row] for row in corners.picture[rows].tolist()),
+        points=tuple(names[row] for row in corners.point[rows].tolist()),
+        xy=corners.xy[rows] + MIDDLE,
+        sd=np.column_stack([sd, sd]),
     )
 
 
@@ -99,6 +125,8 @@ def calibration_of(project: Project) -> Calibration:
     clocks = _in_motion(project, seen) if block.timed else None
     if clocks is not None:
         corners = corners.replace(times=clocks.pop("times")[np.unique(block.image_photos)])
+    elif all(name in (times := project.details.get(TIMES, {})) for name in corners.pictures):
+        corners = corners.replace(times=[times[name] for name in corners.pictures])
     return Calibration(
         board=_with_places(board, block, number),
         corners=corners,
@@ -111,6 +139,7 @@ def calibration_of(project: Project) -> Calibration:
         bend=bend,
         sd_sensors=sd_sensors,
         sd_bend=sd_bend,
+        regularise=project.details.get(REGULARISED),
         messages=project.messages,
         **(clocks or {}),
     )
@@ -166,18 +195,35 @@ def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> 
     place = np.full(len(block.photo_ids), -1)
     place[pictures] = np.arange(len(pictures))
     seen, views = np.unique(stands[pictures], return_inverse=True)
+    names = [block.photo_ids[row] for row in pictures.tolist()]
+    left = project.unused
+    picture, point, kept = _left_out(project, names, number)
+    used = np.arange(len(block.image_xy) + len(kept)) < len(block.image_xy)
     corners = Corners(
-        pictures=[block.photo_ids[row] for row in pictures.tolist()],
+        pictures=names,
         cameras=block.photo_cameras[pictures],
         views=views.reshape(-1),
         camera_names=block.camera_names,
         sizes=project.sizes,
-        picture=place[block.image_photos],
-        point=number[block.image_points],
-        xy=block.image_xy - MIDDLE,
-        sd=block.image_sd[:, 0] / sd0,
+        picture=np.append(place[block.image_photos], picture),
+        point=np.append(number[block.image_points], point),
+        xy=np.vstack([block.image_xy, left.xy[kept]]) - MIDDLE,
+        sd=np.append(block.image_sd[:, 0], left.sd[kept, 0]) / sd0,
+        use=used,
     )
     return corners, seen
+
+
+def _left_out(project: Project, pictures: list[str], number: Indices) -> tuple[Indices, Indices, list[int]]:
+    """Return of the images that were left out of some pictures: picture, point, and their rows."""
+    left = project.unused
+    places = {name: row for row, name in enumerate(pictures)}
+    points = dict(zip(project.block.point_ids, number.tolist(), strict=True))
+    if strange := [name for name in left.points if name not in points]:
+        raise InputError(f"the points {listed(strange)} are none of the board", file=project.path)
+    kept = [row for row, name in enumerate(left.photos) if name in places]
+    picture = np.array([places[left.photos[row]] for row in kept], dtype=np.int64)
+    return picture, np.array([points[left.points[row]] for row in kept], dtype=np.int64), kept
 
 
 def _tied(block: Block) -> tuple[Indices, Floats, Floats, Indices]:

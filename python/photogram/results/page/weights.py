@@ -13,7 +13,7 @@ from photogram.show.page import Column, Drawing, Page, Part, Remarks, Row, Secti
 from photogram.show.ways import page_of
 from photogram.statistics.components import Component
 
-__all__ = ["components_page", "reweighed_page", "weighed_page"]
+__all__ = ["components_page", "components_section", "reweighed_page", "weighed_page"]
 
 
 @page_of.register(VarianceComponents)
@@ -32,13 +32,17 @@ def weighed_page(found: VarianceComponents, page: Page) -> Page:
     page
         That of the adjustment.
     """
-    section = Section("components", "Variance components", _parts(found), _INTRO)
     return replace(
         page,
         judgements=[judged(found.verdict)],
         advice=found.verdict.next,
-        sections=[section, *page.sections],
+        sections=[components_section(found), *page.sections],
     )
+
+
+def components_section(found: VarianceComponents) -> Section:
+    """Return what components say, where a page is judged by more than these."""
+    return Section("components", "Variance components", _parts(found), _INTRO)
 
 
 def reweighed_page(changes: Sequence[str], left: VarianceComponents | None, page: Page) -> Page:
