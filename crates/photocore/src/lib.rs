@@ -18,6 +18,7 @@ pub mod network;
 pub mod normals;
 mod parallel;
 pub mod programs;
+mod sorting;
 mod threads;
 
 pub use nalgebra;

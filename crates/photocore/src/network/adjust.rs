@@ -11,6 +11,7 @@ use super::{
 };
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Adjustment, Event, Method, Watch};
+use crate::sorting::sort_by;
 
 /// An adjustment of a network to be run: from where, on which threads, watched by whom, and into which datum.
 ///
@@ -199,7 +200,7 @@ impl Network {
         solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
         solution.datum.relative_error = lost;
         solution.dropped.extend(leaving.harmful);
-        solution.dropped.sort_unstable_by_key(|dropped| dropped.point);
+        sort_by(&mut solution.dropped, &|a, b| a.point.cmp(&b.point));
         solution.joint = joint.filter(|_| found.is_some()).map(Arc::new);
         solution.converged =
             found.map(|found| Box::new(Converged::new(assembled, options.adjustment, found)));

@@ -12,6 +12,7 @@ use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
 use super::stations::{Bent, Mounted, Station, Stations};
 use crate::geometry::{Orientation, POSE, Vector3};
 use crate::normals::{Cofactors, GroupRows, Layout};
+use crate::sorting::sort_by;
 
 impl Bundle {
     /// The photo whose six unknowns the pose of a photo begins with: its frame, or itself.
@@ -188,7 +189,7 @@ impl Bundle {
         let mut parts = composed.parts();
         // What it does not step with adds nothing, even where nothing is known of that.
         parts.retain(|(_, by)| by.iter().any(|&partial| partial != 0.0));
-        parts.sort_by_key(|part| part.0);
+        sort_by(&mut parts, &|a, b| a.0.cmp(&b.0));
         let mut sum = Matrix6::zeros();
         for (j, part) in parts.iter().enumerate() {
             for before in &parts[..j] {

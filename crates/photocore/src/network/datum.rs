@@ -18,6 +18,7 @@ use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, PoseNumbers, Vector3, angle_axis::rotation_angle_axis,
     angle_axis_rotation, local_vertical,
 };
+use crate::sorting::sort_by;
 
 /// The last of the [`MOTIONS`].
 const SCALE: usize = 6;
@@ -89,7 +90,7 @@ impl Bundle {
         let mut found: Vec<(usize, Vec<usize>)> =
             by_root.into_iter().enumerate().filter(|(_, photos)| !photos.is_empty()).collect();
         let has_asked = |photos: &[usize]| asked.is_some_and(|asked| photos.contains(&asked));
-        found.sort_by_key(|(_, photos)| (!has_asked(photos), usize::MAX - photos.len()));
+        sort_by(&mut found, &|(_, a), (_, b)| has_asked(b).cmp(&has_asked(a)).then(b.len().cmp(&a.len())));
         found.truncate(MOST_PARTS);
         let mut number = vec![None; joined.0.len()];
         found.iter().enumerate().for_each(|(part, (root, _))| number[*root] = Some(part));
@@ -175,7 +176,7 @@ impl Bundle {
                 shift.map(|(number, change)| (left, change.abs(), block + number))
             });
             let mut shifts: Vec<(bool, f64, usize)> = shifts.collect();
-            shifts.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+            sort_by(&mut shifts, &|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
             preferred.extend(shifts.into_iter().map(|(_, _, unknown)| unknown));
         }
         preferred

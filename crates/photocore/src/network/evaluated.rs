@@ -10,6 +10,7 @@ use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{AttitudeNumbers, Vector3};
 use crate::normals::{GroupRows, TieRows};
+use crate::sorting::sort_by;
 
 /// A bundle at given values of the unknowns.
 pub(super) struct At<'a> {
@@ -25,7 +26,7 @@ impl Bundle {
                 let image = &self.images[group];
                 let Station { orientation, camera } = &stations.photos[image.photo];
                 let point = &stations.points[local];
-                each_camera!(camera, camera => write(orientation, camera, point, image, rows));
+                each_camera!(camera, camera => write(orientation, camera, point, Some(image.xy), rows));
             }
             Some(bent) => self.observe_bent((stations, bent), group, local, rows, &mut Composed::new(true)),
         }
@@ -80,7 +81,7 @@ impl Model for Bundle {
         let mut all = self.weighted_angles(values, prior, sd);
         if !self.camera_priors.is_empty() {
             all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));
-            all.sort_by_key(|own| own.first);
+            sort_by(&mut all, &|a, b| a.first.cmp(&b.first));
         }
         all
     }

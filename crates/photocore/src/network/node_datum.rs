@@ -11,6 +11,7 @@ use super::surroundings::Surroundings;
 use super::{InnerConstraints, Network, NetworkError, Options};
 use crate::Threads;
 use crate::adjustment::{Adjusted, DatumColumns, Watch, moved_with_columns};
+use crate::sorting::order;
 
 /// What an unknown belongs to (0: a photo, 1: a camera that photos share, 2: a common unknown, 3: a point), its index in the network, and
 /// the number of the unknown there.
@@ -102,8 +103,7 @@ impl Assembled {
     /// Where named unknowns stand; None where one is not there.
     fn places_of(&self, names: &[UnknownName]) -> Option<Vec<usize>> {
         let own = self.names();
-        let mut order: Vec<usize> = (0..own.len()).collect();
-        order.sort_unstable_by_key(|&unknown| own[unknown]);
+        let order = order(own.len(), &|a, b| own[a].cmp(&own[b]));
         let place = |name: &UnknownName| order.binary_search_by_key(name, |&unknown| own[unknown]).ok();
         names.iter().map(|name| place(name).map(|at| order[at])).collect()
     }

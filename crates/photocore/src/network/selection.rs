@@ -4,6 +4,7 @@ use super::state::State;
 use super::surroundings::Surroundings;
 use super::{Network, NetworkError};
 use crate::parallel;
+use crate::sorting::sort_by;
 
 /// Points that a thread takes at least.
 pub(super) const TOGETHER: usize = 1024;
@@ -99,7 +100,7 @@ impl Network {
                 None => points.push(point),
             }
         }
-        dropped.sort_unstable_by_key(|dropped| dropped.point);
+        sort_by(&mut dropped, &|a, b| a.point.cmp(&b.point));
         let observations = self.observations_of(&points);
         let mut tied = Vec::new();
         if !(observations.is_empty() && named.is_empty()) {

@@ -4,7 +4,7 @@ use super::Image;
 use super::commons::CommonState;
 use super::film::FilmAt;
 use super::mounts::Composed;
-use crate::geometry::camera::each_camera;
+use crate::geometry::camera::{LensDirection, each_camera};
 use crate::geometry::{
     self, Camera, CameraModel, ObjectSpace, Orientation, POSE, Refraction, Vector3, Vertical,
 };
@@ -99,12 +99,10 @@ impl Bent {
         let camera = &stations.photos[image.photo].camera;
         let timed = timed.map(|own| &own.orientation);
         self.seen(space, stations, timed, image.photo, local, |orientation, point| {
-            let scanned = self.film(image.photo).is_some();
+            // Nothing is observed of the place in the camera itself.
+            let measured = self.film(image.photo).is_none().then_some(image.xy);
             let write = |rows: &mut GroupRows<'_>| {
-                each_camera!(camera, camera => match scanned {
-                    false => write(orientation, camera, point, image, rows),
-                    true => write_place(orientation, camera, point, rows),
-                });
+                each_camera!(camera, camera => write(orientation, camera, point, measured, rows));
             };
             match composed {
                 None => write(rows),
@@ -136,31 +134,25 @@ impl Bent {
     }
 }
 
-/// The two equations of an image: observed minus computed, and the partials of the computed.
+/// The two equations of an image: observed minus computed, and the partials of the computed. Where nothing is measured, those of its
+/// place in the camera, compared with zero.
 #[inline(never)]
 pub fn write<C: CameraModel>(
     orientation: &Orientation,
     camera: &C,
     point: &geometry::Point,
-    image: &Image,
+    measured: Option<[f64; 2]>,
     rows: &mut GroupRows<'_>,
 ) {
     let u = orientation.sight(point);
-    let (residual, computed) = camera.compare(&u, image.xy);
+    let (residual, computed) = match measured {
+        None if C::LENS == LensDirection::Backward => {
+            let place = camera.linearize(&u);
+            (place.xy.map(|value| -value), place)
+        }
+        _ => camera.compare(&u, measured.unwrap_or_default()),
+    };
     put(orientation, &u, (residual, &computed), point, rows);
-}
-
-/// The same of a place in the camera, nothing being observed of it.
-#[inline(never)]
-pub fn write_place<C: CameraModel>(
-    orientation: &Orientation,
-    camera: &C,
-    point: &geometry::Point,
-    rows: &mut GroupRows<'_>,
-) {
-    let u = orientation.sight(point);
-    let computed = camera.linearize(&u);
-    put(orientation, &u, (computed.xy.map(|value| -value), &computed), point, rows);
 }
 
 #[inline(always)]

@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::model::{Bundle, Owner};
 use super::problem::Assembled;
 use crate::geometry::PoseNumbers;
+use crate::sorting::sort_by;
 
 /// What a group of observations is of: indices into the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -203,7 +204,7 @@ fn of_points(assembled: &Assembled) -> Vec<Suspect> {
         Some((point, weighted(assembled, Subject::Control(point), Home::Point(place), unknowns)?))
     };
     let mut all: Vec<(usize, Suspect)> = assembled.points.iter().enumerate().filter_map(of).collect();
-    all.sort_unstable_by_key(|&(point, _)| point);
+    sort_by(&mut all, &|a, b| a.0.cmp(&b.0));
     all.into_iter().map(|(_, suspect)| suspect).collect()
 }
 

@@ -106,6 +106,14 @@ pub(super) struct Strip<'a> {
     pub rows: Rows<'a>,
 }
 
+impl Strip<'_> {
+    /// The same without rows: its products are zero.
+    #[inline(always)]
+    pub fn emptied(self) -> Self {
+        Self { rows: Rows { count: 0, ..self.rows }, ..self }
+    }
+}
+
 impl Columns<'_> {
     /// Whether a column of the front is among these.
     #[inline(always)]

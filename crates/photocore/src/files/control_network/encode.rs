@@ -5,6 +5,7 @@ use super::fault::{Fault, Reason};
 use super::fields::MEASURE;
 use super::watch::{Watch, go_on};
 use super::wire::{LARGEST, Message, Packed, put_bytes, put_number, put_whole};
+use crate::sorting;
 
 /// Writes points as messages of version 5, each behind its length.
 ///
@@ -39,9 +40,7 @@ pub fn encoded(all: &Points<'_>, watch: Watch<'_>) -> Result<Vec<u8>, Fault> {
 
 /// The columns in the order of their fields' numbers.
 fn order(table: &Table<'_>) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..table.fields.len()).collect();
-    order.sort_by_key(|&slot| table.fields[slot].number);
-    order
+    sorting::order(table.fields.len(), &|a, b| table.fields[a].number.cmp(&table.fields[b].number))
 }
 
 type Inside<'a> = &'a mut dyn FnMut(&mut Vec<u8>) -> Result<(), Reason>;

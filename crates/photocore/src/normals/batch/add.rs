@@ -55,15 +55,13 @@ impl Batch {
             }
             let (v, own) = (self.slot_coupling::<0>(slot, l), self.slot_rows::<0>(slot, rows));
             for segment in self.segments.iter().filter(|segment| segment.row > slot.row) {
-                let taken = (-1.0, self.segment_coupling(segment, l), v);
-                match segment.run_of(slot.groups.start) {
-                    Some(run) => {
-                        let shared = self.run_rows(segment, run, slot.groups.clone(), rows);
-                        columns.add_products(simd, [(1.0, shared, own), taken]);
-                    }
-                    None if self.coupled => columns.add_products(simd, [taken]),
-                    None => {}
-                }
+                let coupling = self.segment_coupling(segment, l);
+                let shared = match segment.run_of(slot.groups.start) {
+                    Some(run) => self.run_rows(segment, run, slot.groups.clone(), rows),
+                    None if self.coupled => coupling.emptied(),
+                    None => continue,
+                };
+                columns.add_products(simd, [(1.0, shared, own), (-1.0, coupling, v)]);
             }
         }
     }
@@ -95,15 +93,15 @@ impl Batch {
                     for (index, part) in self.parts(p).iter().enumerate() {
                         let equations = t * rows..t * rows + count;
                         let own = self.part_rows(p, part, equations.clone());
-                        for other in &self.parts(p)[..index] {
-                            add_below(simd, columns, own, self.part_rows(p, other, equations.clone()));
-                        }
                         let in_run = in_run(part);
-                        if !in_run || self.segments[part.segment].row < slot.row {
-                            add_below(simd, columns, own, retained);
+                        let below = !in_run || self.segments[part.segment].row < slot.row;
+                        let others = self.parts(p)[..index].iter();
+                        let others = others.map(|other| self.part_rows(p, other, equations.clone()));
+                        let retained = below.then_some(retained);
+                        for other in others.chain(retained).chain((!in_run).then_some(own)) {
+                            add_below(simd, columns, own, other);
                         }
                         if !in_run && columns.contain(own.at) {
-                            columns.add_product(simd, 1.0, own, own);
                             columns.add_equations(simd, own, constants);
                         }
                     }
@@ -120,27 +118,27 @@ impl Batch {
                 continue;
             }
             let v = self.segment_coupling(segment, l);
-            let taken = (-1.0, v, v);
-            for (number, run) in segment.runs.iter().enumerate() {
-                let own = self.run_rows(segment, run, run.places.clone(), rows);
-                let first = run.places.start * self.locals.len() * rows;
-                columns.add_equations(simd, own, &self.constants[first..]);
-                match number {
-                    0 => columns.add_products(simd, [(1.0, own, own), taken]),
-                    _ => columns.add_product(simd, 1.0, own, own),
-                }
-            }
-            if segment.runs.is_empty() {
-                columns.add_products(simd, [taken]);
+            for number in 0..segment.runs.len().max(1) {
+                let own = match segment.runs.get(number) {
+                    Some(run) => {
+                        let own = self.run_rows(segment, run, run.places.clone(), rows);
+                        let first = run.places.start * self.locals.len() * rows;
+                        columns.add_equations(simd, own, &self.constants[first..]);
+                        own
+                    }
+                    None => v.emptied(),
+                };
+                let taken = if number == 0 { v } else { v.emptied() };
+                columns.add_products(simd, [(1.0, own, own), (-1.0, taken, taken)]);
             }
             if !self.apart {
                 columns.subtract_right(simd, v, &self.reduced);
             }
-            for other in self.coupled_to(&self.segments[index + 1..]) {
-                columns.add_product(simd, -1.0, self.segment_coupling(other, l), v);
-            }
-            for slot in self.coupled_to(&self.slots).iter().filter(|slot| slot.row > segment.row) {
-                columns.add_product(simd, -1.0, self.slot_coupling::<0>(slot, l), v);
+            let segments = self.coupled_to(&self.segments[index + 1..]).iter();
+            let slots = self.coupled_to(&self.slots).iter().filter(|slot| slot.row > segment.row);
+            let slots = slots.map(|slot| self.slot_coupling::<0>(slot, l));
+            for other in segments.map(|other| self.segment_coupling(other, l)).chain(slots) {
+                columns.add_product(simd, -1.0, other, v);
             }
         }
     }
@@ -169,7 +167,7 @@ impl Kernel for AddSlots<'_, '_> {
     }
 }
 
-/// Shared blocks have any size.
+/// Shared blocks have any size. A product is compiled for all widths wherever it stands: it stands in few places.
 struct AddSegments<'a, 'b> {
     batch: &'a Batch,
     columns: &'a mut Columns<'b>,

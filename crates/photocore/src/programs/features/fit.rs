@@ -11,6 +11,7 @@ use super::placed::Placed;
 use super::start::starts;
 use super::{FeatureError, Form};
 use crate::geometry::Vector3;
+use crate::sorting::sort_by;
 
 /// Steps at the most, and the step below which the feature rests; lengths are those of points with a mean square distance of 1.
 const STEPS: usize = 200;
@@ -49,7 +50,7 @@ pub fn fit(form: Form, points: &[Vector3]) -> Result<Placed, FeatureError> {
             Err(error) => failed = error,
         }
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sort_by(&mut found, &|a, b| a.0.total_cmp(&b.0));
     let mut found = found.into_iter();
     let Some((least, best)) = found.next() else { return Err(failed) };
     let limit = RIVAL * least + ROUNDING * points.len() as f64;

@@ -5,6 +5,7 @@ use nalgebra::{Matrix4, Vector4};
 use super::Form;
 use super::placed::Placed;
 use crate::geometry::{Matrix3, Vector3};
+use crate::sorting::sort_by;
 
 /// Directions of the axis of a cylinder that are tried, over half a sphere: one every 8 degrees.
 const DIRECTIONS: usize = 300;
@@ -80,7 +81,7 @@ fn cylinders(points: &[Vector3], axes: &Matrix3) -> Vec<Placed> {
     let all = main.chain(spiral).filter_map(|axis| placed(Form::Cylinder, points, &axis));
     let mut judged: Vec<(f64, Placed)> =
         all.map(|each| (each.square_sum(Form::Cylinder, points), each)).collect();
-    judged.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sort_by(&mut judged, &|a, b| a.0.total_cmp(&b.0));
     let mut taken: Vec<Placed> = vec![];
     for (_, each) in judged {
         let apart = |other: &Placed| other.axis().dot(&each.axis()).abs() < APART;

@@ -7,6 +7,7 @@ use super::{FirstValuesError, Search, Source};
 use crate::geometry::{Matrix3, Pose, Vector3};
 use crate::network::median;
 use crate::programs::relative_orientation::{Candidate, relative_orientation};
+use crate::sorting::sort_by;
 
 /// Common points that a pair needs: five, and three to check.
 pub(super) const COMMON: usize = 8;
@@ -28,7 +29,7 @@ impl Search<'_> {
     pub fn relative_model(&mut self, free: &[bool]) -> Result<Option<Model>, FirstValuesError> {
         let mut pairs: Vec<Pair> =
             self.pairs(free).into_iter().filter_map(|photos| self.oriented(photos)).collect();
-        pairs.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        sort_by(&mut pairs, &|a, b| b.merit.total_cmp(&a.merit));
         let mut best: Option<Model> = None;
         for pair in &pairs {
             // Where two poses fit alike (a plane), the other photos decide.
@@ -63,7 +64,7 @@ impl Search<'_> {
         let mut pairs: Vec<(usize, [usize; 2])> =
             common.into_iter().map(|(pair, count)| (count, pair)).collect();
         pairs.retain(|(count, _)| *count >= COMMON);
-        pairs.sort_by_key(|&(count, pair)| (std::cmp::Reverse(count), pair));
+        sort_by(&mut pairs, &|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         pairs.into_iter().take(TRIED).map(|(_, pair)| pair).collect()
     }
 

@@ -29,6 +29,7 @@ pub use planar::over_plane;
 
 use super::sampling::Samples;
 use crate::geometry::{Matrix3, Vector3};
+use crate::sorting::sort_by;
 
 /// Samples that are drawn: with a third of the pairs wrong, one in eight has none of them.
 const SAMPLES: usize = 80;
@@ -74,7 +75,7 @@ pub fn relative_orientation(pairs: &[[Vector3; 2]]) -> Vec<Candidate> {
 
 /// The best, and what is unlike it and fits nearly as well.
 fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
-    found.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    sort_by(&mut found, &|a, b| a.misfit.total_cmp(&b.misfit));
     let Some(best) = found.first().map(|candidate| candidate.misfit) else { return found };
     let mut retained: Vec<Candidate> = Vec::new();
     for candidate in found {

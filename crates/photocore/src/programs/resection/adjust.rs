@@ -11,6 +11,7 @@ use crate::Threads;
 use crate::adjustment::{self, AdjustError, Event, Options, Problem};
 use crate::geometry::{ObjectSpace, rotation, rotation_angles};
 use crate::normals::{Layout, LayoutError, Ordering, System};
+use crate::sorting::sort_by;
 
 impl Resection {
     /// Adjusts the photo by least squares, on threads of its own.
@@ -64,7 +65,7 @@ impl Resection {
                 }
             }
         }
-        solved.sort_by(|a, b| {
+        sort_by(&mut solved, &|a, b| {
             b.converged().cmp(&a.converged()).then(a.sum_of_squares().total_cmp(&b.sum_of_squares()))
         });
         Solution::new(self, solved, undetermined).ok_or(failure)

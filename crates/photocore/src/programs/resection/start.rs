@@ -8,6 +8,7 @@ use crate::geometry::{
     CameraModel, Matrix3, ObjectSpace, Perspective, RotationSense, Vector3, local_vertical, nearest_turns,
     rotation_angles,
 };
+use crate::sorting::sort_by;
 
 /// Points among which triples are formed, and triples that are solved.
 const SPREAD_POINTS: usize = 8;
@@ -106,7 +107,7 @@ impl Sight {
             scored.extend(three_points(&rays, &points).into_iter().map(|place| (self.misfit(&place), place)));
         }
         scored.retain(|(misfit, _)| misfit.is_finite());
-        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sort_by(&mut scored, &|a, b| a.0.total_cmp(&b.0));
         let limit = scored.first().map_or(0.0, |best| WORSE * best.0.max(self.noise));
         let mut chosen: Vec<Placement> = Vec::new();
         for (_, place) in scored.into_iter().take_while(|(misfit, _)| *misfit <= limit) {
@@ -145,7 +146,7 @@ impl Sight {
                 }
             }
         }
-        triples.sort_by(|a, b| b.0.total_cmp(&a.0));
+        sort_by(&mut triples, &|a, b| b.0.total_cmp(&a.0));
         triples.into_iter().take(TRIPLES).map(|(_, triple)| triple).collect()
     }
 

@@ -7,6 +7,7 @@
 
 use crate::geometry::cramer::{solve, unit};
 use crate::geometry::{Matrix3, Vector3};
+use crate::sorting::sort_by;
 
 /// Where a photo stands in cartesian object space: u = G (P - C).
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +31,7 @@ const TWINS: f64 = 1e-4;
 pub fn three_points(rays: &[Vector3; 3], points: &[Vector3; 3]) -> Vec<Placement> {
     let triangle = Triangle::new(rays, points);
     let mut candidates = triangle.distances();
-    candidates.sort_by(|a, b| a.misclosure.total_cmp(&b.misclosure));
+    sort_by(&mut candidates, &|a, b| a.misclosure.total_cmp(&b.misclosure));
     let mut found: Vec<Vector3> = Vec::new();
     for Candidate { distances, .. } in candidates {
         let twin = |other: &Vector3| {

@@ -5,6 +5,7 @@ use super::moments::Moments;
 use super::transform::Similarity;
 use super::{SimilarityError, Start, Station};
 use crate::geometry::{Vector3, rotation};
+use crate::sorting::sort_by;
 
 /// Another minimum fits as well when its sum of squares is at most this multiple of the least.
 const AS_WELL: f64 = 4.0;
@@ -52,7 +53,7 @@ pub fn choose(stations: &[Station], start: Start, held: Option<f64>) -> Result<C
             let report = report(stations, control_centre, model_centre, held).ok();
             let report = report.filter(|_| start == Start::Auto);
             let sum = |similarity: &Similarity| sum_of_squares(stations, similarity);
-            minima.sort_by(|a, b| sum(a).total_cmp(&sum(b)));
+            sort_by(&mut minima, &|a, b| sum(a).total_cmp(&sum(b)));
             let Some(best) = minima.first().copied() else {
                 // Only mirror images fit: let the report's values show it.
                 return report.map(|r| only(r, Started::Report)).ok_or(SimilarityError::Scale(f64::NAN));
