@@ -13,7 +13,7 @@ from photogram import Camera, InputError, variance_components
 from photogram.targets import read
 from photogram.targets.datums import datum_rows
 from photogram.targets.differences import difference
-from photogram.targets.drawing import steps_of_125
+from photogram.targets.drawing import draw_uncertainty_curve, steps_of_125
 from photogram.targets.housings import housing_of
 from photogram.targets.imaging import imaged, rays
 from photogram.targets.stereo import distance_uncertainty, triangulate
@@ -86,6 +86,12 @@ def test_uncertainty_is_smallest_about_where_boards_were(calibrated):
     away = np.linalg.norm(calibrated.poses[:, :3, 3], axis=1)
     assert away.min() < found.minimum[0] < 2 * away.max()
     assert found.sd[-1] == pytest.approx(found.sd[-2], rel=0.02)
+    axes = draw_uncertainty_curve(found)
+    line, across, least = axes.lines
+    assert (np.diff(line.get_xdata()) > 0).all()
+    assert len(line.get_xdata()) == 40
+    assert across.get_ydata()[0] == found.sd[-1]
+    assert (least.get_xdata()[0], least.get_ydata()[0]) == found.minimum
 
 
 def test_two_calibrations_of_the_same_corners_are_not_independent(calibrated):

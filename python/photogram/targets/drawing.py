@@ -18,7 +18,7 @@ from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, INK, ORDERED, VERMILION
 from photogram.targets.compared import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
-from photogram.targets.maps import UncertaintyMap, distance_text
+from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +28,7 @@ __all__ = [
     "draw_cross_validation",
     "draw_difference",
     "draw_uncertainty",
+    "draw_uncertainty_curve",
     "in_pixels",
     "steps_of_125",
 ]
@@ -68,6 +69,28 @@ def draw_uncertainty(found: UncertaintyMap, path: Path | None = None, ax: Where 
         matplotlib is absent.
     """
     return placed(partial(_uncertainty, found), path, ax)
+
+
+def draw_uncertainty_curve(found: UncertaintyCurve, path: Path | None = None, ax: Where = None) -> Any:
+    """Draw the uncertainty of projection of a pixel against distance, its minimum marked.
+
+    Parameters
+    ----------
+    found
+        The curve; where it has a value at infinity this is a line across.
+    path, ax
+        As of :func:`draw_uncertainty`.
+
+    Returns
+    -------
+    The axes.
+
+    Raises
+    ------
+    InputError, ModuleNotFoundError
+        As of :func:`draw_uncertainty`.
+    """
+    return placed(partial(_curve, found), path, ax)
 
 
 def draw_difference(found: CameraDifference, path: Path | None = None, ax: Where = None) -> Any:
@@ -132,10 +155,56 @@ def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
     with panels(ax, 1, 1, WIDTH, _height(found.size)) as (axes,):
         in_pixels(axes, found.size)
         _contours(axes, found.columns, found.rows, found.sd, "px")
+        _known(axes, found)
         _seen(axes, found.corners, found.coverage)
         said = found.model.replace("; ", "\n")
         axes.set_title(f"{found.title}\n{said}", fontsize=9.0)
     return handed_out([axes])
+
+
+def _curve(found: UncertaintyCurve, ax: Where) -> Any:
+    from matplotlib.ticker import LogLocator
+
+    away = np.isfinite(found.distances)
+    order = np.argsort(found.distances[away])
+    distance, sd = found.minimum
+    with panels(ax, 1, 1, WIDTH, 0.6 * WIDTH) as (axes,):
+        axes.loglog(found.distances[away][order], found.sd[away][order], color=BLUE)
+        for each in found.sd[~away]:
+            axes.axhline(
+                each, color=INK, linewidth=0.9, linestyle="dashed", label=f"at infinity {each:.2g} px"
+            )
+        if math.isfinite(distance):
+            least = f"least {sd:.2g} px {distance_text(float(f'{distance:.3g}'), found.unit)}"
+            axes.plot(distance, sd, "o", color=VERMILION, label=least)
+        axes.set(xlabel=f"distance from the camera, {found.unit}", ylabel="px")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter("{x:g}")
+        axes.legend(fontsize=8.0)
+        column, row = found.pixel
+        axes.set_title(
+            f"{found.camera}: standard deviation of projection at column {column:g}, row {row:g}"
+            f" (datum {found.datum})",
+            fontsize=9.0,
+        )
+    return handed_out([axes])
+
+
+def _known(axes: Axes, found: UncertaintyMap) -> None:
+    """Draw where what is known of the lens ends, such as the knots of splines."""
+    known = np.isfinite(found.sd)
+    if known.any() and not known.all():
+        axes.contour(
+            found.columns,
+            found.rows,
+            known.astype(float),
+            [0.5],
+            colors=INK,
+            linewidths=0.9,
+            linestyles="dashed",
+        )
 
 
 def _difference(found: CameraDifference, ax: Where) -> Any:

@@ -20,7 +20,7 @@ __all__ = ["drawings", "worth_facts", "worth_section"]
 
 CAPTION = (
     "Standard deviation, in the worst direction, of the image of a point that stays fixed to the housing."
-    " Dots: corners that were seen; line: their convex hull."
+    " Dots: corners that were seen; line: their convex hull; dashed, of splined lenses: where knots end."
 )
 CROSS = (
     "Images of the same points by the second part of the views less those by the first (vectors), and what"
