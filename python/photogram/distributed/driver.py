@@ -99,16 +99,10 @@ class Driver:
 
     Parameters
     ----------
-    job
-        What tasks are told.
-    tree
-        The tree of the nodes.
-    executor
-        Does the tasks.
+    job, tree, executor, progress
+        As of :class:`photogram.distributed.walks.Walks`.
     stop
         When to stop.
-    progress
-        Told of parts done.
     mover
         Takes the block to a datum when it is adjusted.
     """

@@ -35,19 +35,10 @@ pub struct BlockNetwork {
     pub records: usize,
 }
 
-/// A solution without what stands for so many records.
-pub fn without_records(mut solution: Solution, records: usize) -> Solution {
-    solution.photos.truncate(solution.photos.len() - records);
-    if records > 0 {
-        solution.cameras.pop();
-    }
-    solution
-}
-
 impl BlockNetwork {
     /// A solution as callers know it: without what stands for records.
     fn told(&self, solution: Solution, pool: &Threads) -> Told {
-        Told::new(without_records(solution, self.records), pool)
+        Told::without_records(solution, self.records, pool)
     }
 }
 

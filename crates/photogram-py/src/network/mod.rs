@@ -8,6 +8,7 @@ mod first_values;
 mod node;
 mod solution;
 mod state;
+mod steps;
 mod suspects;
 mod tables;
 mod trial;
@@ -43,6 +44,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     collection::register(module)?;
     first_values::register(module)?;
     node::register(module)?;
+    steps::register(module)?;
     suspects::register(module)?;
     trial::register(module)?;
     solution::register(module)

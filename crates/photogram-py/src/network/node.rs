@@ -1,12 +1,11 @@
 //! A node of the elimination tree of a block that is adjusted in parts; its documentation is in `_photocore.pyi`.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use photocore::Threads;
-use photocore::adjustment::{DatumOfPart, History, Iteration, Watch};
+use photocore::adjustment::{DatumOfPart, Watch};
 use photocore::network::{
     BlockOf, FormedNode as Formed, Network, NetworkError as Failure, Node as Core, NodePrediction, Options,
     Surroundings,
@@ -16,7 +15,6 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::block_network::without_records;
 use super::covariances::refused;
 use super::solution::BlockSolution;
 use super::tables::Told;
@@ -28,51 +26,7 @@ use crate::work::{Workers, watched};
 /// Adds the classes to the extension module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Node>()?;
-    module.add_class::<FormedNode>()?;
-    module.add_function(wrap_pyfunction!(judge_full_step, module)?)?;
-    module.add_function(wrap_pyfunction!(is_chord, module)?)?;
-    module.add_function(wrap_pyfunction!(step_rules, module)?)
-}
-
-#[pyfunction]
-fn step_rules() -> BTreeMap<&'static str, f64> {
-    let mut rules = BTreeMap::from(photocore::adjustment::step_rules());
-    rules.insert("least_redundancy", photocore::network::LEAST_REDUNDANCY);
-    rules
-}
-
-/// What a full step is by its length and by the damping and length of those before.
-#[pyfunction]
-#[pyo3(signature = (taken, change, *, chord, unknowns, tolerance))]
-fn judge_full_step(
-    taken: Vec<(f64, f64)>,
-    change: f64,
-    chord: Option<f64>,
-    unknowns: usize,
-    tolerance: f64,
-) -> &'static str {
-    let row = |(number, (damping, largest_change))| Iteration {
-        number,
-        sum_of_squares: f64::NAN,
-        largest_change,
-        damping,
-    };
-    let iterations: Vec<Iteration> = taken.into_iter().enumerate().map(row).collect();
-    let history = History { iterations: &iterations, chord, unknowns };
-    if change <= tolerance || history.leaves_less_than(tolerance, change) {
-        "last"
-    } else if history.falls_no_more(change) {
-        "rests"
-    } else if history.is_for_chord(change) {
-        "before a chord"
-    } else {
-        "one of many"
-    }
-}
-
-#[pyfunction]
-fn is_chord(chord: f64, change: f64) -> bool {
-    History::is_chord(chord, change)
+    module.add_class::<FormedNode>()
 }
 
 type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -283,7 +237,7 @@ impl Node {
         let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
         let told = watched(py, self.workers(threads), None, |pool, _| {
             let solution = self.node.solution(&state, &before, pool)?;
-            Ok(Told::new(without_records(solution, self.records), pool))
+            Ok(Told::without_records(solution, self.records, pool))
         })?;
         BlockSolution::new(py, told.map_err(|error: Failure| failed(&error))?, 6)
     }
@@ -484,7 +438,7 @@ impl FormedNode {
         let workers = Workers::of(threads, self.node.images());
         let found = watched(py, workers, progress, |pool, watch| {
             let found = self.node.invert(formed, given, &state, datum, pool, watch);
-            found.map(|(solution, below)| (Told::new(without_records(solution, self.records), pool), below))
+            found.map(|(solution, below)| (Told::without_records(solution, self.records, pool), below))
         })?;
         let (told, below) = found.map_err(|error| failed(&error))?;
         let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();

@@ -33,6 +33,15 @@ impl Told {
         pool.install(|| Self::on_pool(solution))
     }
 
+    /// The same without what stands for so many records on trajectories: the last photos, which have the last camera.
+    pub fn without_records(mut solution: Solution, records: usize, pool: &Threads) -> Self {
+        solution.photos.truncate(solution.photos.len() - records);
+        if records > 0 {
+            solution.cameras.pop();
+        }
+        Self::new(solution, pool)
+    }
+
     fn on_pool(mut solution: Solution) -> Self {
         let (points, images) = (std::mem::take(&mut solution.points), std::mem::take(&mut solution.images));
         let (three, two) = ([f64::NAN; 3], [f64::NAN; 2]);
