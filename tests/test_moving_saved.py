@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling, scanned
-from photogram import InputError, adjust, adjust_in_parts, group_sums, read_result
-from photogram.distributed import Division, plan_in_parts
+from photogram import InputError, adjust, group_sums, read_result
 from photogram.network.lens import Lens
 from photogram.network.observations import Smoothness
 from photogram.network.trajectories import Spline, Trajectory
@@ -100,15 +99,3 @@ def test_damaged_coefficients_are_refused(tmp_path):
     with pytest.raises(InputError, match="strip 1"):
         dataclasses.replace(kept, position=Spline(1.0)).original()
     assert isinstance(kept.original(), Trajectory)
-
-
-@pytest.mark.parametrize("block", [rolling, scanned])
-def test_blocks_in_parts_take_no_trajectories(block, tmp_path):
-    block = block()
-    first = block.photo_ids[0]
-    with pytest.raises(InputError, match=f"in parts: the photo {first} is on a trajectory"):
-        adjust_in_parts(block, Division(parts=2))
-    with pytest.raises(InputError, match=f"in parts: the photo {first} is on a trajectory"):
-        plan_in_parts(block, Division(parts=2, folder=tmp_path / "run"))
-    with pytest.raises(InputError, match="in parts: observations are of the trajectory strip 1"):
-        adjust_in_parts(scanned().replace(timed=()), Division(memory="8 GiB"))

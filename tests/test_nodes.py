@@ -464,7 +464,6 @@ def test_what_does_not_fit_is_refused(small):
     core = block_network(block, OPTIONS)
     for outer, children in (
         ([("photo", len(block.photo_ids))], []),
-        ([("photo", 0), ("photo", 0)], []),
         ([], [[("camera", 0)]]),
         ([("unknown", 0)], []),
     ):
@@ -472,6 +471,9 @@ def test_what_does_not_fit_is_refused(small):
             core.node(outer, children, middle=None, threads=1)
     with pytest.raises(ValueError, match="kind of block"):
         core.node([("point cloud", 0)], [], middle=None, threads=1)
+    # What several photos on a trajectory stand for is named by each of them, and counts once.
+    once, twice = (core.node([("photo", 0)] * n, [], middle=None, threads=1) for n in (1, 2))
+    np.testing.assert_array_equal(once.outer, twice.outer)
     leaf, above = pieces[0].node, pieces[2].node
     formed = leaf.form(leaf.initial, [], damping=0.0, curved=False, threads=1)
     given = formed.contribution

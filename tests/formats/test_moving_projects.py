@@ -456,7 +456,10 @@ def test_photos_that_move_are_not_adjusted_in_parts(moving_projects):
     table.to_parquet(drone / "images.parquet")
     (drone / "images.csv").unlink()
     assert streamable(drone)
-    with pytest.raises(InputError, match="rolling shutter, or on trajectories, are read whole"):
+    with pytest.raises(
+        InputError,
+        match="DJI_0 has a rolling shutter, or is on a trajectory, and images in Parquet",
+    ):
         Streamed(drone, Wishes(), moving_projects / "run")
 
 
