@@ -47,10 +47,8 @@ def adjusted_on_disk(
     from photogram.formats import in_parts
 
     wishes, folder = Wishes(), divided.run or target / "run"
-    chosen: Any = {
-        "unit_variance": choices.unit_variance and choices.unit_variance.value,
-        "loss": choices.loss and choices.loss.value,
-    }
+    unit_variance = choices.unit_variance and choices.unit_variance.value
+    chosen: Any = {"unit_variance": unit_variance, "loss": choices.loss_of}
     if divided.plan:
         plan = in_parts.planned_on_disk(path, wishes, folder, division, **chosen)
         output.print("\n".join(plan.lines()))

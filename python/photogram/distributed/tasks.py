@@ -218,11 +218,8 @@ def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
         if factor is None:
             return Lost(number)
-        node = _node(job, number)
         step = factor.solve(_plain(outer), threads=job.threads)
-        state = node.advance(_state(job, node, number, at.state), step)
-        write_state(job, number, after, {"values": state})
-        return [step[rows] for rows in node.children]
+        return _advanced(job, number, at.state, step, after)
 
 
 def reduced_chord(
@@ -279,13 +276,18 @@ def solved_chord(
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
         if factor is None:
             return Lost(number)
-        node = _node(job, number)
         if not factor.has_chord:  # it was formed again since
             reduced_chord(job, number, at, after, below)
         chord = factor.solve_chord(_plain(outer), threads=job.threads)
-        state = node.advance(_state(job, node, number, after), chord)
-        write_state(job, number, further, {"values": state})
-        return [chord[rows] for rows in node.children]
+        return _advanced(job, number, after, chord, further)
+
+
+def _advanced(job: Job, number: int, state: str, step: Floats, after: str) -> list[Floats]:
+    """Write the state after a step of a node from another; return the steps of what each child is over."""
+    node = _node(job, number)
+    reached = node.advance(_state(job, node, number, state), step)
+    write_state(job, number, after, {"values": reached})
+    return [step[rows] for rows in node.children]
 
 
 def relocated(job: Job, number: int, state: str, after: str) -> tuple[float, float]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Literal
 
 from photogram.adjustment.adjustment import Progress, UnitVariance, core_options
-from photogram.adjustment.robust import LossName
+from photogram.adjustment.robust import Loss
 from photogram.declared import dataclass
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
@@ -18,6 +17,7 @@ from photogram.distributed.run import Manifest, result_folder
 from photogram.distributed.running import Run, opened
 from photogram.formats.format import Wishes
 from photogram.formats.plain.streamed import Streamed
+from photogram.formats.project import Project
 
 __all__ = ["OnDisk", "adjusted_on_disk", "planned_on_disk"]
 
@@ -69,6 +69,10 @@ def _sizes(manifest: Manifest) -> tuple[list[int], list[int], list[int]]:
     return manifest.photos, manifest.points, manifest.images
 
 
+def _as_said(project: Project) -> Loss | None:
+    return project.options.loss
+
+
 def adjusted_on_disk(
     path: Path,
     wishes: Wishes,
@@ -76,7 +80,7 @@ def adjusted_on_disk(
     division: Division,
     *,
     unit_variance: UnitVariance | None = None,
-    loss: Literal["none", LossName] | None = None,
+    loss: Callable[[Project], Loss | None] = _as_said,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
@@ -91,7 +95,8 @@ def adjusted_on_disk(
     division
         Cluster, workers, parts and memory.
     unit_variance, loss
-        What the variance of unit weight is based on, and what is minimised; None: as the project says.
+        What the variance of unit weight is based on; None: as the project says. The loss of the project: by
+        default what it says.
     threads, progress
         As of :func:`photogram.adjust_in_parts`.
 
@@ -113,7 +118,7 @@ def planned_on_disk(
     division: Division,
     *,
     unit_variance: UnitVariance | None = None,
-    loss: Literal["none", LossName] | None = None,
+    loss: Callable[[Project], Loss | None] = _as_said,
 ) -> PartsPlan:
     """Plan the same: its parts are written, and wait in the folder for the adjustment."""
     with _run(path, wishes, folder, division, (unit_variance, loss), None) as run:
@@ -126,16 +131,15 @@ def _run(
     wishes: Wishes,
     folder: Path,
     division: Division,
-    chosen: tuple[UnitVariance | None, Literal["none", LossName] | None],
+    chosen: tuple[UnitVariance | None, Callable[[Project], Loss | None]],
     threads: int | None,
 ) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(alone(folder))
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
-        given, (unit_variance, loss) = streamed.project.options, chosen
-        minimised = given.loss if loss is None else None if loss == "none" else loss
-        options = core_options(unit_variance or given.unit_variance, minimised)
+        project, (unit_variance, loss) = streamed.project, chosen
+        options = core_options(unit_variance or project.options.unit_variance, loss(project))
         source = streamed.source(options)
         with opened(
             folder,

@@ -360,6 +360,21 @@ impl Node {
         if fit { Ok(()) } else { Err(NetworkError::State) }
     }
 
+    /// Solves where right-hand sides were reduced, solutions for the outer unknowns being given.
+    pub(super) fn solved<const C: usize>(
+        &self,
+        formed: &FormedNode,
+        reduced: Option<ReducedRights<C>>,
+        outer: &[f64],
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<Vec<f64>, NetworkError> {
+        let reduced = reduced.filter(|reduced| reduced.left().len() == outer.len());
+        let reduced = reduced.ok_or(NetworkError::State)?;
+        let found = formed.part.solve_reduced_rights(&self.assembled.problem, reduced, outer, threads, watch);
+        found.map_err(|error| self.named(error))
+    }
+
     pub(super) fn assembled(&self) -> &Assembled {
         &self.assembled
     }

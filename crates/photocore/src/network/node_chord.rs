@@ -51,11 +51,8 @@ impl Node {
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
-        let reduced = formed.chord.take().filter(|_| outer.len() == self.outer().len());
-        let reduced = reduced.ok_or(NetworkError::State)?;
-        let problem = &self.assembled().problem;
-        let found = formed.part.solve_reduced_rights(problem, reduced, outer, threads, watch);
-        found.map_err(|error| self.named(error))
+        let reduced = formed.chord.take();
+        self.solved(formed, reduced, outer, threads, watch)
     }
 }
 

@@ -147,10 +147,7 @@ impl Node {
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
-        let reduced = formed.reduced.take().filter(|reduced| reduced.left().len() == outer.len());
-        let reduced = reduced.ok_or(NetworkError::State)?;
-        let problem = &self.assembled().problem;
-        let found = formed.part.solve_reduced_rights(problem, reduced, outer, threads, watch);
-        found.map_err(|error| self.named(error))
+        let reduced = formed.reduced.take();
+        self.solved(formed, reduced, outer, threads, watch)
     }
 }
