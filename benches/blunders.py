@@ -17,7 +17,7 @@ import numpy as np
 
 from photogram import Block, Result, adjust, simulate, snoop
 from photogram.errors import AdjustmentError
-from photogram.results.snooped import Snooped
+from photogram.results.snooping_result import Snooped
 
 SMALLEST, LARGEST = 4.0, 100.0
 """Of the planted errors, in standard deviations."""

@@ -20,7 +20,7 @@ from photogram.memory import give_back, resident_memory
 
 def predicted(block: object) -> float:
     """Return the GiB that the adjustment says it needs, which it does where there are fewer."""
-    with patch("photogram.network.core.available_memory", lambda: 1):
+    with patch("photogram.network.core_arrays.available_memory", lambda: 1):
         try:
             adjust(block)
         except OutOfMemoryError as error:

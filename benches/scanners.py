@@ -33,7 +33,7 @@ from photogram.distributed.workers import connected
 from photogram.formats.in_parts import OnDisk
 from photogram.memory import give_back, resident_memory
 from photogram.network.attitudes import Attitudes
-from photogram.network.timed import Lines, LineSensor, Timed
+from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Table, Trajectory
 
 ALTITUDE, SPEED, APART, LENGTH = 100e3, 1.6e3, 10e3, 35e3

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from photogram import adjust, formats
-from photogram.results.statement.asked import Asked
-from photogram.results.statement.compared import Compared, compared
+from photogram.results.statement.comparison import Compared, compared
+from photogram.results.statement.request import Asked
 from photogram.statistics.freedom import effective_freedom, rmse_interval
 
 __all__ = ["BLOCKS"]

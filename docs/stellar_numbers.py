@@ -16,7 +16,7 @@ from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Result, calibrate, refraction
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.listing import summary
-from photogram.stellar.night import CalibratedNight, calibrate_night
+from photogram.stellar.night_calibration import CalibratedNight, calibrate_night
 from photogram.stellar.night_file import read_night
 from photogram.stellar.night_report import report
 from photogram.stellar.night_report import summary as night_summary

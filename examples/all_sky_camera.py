@@ -14,10 +14,10 @@ from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.lenses import LENSES
-from photogram.stellar.night import Night, calibrate_night
+from photogram.stellar.night_calibration import Night, calibrate_night
 from photogram.stellar.night_report import report
 from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.skies import Exposure, project_sky
+from photogram.stellar.sky_calibration import Exposure, project_sky
 from photogram.stellar.sky_cameras import SkyCamera
 
 SITE = Site(np.radians(46.5), np.radians(-7.5), 1000.0, Air(278.15, 680.0), aberration=0.3192 * ARCSEC)

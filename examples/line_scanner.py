@@ -12,9 +12,9 @@ import numpy as np
 
 from photogram import Block, Camera, Result, adjust
 from photogram.network.attitudes import Attitudes
+from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.observations import Attitude, Position
 from photogram.network.projecting import projected
-from photogram.network.timed import Lines, LineSensor, Timed
 from photogram.network.trajectories import Clock, Spline, Table, Trajectory
 from photogram.network.unknowns import Sensor
 

@@ -19,7 +19,7 @@ from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
 from photogram.stellar.pointing import attitude_of
-from photogram.stellar.skies import project_sky
+from photogram.stellar.sky_calibration import project_sky
 
 FOLDER = Path(__file__).resolve().parents[1] / "python/photogram/examples/exposures"
 

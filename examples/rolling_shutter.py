@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from photogram import Block, Camera, Result, adjust
+from photogram.network.moving_photos import Shutter, Timed
 from photogram.network.observations import Position, Velocity
 from photogram.network.projecting import projected
-from photogram.network.timed import Shutter, Timed
 from photogram.network.trajectories import Polynomial, Readout, Table, Trajectory
 
 WIDTH, HEIGHT, F = 4000, 3000, 3650.0

@@ -8,8 +8,8 @@ import numpy as np
 
 from photogram import Block, Camera
 from photogram.network.attitudes import Attitudes
+from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
 from photogram.network.observations import Attitude, Position, Rate, Velocity
-from photogram.network.timed import Lines, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Clock, GyroBias, Readout, Spline, Table, Trajectory
 from photogram.network.unknowns import Boresight, LeverArm
 

@@ -13,7 +13,7 @@ import photogram
 from photogram import InputError, PhotogramError
 from photogram.distributed import Division
 from photogram.giant import Project, read_project
-from photogram.results.statement.asked import Asked
+from photogram.results.statement.request import Asked
 
 SMALL = {"strips": 1, "photos_per_strip": 3, "points_per_photo": 6, "check_points": 1, "control_spacing": 1}
 PACKAGES = (

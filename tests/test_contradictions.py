@@ -23,7 +23,7 @@ from photogram.perspective_center import run_deck
 from photogram.perspective_center.document import to_json as run_to_json
 from photogram.perspective_center.summary import summary
 from photogram.show.judgement import remarks_section
-from photogram.show.ways import page_of
+from photogram.show.methods import page_of
 
 EXAMPLES = files("photogram") / "examples"
 
@@ -376,7 +376,7 @@ def test_plates(changes, code):
 @pytest.mark.parametrize("pixel_sd", [None, 0.02])
 def test_nights(pixel_sd):
     pytest.importorskip("erfa")
-    from photogram.stellar.night import calibrate_night
+    from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_document import to_json as night_to_json
     from photogram.stellar.night_file import read_night
     from photogram.stellar.night_report import report

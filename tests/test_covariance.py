@@ -129,8 +129,8 @@ def test_what_has_no_covariance_is_refused(small, monkeypatch):
         covariances.propagate(lambda p: p * np.nan, ("point", point))
     with pytest.raises(InputError, match="take the photo"):
         covariances.propagate(lambda p: p, ("step", small.block.photo_ids[0]))
-    monkeypatch.setattr("photogram.network.core.fits_anywhere", lambda block: False)
-    monkeypatch.setattr("photogram.network.core.available_memory", lambda: 1 << 29)
+    monkeypatch.setattr("photogram.network.core_arrays.fits_anywhere", lambda block: False)
+    monkeypatch.setattr("photogram.network.core_arrays.available_memory", lambda: 1 << 29)
     with pytest.raises(OutOfMemoryError, match="ask for fewer"):
         small.covariances().covariance(("point", [point] * 3000))
 

@@ -5,7 +5,7 @@ import pytest
 
 from photogram import InputError
 from photogram.network.lens import Lens
-from photogram.network.timed import LineSensor
+from photogram.network.moving_photos import LineSensor
 
 TRANSVERSE = (
     *(0.01, 1.001, 2e-3, 1e-5, -2e-5, 3e-5, 1e-7, 2e-7, -1e-7, 3e-8),

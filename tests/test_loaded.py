@@ -33,7 +33,7 @@ OF_OTHERS = (
     "photogram.formats.blocks_exchange.writing",
     "photogram.formats.isis.assembling",
     "photogram.giant.printout",
-    "photogram.targets.first",
+    "photogram.targets.first_calibration",
     "urllib.request",
 )
 """Modules for blocks of other kinds, and for adjustments that fail."""

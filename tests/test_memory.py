@@ -116,20 +116,20 @@ def test_a_system_that_does_not_tell(tmp_path):
 def test_a_block_that_does_not_fit_is_refused(monkeypatch):
     # More photos than fit anywhere.
     block = simulate(strips=3, photos_per_strip=40, seed=2).block
-    monkeypatch.setattr("photogram.network.core.available_memory", lambda: 1 << 20)
+    monkeypatch.setattr("photogram.network.core_arrays.available_memory", lambda: 1 << 20)
     with pytest.raises(
         OutOfMemoryError, match=r"takes \d+\.\d MiB of memory, and 1\.0 MiB are free"
     ) as raised:
         adjust(block)
     assert isinstance(raised.value, MemoryError)
     assert isinstance(raised.value, AdjustmentError)
-    monkeypatch.setattr("photogram.network.core.available_memory", lambda: 1 << 30)
+    monkeypatch.setattr("photogram.network.core_arrays.available_memory", lambda: 1 << 30)
     assert adjust(block).converged
 
 
 def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
     collection = simulate_collection(photos=4, points=20).collection
-    monkeypatch.setattr("photogram.collection.core.available_memory", lambda: 1 << 20)
+    monkeypatch.setattr("photogram.collection.core_arrays.available_memory", lambda: 1 << 20)
     with pytest.raises(OutOfMemoryError, match=r"of memory, and 1\.0 MiB are free"):
         adjust_collection(collection)
 

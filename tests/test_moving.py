@@ -11,9 +11,9 @@ import pytest
 from example_scripts import load
 from photogram import Block, Camera, InputError, adjust
 from photogram.network.geometry import Spheroid
+from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
 from photogram.network.observations import Attitude, Control, Position, Rate, Smoothness, Velocity
 from photogram.network.projecting import projected
-from photogram.network.timed import Lines, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
 from photogram.network.unknowns import Boresight, Sensor
 from shared_data import SHARED

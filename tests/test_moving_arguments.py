@@ -8,9 +8,9 @@ import pytest
 from moving_blocks import rolling
 from photogram.adjustment.snooping import options_of
 from photogram.errors import PhotogramError
-from photogram.network.core import block_network
+from photogram.network.core_arrays import block_network
+from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
 from photogram.network.observations import Attitude, Position, Range, Rate, Smoothness, Velocity
-from photogram.network.timed import Lines, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
 from test_arguments import HOSTILE
 

@@ -7,10 +7,10 @@ import pytest
 
 from moving_blocks import rolling, scanned
 from photogram import Camera, InputError
-from photogram.network.chosen import of_photos
 from photogram.network.motion import at_rest, flown_by, focal_images, of_pictures, scanners, timed_photos
+from photogram.network.moving_photos import Timed
 from photogram.network.observations import Attitude, Position, Range, Rate, Smoothness, Velocity
-from photogram.network.timed import Timed
+from photogram.network.subset import of_photos
 from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
 from photogram.network.unknowns import Sensor
 

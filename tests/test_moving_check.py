@@ -16,14 +16,14 @@ from photogram import (
     first_values,
     simulate,
 )
-from photogram.diagnosis.adjusted import errors_explained
+from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints
 from photogram.network.directions import image_directions, seen_without_lenses
+from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.observations import OnPlane
-from photogram.network.timed import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Table, Trajectory
 from photogram.network.unknowns import Plane
-from photogram.results.held import held_tested
+from photogram.results.fixed_tests import held_tested
 
 
 def test_the_check_proposes_nothing_for_what_moves():

@@ -8,15 +8,15 @@ import pytest
 from moving_blocks import rolling, scanned
 from photogram import InputError, adjust, formats, predict
 from photogram.absolute_orientation import relative_model
-from photogram.formats.additions import repeated_remarks
 from photogram.formats.carrying import is_free
 from photogram.formats.millimetres import in_pixels
 from photogram.formats.project import Repeated
 from photogram.formats.registry import FORMATS, cannot_hold, to_files
+from photogram.formats.supplements import repeated_remarks
 from photogram.formats.topocentric import in_topocentric
 from photogram.network.block import of_images_alone
 from photogram.network.geometry import Spheroid
-from photogram.network.timed import Timed
+from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Polynomial, Table, Trajectory
 
 OTHERS = [name for name, each in FORMATS.items() if each.write is not None and name != "plain"]

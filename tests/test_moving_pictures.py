@@ -5,7 +5,7 @@ import pytest
 
 from moving_blocks import rolling, scanned
 from photogram import adjust
-from photogram.plots.pictured import pictured
+from photogram.plots.picture_data import pictured
 from photogram.results.footprints import footprints
 from photogram.results.weakest import weakest_lines, weakest_points
 

@@ -8,7 +8,7 @@ import pytest
 from moving_blocks import rolling, scanned
 from photogram import adjust, simulate
 from photogram.network.attitudes import Attitudes
-from photogram.network.timed import Lines, Shutter, Timed
+from photogram.network.moving_photos import Lines, Shutter, Timed
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
 

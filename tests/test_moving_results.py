@@ -26,9 +26,9 @@ from photogram import (
     variance_function,
 )
 from photogram.formats import Project, read, to_files
-from photogram.network.chosen import kept_images
+from photogram.network.moving_photos import Lines, Timed
 from photogram.network.observations import Attitude, Prior
-from photogram.network.timed import Lines, Timed
+from photogram.network.subset import kept_images
 from photogram.network.trajectories import Clock, Readout, Spline, Table, Trajectory
 from photogram.network.unknowns import Boresight, Sensor
 from photogram.results.courses import courses

@@ -8,7 +8,7 @@ import pytest
 import photogram
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
-from photogram.network.core import CoreOptions, block_network
+from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.observations import Distance, Position
 
 OPTIONS = CoreOptions(

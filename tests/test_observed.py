@@ -12,7 +12,7 @@ from photogram.collection import AdjustedCollection
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.ways import Shown, axes_of, columns_of, report_of
+from photogram.show.methods import Shown, axes_of, columns_of, report_of
 
 KINDS = {
     "image": ("residuals", "redundancy", "standardized"),
@@ -162,9 +162,9 @@ def test_a_way_that_nobody_has_defined_says_so():
 
 
 def test_a_report_lists_no_more_than_can_be_read(monkeypatch):
-    from photogram.results import observed
+    from photogram.results import observation_rows
 
-    monkeypatch.setattr(observed, "LISTED", 3)
+    monkeypatch.setattr(observation_rows, "LISTED", 3)
     result = ring()
     more = np.count_nonzero(result.used_images) - 3
     assert f"and {more} more; the JSON document and the table of images have all" in result.report()

@@ -17,7 +17,7 @@ from photogram.giant import read_project
 from photogram.plots import PICTURES, figures, picture_files
 from photogram.plots.cells import cells
 from photogram.plots.panels import labels
-from photogram.plots.pictured import pictured
+from photogram.plots.picture_data import pictured
 from photogram.show.pictures import drawn
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}

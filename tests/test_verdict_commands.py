@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from photogram import Camera, adjust, diagnose, simulate
 from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
-from photogram.show.ways import page_of
+from photogram.show.methods import page_of
 
 pytestmark = pytest.mark.usefixtures("sketched")
 

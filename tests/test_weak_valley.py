@@ -7,7 +7,7 @@ import pytest
 
 import photogram
 from photogram import Camera, adjust, formats
-from photogram.formats.additions import self_calibrated
+from photogram.formats.supplements import self_calibrated
 from shared_data import SHARED
 
 WORDS = "(principal distance and "

@@ -45,15 +45,15 @@ def watched() -> Clock:
     """Put the clock on the phases of the command."""
     from photogram import Result
     from photogram.cli.job import Job
-    from photogram.diagnosis import adjusted
-    from photogram.show.ways import Judged
+    from photogram.diagnosis import after_adjustment
+    from photogram.show.methods import Judged
 
     # By its name: the package has a function that is called so, too.
     command = import_module("photogram.cli.adjust")
     clock = Clock()
     clock.watch(command, "read_project", "read")
     clock.watch(command, "adjusted_block", "adjust")
-    clock.watch(adjusted, "diagnosed", "verdict")
+    clock.watch(after_adjustment, "diagnosed", "verdict")
     # A property that is kept when it is first read: what computes it is watched.
     clock.watch(vars(Judged)["verdict"], "func", "verdict")
     clock.watch(command, "_files", "tables")

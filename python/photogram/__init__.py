@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from photogram._photocore import __version__
     from photogram.absolute_orientation import Orientation, orient
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
-    from photogram.adjustment.again import adjust_started
     from photogram.adjustment.cleaning import Cleaned, clean
     from photogram.adjustment.components import variance_components
     from photogram.adjustment.elimination import eliminate_terms
     from photogram.adjustment.first_values import FirstValues, first_values
     from photogram.adjustment.prediction import predict
+    from photogram.adjustment.reconsidered import adjust_started
     from photogram.adjustment.resection import Pose, Resection, resect
     from photogram.adjustment.snooping import snoop
     from photogram.adjustment.variance_function import variance_function
@@ -55,8 +55,8 @@ if TYPE_CHECKING:
     from photogram.results.iteration import Iteration
     from photogram.results.model_tests import compare, score_test, terms_test
     from photogram.results.result import Result
-    from photogram.results.snooped import Snooped
-    from photogram.results.statement.made import statement
+    from photogram.results.snooping_result import Snooped
+    from photogram.results.statement.making import statement
     from photogram.results.statement.statement import Statement
     from photogram.results.variance_function import VarianceFunction
     from photogram.stellar.cameras import camera_from
@@ -156,14 +156,14 @@ _HOMES = {
     "Resection": "adjustment.resection",
     "Result": "results.result",
     "Simulation": "network.simulation",
-    "Snooped": "results.snooped",
+    "Snooped": "results.snooping_result",
     "Statement": "results.statement.statement",
-    "statement": "results.statement.made",
+    "statement": "results.statement.making",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",
     "adjust_in_parts": "distributed.adjust",
-    "adjust_started": "adjustment.again",
+    "adjust_started": "adjustment.reconsidered",
     "camera_from": "stellar.cameras",
     "Cleaned": "adjustment.cleaning",
     "clean": "adjustment.cleaning",

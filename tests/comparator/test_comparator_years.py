@@ -18,8 +18,8 @@ from photogram.comparator import (
     simulate_calibration,
     to_json,
 )
+from photogram.comparator.years.joint import adjust_together
 from photogram.comparator.years.record import day_of
-from photogram.comparator.years.together import adjust_together
 from photogram.errors import InputError
 
 GRID = Grid.square(number=7, sigma_um=0.3)

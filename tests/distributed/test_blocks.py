@@ -9,7 +9,7 @@ from example_scripts import load
 from photogram import AsPublished, adjust, adjust_in_parts, adjust_started
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed import adjust as of_blocks
-from photogram.distributed.core import CoreEngine
+from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.run import read_manifest
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.network.observations import Distance, Relative

@@ -20,7 +20,7 @@ MEASURE = """
 import sys
 from pathlib import Path
 import numpy as np
-from photogram.distributed.core import CoreEngine
+from photogram.distributed.nodes import CoreEngine
 from photogram.memory import give_back, resident_memory
 
 def held():

@@ -9,7 +9,7 @@ import photogram
 from photogram.distributed.cut import Incidence, cut, homes, joined, tree_of
 from photogram.distributed.run import partition, read_manifest, read_node
 from photogram.network.cameras import Camera
-from photogram.network.core import CoreOptions
+from photogram.network.core_arrays import CoreOptions
 from photogram.network.geometry import rotation_matrix
 from photogram.network.observations import Distance, OnLevel, Position, Relative
 from photogram.network.unknowns import Level, LeverArm

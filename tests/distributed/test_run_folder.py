@@ -18,8 +18,8 @@ import photogram
 from photogram import adjust_in_parts
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.adjust import fingerprint
-from photogram.distributed.core import CoreEngine
 from photogram.distributed.files import alone
+from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.run import partition, read_node
 from photogram.distributed.shelf import shelf
 from photogram.distributed.workers import connected

@@ -10,8 +10,8 @@ from test_parts import OPTIONS, tied_block
 from photogram.distributed.run import partition, read_manifest, read_node
 from photogram.errors import InputError
 from photogram.formats import Wishes, read, to_files
-from photogram.formats.plain import streamed
-from photogram.formats.plain.streamed import Streamed, streamable
+from photogram.formats.plain import batches
+from photogram.formats.plain.batches import Streamed, streamable
 from photogram.formats.project import Project
 from photogram.network.observations import Distance, Position, Relative
 
@@ -41,8 +41,8 @@ def project(tmp_path_factory):
 
 @pytest.mark.parametrize("rows", [10**6, 700])
 def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatch, rows):
-    monkeypatch.setattr(streamed, "BUCKET", rows)
-    monkeypatch.setattr(streamed, "BATCH", 500)
+    monkeypatch.setattr(batches, "BUCKET", rows)
+    monkeypatch.setattr(batches, "BATCH", 500)
     block = read(project).block
     expected = partition(block, tmp_path / "whole", 4, OPTIONS, "")
     assert streamable(project)
@@ -66,7 +66,7 @@ def test_parts_are_those_of_the_project_read_whole(project, tmp_path, monkeypatc
 
 
 def test_names_may_come_with_all_that_the_file_has(project, tmp_path, monkeypatch):
-    monkeypatch.setattr(streamed, "BATCH", 100)
+    monkeypatch.setattr(batches, "BATCH", 100)
     folder = tmp_path / "categories"
     folder.mkdir()
     for each in project.iterdir():

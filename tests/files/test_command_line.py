@@ -176,7 +176,7 @@ def test_an_ignored_signal_stays_ignored(tmp_path):
     """As under nohup."""
     program = (
         "import os, signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "from photogram.cli.ending import end_by_signals\n"
+        "from photogram.cli.signals import end_by_signals\n"
         "end_by_signals(); os.kill(os.getpid(), signal.SIGHUP); print('alive')"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
@@ -223,7 +223,7 @@ def writes(tree):
 
 IN_RUNS = {f"distributed/{name}.py" for name in ("core", "executors", "files", "run", "running", "tasks")} | {
     "formats/in_parts.py",
-    "formats/plain/streamed.py",
+    "formats/plain/batches.py",
 }
 """These make folders of a run in parts, which is taken up again after whatever happens. One file writes
 there, under another name first; another one into a temporary folder."""

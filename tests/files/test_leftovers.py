@@ -166,7 +166,7 @@ def test_a_signal_that_ends_a_command_leaves_nothing(tmp_path, number):
     program = (
         "import os, sys\n"
         "from pathlib import Path\n"
-        "from photogram.cli.ending import end_by_signals\n"
+        "from photogram.cli.signals import end_by_signals\n"
         "from photogram.io.writing import OutputSet\n"
         "end_by_signals()\n"
         "with OutputSet() as outputs:\n"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from photogram import Result, adjust
-from photogram.diagnosis.adjusted import diagnosed
+from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_axes import _fitted, axis_hints
 from photogram.formats import Wishes, read
 

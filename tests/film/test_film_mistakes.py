@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from photogram.cli import app
 from photogram.errors import ContradictionError, InputError
 from photogram.formats import Wishes, read
-from photogram.formats.additions import deviations
+from photogram.formats.supplements import deviations
 from photogram.network.observations import Fiducial
 
 ARCHIVE = files("photogram") / "examples" / "archive"

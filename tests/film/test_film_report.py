@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from photogram import InputError, Result, adjust, formats, simulate
 from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
-from photogram.results.films_drawn import film_patterns, mark_residuals, mean_mark_residuals
-from photogram.results.films_told import film_table, scanner_table
+from photogram.results.film_pictures import film_patterns, mark_residuals, mean_mark_residuals
+from photogram.results.film_report import film_table, scanner_table
 from photogram.show.quantity import labelled
 from shared_data import SHARED
 

@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 
 from photogram import Result, adjust
 from photogram.cli import app
-from photogram.diagnosis.adjusted import diagnosed
+from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_scans import seam_hints
 from photogram.errors import InputError
 from photogram.formats import read
-from photogram.results.films_told import film_table
+from photogram.results.film_report import film_table
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 SHIFT = (1.5, 3.0)

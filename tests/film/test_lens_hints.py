@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from photogram import Result, adjust
-from photogram.diagnosis.adjusted import diagnosed
+from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_lenses import lens_hints
 from photogram.formats import read
 from photogram.network.block import Block

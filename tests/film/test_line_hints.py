@@ -6,7 +6,7 @@ import pytest
 from example_scripts import load
 from photogram import adjust
 from photogram.arguments.types import Floats
-from photogram.diagnosis.adjusted import diagnosed
+from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_lines import line_hints
 from photogram.formats import read
 from photogram.network.block import Block

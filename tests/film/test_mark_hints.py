@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError, Result, adjust
-from photogram.diagnosis.adjusted import diagnosed
+from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_marks import mark_hints
 from photogram.diagnosis.film_scans import seam_hints
 from photogram.film import compare_steps

@@ -12,7 +12,7 @@ from photogram import Attitudes, Result, adjust, diagnose
 from photogram.cli import app
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.adjusted import table_files
-from photogram.network.refined import as_seen, camera_images
+from photogram.network.film_reduction import as_seen, camera_images
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 PHOTOS = ("photo", "x", "y", "z", "omega", "phi", "kappa")

@@ -5,7 +5,7 @@ import pytest
 
 from example_scripts import load
 from photogram import Block, InputError, Spheroid, adjust, simulate
-from photogram.adjustment.started import started
+from photogram.adjustment.first_features import started
 from photogram.network.observations import OnLevel, OnLine, OnPlane, OnPlumbLine
 from photogram.network.simulated_observations import with_inertial, with_rig
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from photogram import Attitudes, Block, Camera, formats
+from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
 from photogram.network.observations import Attitude, Position, Prior, Rate, Velocity
-from photogram.network.timed import Lines, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
 from photogram.network.unknowns import Boresight, LeverArm, Sensor, Shift
 from photogram.network.whereabouts import about

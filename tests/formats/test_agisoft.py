@@ -8,7 +8,7 @@ from test_opensfm import only
 from test_plain_project import EXAMPLE, written
 
 from photogram import Attitudes, Camera, InputError, adjust, formats
-from photogram.formats import additions
+from photogram.formats import supplements
 from photogram.formats.project import Frame
 from photogram.formats.self_check import agreement
 
@@ -54,7 +54,7 @@ def test_a_table_of_markers_is_control(tmp_path):
     project = project.replace(
         block=project.block.replace(point_ids=[names[point] for point in project.block.point_ids])
     )
-    found = additions.with_control(project, sample("agisoft", "markers.csv"), {}, "EPSG:4979")
+    found = supplements.with_control(project, sample("agisoft", "markers.csv"), {}, "EPSG:4979")
     control = [each for each in found.block.observations if each.KIND == "control"]
     assert len(control) == 7
     for each in control:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from photogram import InputError, formats
-from photogram.formats.additions import with_control
 from photogram.formats.columns import columns_given
 from photogram.formats.project import Frame
+from photogram.formats.supplements import with_control
 from photogram.network.observations import Position
 
 LISTS = Path(__file__).parents[1] / "data" / "control_lists"

@@ -14,10 +14,10 @@ from test_plain_project import EXAMPLE, change
 from test_results_in_a_system import FRAME, UTM
 
 from photogram import InputError, Spheroid, adjust, formats, read_result, simulate
+from photogram.formats.crs_results import placed
 from photogram.formats.maps.layers import chosen_crs, map_layers
 from photogram.formats.maps.ply import point_cloud
 from photogram.formats.maps.styles import LAYERS, style
-from photogram.formats.placing import placed
 
 geopandas = pytest.importorskip("geopandas", reason="geopandas is not installed")
 pyogrio = pytest.importorskip("pyogrio", reason="pyogrio is not installed")

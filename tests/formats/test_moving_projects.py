@@ -15,11 +15,11 @@ from test_plain_project import change, written
 import test_moving
 from photogram import Attitudes, InputError, adjust, formats
 from photogram.formats import Wishes
-from photogram.formats.moving import motions
-from photogram.formats.plain.streamed import Streamed, streamable
+from photogram.formats.motion_summary import motions
+from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network.lens import Lens
+from photogram.network.moving_photos import Timed
 from photogram.network.observations import Smoothness
-from photogram.network.timed import Timed
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 from photogram.network.whereabouts import about
 

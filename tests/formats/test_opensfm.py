@@ -19,7 +19,7 @@ from damaged import check_damaged
 from test_plain_project import EXAMPLE, written
 
 from photogram import InputError, adjust, formats
-from photogram.formats import additions
+from photogram.formats import supplements
 from photogram.formats.self_check import agreement
 from photogram.network.observations import Position
 
@@ -81,7 +81,7 @@ def test_a_round_trip_keeps_all_but_deviations(tmp_path):
 def test_lists_of_control_come_with_their_measurements(tmp_path, file):
     pytest.importorskip("pyproj", reason="pyproj is not installed")
     project = formats.read(only(tmp_path / "model"))
-    found = additions.with_control(project, sample("opensfm", file), {"control": (0.02,)}, None)
+    found = supplements.with_control(project, sample("opensfm", file), {"control": (0.02,)}, None)
     block = found.block
     known = truth()
     rows = {name: row for row, name in enumerate(block.point_ids)}
@@ -100,7 +100,7 @@ def test_lists_of_control_come_with_their_measurements(tmp_path, file):
                 own = seen[each["photo"], name]
                 np.testing.assert_allclose(own, [each["column"], each["row"]], atol=1e-9)
     # Standard deviations that differ are along the axes of the list's system: full covariances in the frame.
-    turned = additions.with_control(
+    turned = supplements.with_control(
         project, sample("opensfm", file), {"control": (0.02, 0.02, 0.03)}, None
     ).block
     full = [each for each in turned.observations if each.KIND == "control"]
@@ -171,7 +171,7 @@ def test_control_is_written_with_its_measurements(tmp_path):
     other = formats.read(place)
     count = len(other.block.image_xy)
     sd = {"control": (0.02, 0.02, 0.03)}
-    found = additions.with_control(other, place / "gcp_list.txt", sd, None).block
+    found = supplements.with_control(other, place / "gcp_list.txt", sd, None).block
     # Its measurements are those of the tracks.
     assert len(found.image_xy) == count
     control = {each.point: each for each in found.observations if each.KIND == "control"}
@@ -183,7 +183,7 @@ def test_control_is_written_with_its_measurements(tmp_path):
     moved = [*first[:3], repr(float(first[3]) + 1.0), *first[4:]]
     (tmp_path / "gcp_list.txt").write_text("\n".join([lines[0], " ".join(moved), *lines[2:]]) + "\n")
     with pytest.raises(InputError, match="has two images on the photo"):
-        additions.with_control(other, place / "gcp_list.txt", sd, None)
+        supplements.with_control(other, place / "gcp_list.txt", sd, None)
 
 
 @pytest.mark.parametrize("command", ["info", "check"])

@@ -10,8 +10,8 @@ from example_scripts import load
 from formats.photographs import EXAMPLE, ORIGIN, block_with_pictures, dji, packet, picture, tags
 from photogram import InputError, formats
 from photogram.formats import PhotoFiles, Wishes, read_metadata
-from photogram.formats.metadata.found import Photos
-from photogram.formats.metadata.located import located
+from photogram.formats.metadata.search import Photos
+from photogram.formats.metadata.systems import located
 from photogram.network.observations import Position
 
 MRK = "{}\t384233.385421\t[2264]\t -40,N\t 0,E\t 86,V\t{},Lat\t{},Lon\t{},Ellh\t0.021, 0.022, 0.043\t50,Q\n"

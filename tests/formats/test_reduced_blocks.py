@@ -9,7 +9,7 @@ from damaged import check_damaged
 from test_plain_project import written
 
 from photogram import Attitudes, Camera, InputError, adjust, formats
-from photogram.formats import Wishes, additions
+from photogram.formats import Wishes, supplements
 from photogram.network.directions import image_directions
 
 FOCAL = {"A": 8.67, "B": 9.315}
@@ -159,7 +159,7 @@ def test_bingo_keeps_all_digits(tmp_path):
     place = written(project, tmp_path, "bingo")
     other = formats.read(place)
     names = {name.replace(" ", "_"): name for name in project.block.photo_ids}
-    other = additions.with_control(other, place / "control.csv", {}, None)
+    other = supplements.with_control(other, place / "control.csv", {}, None)
     block = with_own_sd(other).replace(photo_ids=[names[name] for name in other.block.photo_ids])
     one, two = adjust(project.block, tolerance=1e-10), adjust(block, tolerance=1e-10)
     assert compared(one, two) < 1e-9

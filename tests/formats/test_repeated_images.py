@@ -9,7 +9,7 @@ from block import sample
 
 from photogram import adjust, formats
 from photogram.adjustment.prediction import at_adjusted, computed_images
-from photogram.formats.additions import repeated_remarks, with_repeated
+from photogram.formats.supplements import repeated_remarks, with_repeated
 
 EVERY = 5
 

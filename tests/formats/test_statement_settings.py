@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from photogram import InputError, adjust, formats
-from photogram.formats.additions import with_control
 from photogram.formats.names import with_names
 from photogram.formats.sentences import read_sentences
-from photogram.results.statement.asked import Asked
+from photogram.formats.supplements import with_control
+from photogram.results.statement.request import Asked
 from shared_data import SHARED
 
 ROOT = Path(__file__).parents[2]

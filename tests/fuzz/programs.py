@@ -53,7 +53,7 @@ class Watch:
         ("photogram.perspective_center.batch", "determine"),
         ("photogram.comparator", "calibrate"),
         ("photogram.stellar", "calibrate"),
-        ("photogram.stellar.night", "calibrate_night"),
+        ("photogram.stellar.night_calibration", "calibrate_night"),
     )
     METHODS = (
         ("photogram.absolute_orientation.similarity", "Similarity", "transform"),

@@ -20,9 +20,9 @@ from photogram.cli import adjust as adjusting
 from photogram.cli import choices
 from photogram.cli.components import UnitVarianceName
 from photogram.distributed import Division
-from photogram.formats.additions import self_calibrated, with_control
 from photogram.formats.format import Wishes
 from photogram.formats.images import to_corner
+from photogram.formats.supplements import self_calibrated, with_control
 
 from .networks import random_network
 

@@ -23,7 +23,7 @@ from photogram.comparator import Grid, Options, calibrate, simulate_calibration,
 from photogram.comparator.grid import built_in_grid
 from photogram.giant import Common, Project
 from photogram.giant.files import to_bytes as record_bytes
-from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_file import read_night
 from photogram.stellar.plain import read_plain
 

@@ -18,10 +18,10 @@ from photogram.diagnosis.robust import critical, fit, mad_sd
 from photogram.diagnosis.structure import parts_of
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check
-from photogram.network.chosen import kept_images, of_photos
 from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
 from photogram.network.strips import strips_of
+from photogram.network.subset import kept_images, of_photos
 
 pytestmark = pytest.mark.usefixtures("sketched")
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}

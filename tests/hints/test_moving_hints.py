@@ -19,13 +19,13 @@ from moving_blocks import (
     scanned,
 )
 from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
-from photogram.diagnosis.adjusted import diagnosed, errors_explained, explained, remarks
 from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.flown_hints import flown_hints
 from photogram.diagnosis.rolling import rolling_hints
+from photogram.diagnosis.trajectory_hints import flown_hints
+from photogram.network.moving_photos import Lines
 from photogram.network.observations import Attitude
-from photogram.network.timed import Lines
 from photogram.network.trajectories import Clock, Readout
 from photogram.network.unknowns import Boresight
 

@@ -6,7 +6,7 @@ import pytest
 
 from example_scripts import load
 from photogram import Camera, InputError, RankError, Spheroid, adjust, diagnose, simulate
-from photogram.diagnosis.adjusted import errors_explained
+from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints, verdicts
 from photogram.diagnosis.regression import eligible, regressions, spread, view
 from photogram.giant import Project, write_project

@@ -10,10 +10,10 @@ from golden_statement import block_path, compare, golden
 
 import photogram
 from photogram.formats import read
-from photogram.results.statement.asked import Asked
-from photogram.results.statement.compared import compared
+from photogram.results.statement.comparison import compared
 from photogram.results.statement.honest import bias, prediction
-from photogram.results.statement.judged import judged
+from photogram.results.statement.judgement import judged
+from photogram.results.statement.request import Asked
 from photogram.statistics.freedom import rmse_interval
 
 KINDS = ("point C08 z", "distance C01 C30", "camera drone f")

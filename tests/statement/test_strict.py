@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from golden_statement import block_path
 
-from photogram.results.statement.judged import judged
+from photogram.results.statement.judgement import judged
 
 
 @pytest.fixture(scope="module")

@@ -21,11 +21,11 @@ from photogram.results import datum as datums
 from photogram.results import patterns
 from photogram.results.features import KINDS as FORMS
 from photogram.results.features_report import through
+from photogram.results.fixed_tests import HELD
 from photogram.results.group_sums import observables
-from photogram.results.groups_tested import PLURALS
-from photogram.results.held import HELD
+from photogram.results.group_tests import PLURALS
 from photogram.results.result import adjusted
-from photogram.results.statement import sources, words
+from photogram.results.statement import sources, translation
 from photogram.results.statement.texts import LANGUAGES, Texts, table_of
 
 PACKAGE = Path(photogram.__file__).parent
@@ -65,10 +65,16 @@ def test_every_kind_of_observation_has_a_word(result):
     assert not lacking("kind", names)
     singles = {sources.kind_of(each) for each in kinds} | {"image", "control", "camera", "attitude"}
     assert not lacking("one", singles)
-    assert words.kind(GERMAN, "prior, lever arm") == "Vorwerte, Hebelarm"
-    assert words.kind(GERMAN, "images, 2, x") == "Bildpunkte, 2, x"
-    assert words.kind(ENGLISH, "smoothness, 4 position coefficients") == "smoothness, 4 position coefficients"
-    assert words.kind(GERMAN, "smoothness, 4 position coefficients") == "Glattheit, 4 Positionskoeffizienten"
+    assert translation.kind(GERMAN, "prior, lever arm") == "Vorwerte, Hebelarm"
+    assert translation.kind(GERMAN, "images, 2, x") == "Bildpunkte, 2, x"
+    assert (
+        translation.kind(ENGLISH, "smoothness, 4 position coefficients")
+        == "smoothness, 4 position coefficients"
+    )
+    assert (
+        translation.kind(GERMAN, "smoothness, 4 position coefficients")
+        == "Glattheit, 4 Positionskoeffizienten"
+    )
 
 
 def test_every_component_has_a_word_or_is_a_letter():
@@ -77,7 +83,7 @@ def test_every_component_has_a_word_or_is_a_letter():
     names |= {
         name for crs in ("ENU:48,9", "EPSG:4978", "EPSG:25832", "EPSG:4979") for name in axes_of(crs)[0]
     }
-    assert not lacking("axis", (names | {"column", "row"}) - set(words.LETTERS))
+    assert not lacking("axis", (names | {"column", "row"}) - set(translation.LETTERS))
 
 
 def test_every_verdict_datum_frame_and_reason_has_a_sentence(result):
@@ -113,8 +119,8 @@ def test_every_test_of_a_verdict_is_known_again(result):
     assert len(tests) > 8
     for name in tests:
         said = f"{name[:1].upper()}{name[1:]}"
-        assert words.test(ENGLISH, name) == said
-        assert words.test(GERMAN, name) != said, name
+        assert translation.test(ENGLISH, name) == said
+        assert translation.test(GERMAN, name) != said, name
 
 
 @pytest.mark.parametrize(
@@ -133,14 +139,14 @@ def test_every_test_of_a_verdict_is_known_again(result):
     ],
 )
 def test_names_of_observations_are_turned_and_those_of_users_are_not(said, german):
-    assert words.named(GERMAN, said) == german
-    assert words.named(ENGLISH, said) == said
+    assert translation.named(GERMAN, said) == german
+    assert translation.named(ENGLISH, said) == said
 
 
 def test_names_of_points_are_the_users():
-    assert words.test(GERMAN, "check points: plane 3 of house") == "Kontrollpunkte: plane 3 of house"
-    assert words.test(GERMAN, "pattern by photo: line 4") == "Muster nach Bildern: line 4"
-    assert words.quantity(GERMAN, "point roof height z") == "Punkt roof height z"
+    assert translation.test(GERMAN, "check points: plane 3 of house") == "Kontrollpunkte: plane 3 of house"
+    assert translation.test(GERMAN, "pattern by photo: line 4") == "Muster nach Bildern: line 4"
+    assert translation.quantity(GERMAN, "point roof height z") == "Punkt roof height z"
 
 
 def test_quantities_and_parameters_are_named_in_the_language(result):
@@ -151,10 +157,10 @@ def test_quantities_and_parameters_are_named_in_the_language(result):
         ("unknown flight z", "Unbekannte flight z"),
         (linear, "lineare Funktion von Punkt C01, Punkt C02"),
     ):
-        assert words.quantity(ENGLISH, name) == name
-        assert words.quantity(GERMAN, name) == german
-    assert words.parameter(GERMAN, "rig 1 rotation x") == "rig 1 Drehung x"
-    assert words.observation(GERMAN, ("image", "3", "7", "row")) == "Bildpunkt 3 7 Zeile"
+        assert translation.quantity(ENGLISH, name) == name
+        assert translation.quantity(GERMAN, name) == german
+    assert translation.parameter(GERMAN, "rig 1 rotation x") == "rig 1 Drehung x"
+    assert translation.observation(GERMAN, ("image", "3", "7", "row")) == "Bildpunkt 3 7 Zeile"
     gradient = {("point", "C01"): [0, 0, 1], ("point", "C02"): [0, 0, -1]}
     found = result.statement(language="de", budgets=(gradient,), standards=("plain",))
     assert any(each["text"].startswith("lineare Funktion von Punkt C01") for each in found.sentences)
@@ -184,26 +190,28 @@ def test_quantities_and_parameters_are_named_in_the_language(result):
     ],
 )
 def test_the_datum_is_told_in_the_language(datum, german):
-    assert words.datum(ENGLISH, datum) == str(datum)
-    assert words.datum(GERMAN, datum) == german
+    assert translation.datum(ENGLISH, datum) == str(datum)
+    assert translation.datum(GERMAN, datum) == german
 
 
 def test_frame_and_refraction_are_told_in_the_language():
     frame = Frame("topocentric", "EPSG:4979", (48.5, 9.25, 500.0))
-    assert words.frame(ENGLISH, frame) == str(frame)
-    assert words.frame(GERMAN, frame) == "topozentrisch in Breite 48,5, Länge 9,25, Höhe 500 (EPSG:4979)"
+    assert translation.frame(ENGLISH, frame) == str(frame)
+    assert (
+        translation.frame(GERMAN, frame) == "topozentrisch in Breite 48,5, Länge 9,25, Höhe 500 (EPSG:4979)"
+    )
     for own in (
         Refraction("standard", "snell", 3.25),
         Refraction("giant"),
         Refraction(None, "giant"),
         Refraction(),
     ):
-        assert words.refraction(ENGLISH, own, "m") == own.describe("m")
-    said = words.refraction(GERMAN, Refraction("standard", "snell", 3.25), "m")
+        assert translation.refraction(ENGLISH, own, "m") == own.describe("m")
+    said = translation.refraction(GERMAN, Refraction("standard", "snell", 3.25), "m")
     assert said == (
         "Luft: Normalatmosphäre; Wasser unter 3,250 m: Brechungsgesetz von Snellius, Brechzahl 1,34"
     )
-    assert words.refraction(GERMAN, None, "m") == "keine"
+    assert translation.refraction(GERMAN, None, "m") == "keine"
 
 
 def test_refraction_and_what_is_held_are_assumptions(result):
@@ -230,9 +238,9 @@ def test_features_are_told_in_the_language(result):
         measured += photogram.features(result, {name: definition})
     assert len(measured) == len(FORMS)
     for each in measured:
-        assert words.feature(ENGLISH, each) == through(each)
+        assert translation.feature(ENGLISH, each) == through(each)
         assert not lacking("measured", [own.name for own in each.quantities])
-    said = words.feature(GERMAN, measured[2])
+    said = translation.feature(GERMAN, measured[2])
     assert said == "Ebene durch 12 Punkte: C01, C02, C03, C04 und noch 8"
 
 
@@ -303,9 +311,9 @@ def test_what_is_assumed_of_files_is_told_in_the_language():
     assert len(said) > 10
     for each in said:
         assert ENGLISH.recognised("read", each) is not None, each
-        assert words.read(ENGLISH, each) == each
+        assert translation.read(ENGLISH, each) == each
     assumed = "no standard deviations of image coordinates: 0.5 px is assumed (--sd images=...)"
-    assert words.read(GERMAN, assumed) == (
+    assert translation.read(GERMAN, assumed) == (
         "Standardabweichungen der Bildkoordinaten fehlen: Angenommen ist 0,5 px (--sd images=...)"
     )
 

@@ -41,7 +41,7 @@ def night():
 @pytest.fixture(scope="module")
 def result(night):
     """Return the calibration of the night of the module."""
-    from photogram.stellar.night import calibrate_night
+    from photogram.stellar.night_calibration import calibrate_night
 
     return calibrate_night(night)
 

@@ -9,7 +9,7 @@ import star_plates as plates
 from photogram import AdjustmentError, InputError
 from photogram.stellar import calibrate
 from photogram.stellar.parameters import INDEX
-from photogram.stellar.published import DIVERGED, SETTLED, stop_reason
+from photogram.stellar.report_iteration import DIVERGED, SETTLED, stop_reason
 
 
 @pytest.mark.parametrize("as_published", [False, True])

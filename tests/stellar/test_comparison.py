@@ -11,10 +11,10 @@ from photogram.cli import app
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.comparison import held_out
-from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_file import read_night
 from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.skies import calibrate_exposures
+from photogram.stellar.sky_calibration import calibrate_exposures
 
 pytestmark = pytest.mark.usefixtures("sketched")
 

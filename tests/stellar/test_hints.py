@@ -9,7 +9,7 @@ import pytest
 
 from photogram import InputError
 from photogram.stellar.cameras import BrownCamera
-from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_file import read_night
 from photogram.stellar.pointing import attitude_of, axis_of, roll_of
 

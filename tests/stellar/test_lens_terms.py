@@ -12,10 +12,10 @@ from photogram.stellar.lens_tests import equal
 from photogram.stellar.lens_tests import test_scale as scale_of
 from photogram.stellar.lens_tests import test_terms as terms_of
 from photogram.stellar.listing import listing
-from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_report import report
 from photogram.stellar.parameters import INDEX
-from photogram.stellar.skies import calibrate_exposures
+from photogram.stellar.sky_calibration import calibrate_exposures
 
 FRAME = (6000.0, 4000.0)
 

@@ -8,11 +8,11 @@ import pytest
 from example_scripts import load
 from photogram import InputError, _photocore
 from photogram.stellar.lenses import LENSES
-from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_plots import figures
 from photogram.stellar.night_report import report
 from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.skies import partials, project_sky
+from photogram.stellar.sky_calibration import partials, project_sky
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 
 allsky = load("all_sky_camera")

@@ -12,7 +12,7 @@ from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.skies import (
+from photogram.stellar.sky_calibration import (
     BrownCamera,
     Exposure,
     calibrate_exposures,
@@ -111,7 +111,7 @@ def test_a_hundred_exposures_adjust(catalogue):
 def test_what_the_memory_does_not_hold_is_refused(catalogue, monkeypatch):
     bright = catalogue.brighter(4.0)
     exposure = expose(bright, "2024-03-01T21:10:00", np.array([0.2, -0.1, 0.4]), np.random.default_rng(1))
-    monkeypatch.setattr("photogram.stellar.skies.available_memory", lambda: 1000)
+    monkeypatch.setattr("photogram.stellar.sky_calibration.available_memory", lambda: 1000)
     with pytest.raises(AdjustmentError, match=r"1 exposures with .* images take 0\.0 GiB of memory"):
         calibrate_exposures([exposure], TRUTH, SITE, bright)
 

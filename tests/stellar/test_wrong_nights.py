@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from photogram.cli import app
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.hints import _HOUR
-from photogram.stellar.night import calibrate_night
+from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_file import read_night
 from photogram.stellar.pointing import attitude_of, turn_between
 

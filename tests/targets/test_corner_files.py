@@ -10,7 +10,7 @@ from photogram import Camera, InputError
 from photogram.targets import Board
 from photogram.targets.corner_files import holds_targets, sorted_files
 from photogram.targets.corner_tables import read_table, read_vnl
-from photogram.targets.measured import Grouping, grouped
+from photogram.targets.corner_views import Grouping, grouped
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz, read_storage
 from photogram.targets.reading import _measured, read

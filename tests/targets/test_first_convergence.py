@@ -6,7 +6,7 @@ from golden_boards import golden, left, needs_golden, rig, wide
 from relisted import relisted
 
 from photogram.targets import Calibration
-from photogram.targets.first import first_values
+from photogram.targets.first_calibration import first_values
 
 pytestmark = needs_golden
 

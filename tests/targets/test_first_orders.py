@@ -7,7 +7,7 @@ from relisted import relisted
 
 from photogram.errors import InputError
 from photogram.targets import Board
-from photogram.targets.first import first_values
+from photogram.targets.first_calibration import first_values
 from photogram.targets.sightings import LISTED, Listings
 
 pytestmark = needs_golden

@@ -34,4 +34,4 @@ WAYS = {
     "page_of": ("page",),
     "report_of": ("report",),
 }
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

@@ -14,11 +14,11 @@ import numpy as np
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, quoted
 from photogram.network.geometry import rotation_matrix
 

@@ -17,8 +17,8 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
+from photogram.show.methods import document_of
 from photogram.show.quantity import records
-from photogram.show.ways import document_of
 from photogram.statistics.limits import GlobalTest
 
 __all__ = ["point_rows", "read_similarity", "to_json", "without_points"]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from photogram.absolute_orientation.orientation import Orientation
+from photogram.show.methods import findings_of
 from photogram.show.page import significant
-from photogram.show.ways import findings_of
 from photogram.statistics.findings import Findings, Tested
 
 __all__ = ["orientation_findings"]

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.likelihood import judged
 
 __all__ = ["Fit", "Hint", "Trial", "find", "trials", "undecided", "unit_of"]

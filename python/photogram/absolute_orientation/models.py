@@ -16,11 +16,11 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError, RankError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, refuse_trajectories
-from photogram.network.chosen import kept_images, of_photos
 from photogram.network.datum import MinimumConstraints
+from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 
 __all__ = ["Model", "Strip", "relative_model", "strip_of"]

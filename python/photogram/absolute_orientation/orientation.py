@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.results.iteration import Iteration
-from photogram.show.brief import Brief
-from photogram.show.ways import Shown, axes_of
+from photogram.show.methods import Shown, axes_of
+from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
 from photogram.statistics.reliability import TESTABLE
 

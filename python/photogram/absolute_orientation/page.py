@@ -19,9 +19,9 @@ from photogram.absolute_orientation.tables import (
 )
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Facts, Page, Part, Section, significant
 from photogram.show.quantity import chosen, long
-from photogram.show.ways import page_of
 
 __all__ = ["orientation_page"]
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
 from photogram.plots.panels import Where, figure_of, labels, panels, scale_bars
+from photogram.show.methods import axes_of
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import INK, PURPLE, VERMILION
-from photogram.show.ways import axes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

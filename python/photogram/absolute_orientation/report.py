@@ -18,10 +18,10 @@ from photogram.absolute_orientation.tables import (
     stations,
     tested_control,
 )
-from photogram.results.iterations_told import iteration_lines
+from photogram.results.iteration_text import iteration_lines
 from photogram.show.lines import Field, fact_lines, field, marks, table_lines
+from photogram.show.methods import report_of
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
-from photogram.show.ways import report_of
 
 __all__ = ["report", "summary"]
 

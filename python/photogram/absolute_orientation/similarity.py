@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import is_covariance, number, numbers, shaped
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import rotation_angles
 
 __all__ = ["Similarity"]

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.arrays import frozen, names, numbers, text
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
-from photogram.show.brief import Brief
+from photogram.lazy_dataclasses import dataclass
+from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
     import pandas as pd

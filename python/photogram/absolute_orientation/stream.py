@@ -16,13 +16,13 @@ from photogram.absolute_orientation.document import point_rows
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import MODEL_COLUMNS, MODEL_SD_COLUMNS
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD, cells
 from photogram.io.writing import OutputSet
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
 if TYPE_CHECKING:

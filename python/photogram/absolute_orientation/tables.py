@@ -8,10 +8,10 @@ import numpy as np
 
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
-from photogram.results.iterations_told import iteration_table
+from photogram.results.iteration_text import iteration_table
+from photogram.show.methods import columns_of
 from photogram.show.page import Fact, significant
 from photogram.show.quantity import Axis, Quantity, chosen, frame, long
-from photogram.show.ways import columns_of
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["cycles", "facts", "left_out", "parameters", "points", "rotation", "stations", "tested_control"]

@@ -12,6 +12,6 @@ if TYPE_CHECKING:
 __all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
 
 WAYS = {"findings_of": ("findings",)}
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 
 __getattr__, __dir__ = on_demand(__name__, dict.fromkeys(__all__, "adjustment"))

@@ -11,17 +11,17 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.coefficients import outside
-from photogram.adjustment.ends import behind, folded, harmful, rounded, too_coarse, undetermined
+from photogram.adjustment.first_features import started
+from photogram.adjustment.remarks import behind, folded, harmful, rounded, too_coarse, undetermined
 from photogram.adjustment.robust import Loss, loss_row, remark
-from photogram.adjustment.started import started
 from photogram.adjustment.undetermined import one_place, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, whole_number
-from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message, listed
 from photogram.network.block import Block, checked
-from photogram.network.core import CoreOptions, block_network
+from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import (
     DatumRow,
     InnerConstraints,
@@ -38,7 +38,7 @@ from photogram.results.datum import ResultDatum, datum_messages, datum_of, refus
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.ways import Way
+from photogram.show.methods import Way
 
 __all__ = [
     "AsPublished",

@@ -16,15 +16,15 @@ from photogram.adjustment.components import Settings, of_grouping, scaled
 from photogram.adjustment.snooping import snoop
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
 from photogram.results.components import VarianceComponents, component_lines, statement
 from photogram.results.group_sums import Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.snooped import Snooped
-from photogram.show.brief import Brief
-from photogram.show.ways import report_of
+from photogram.results.snooping_result import Snooped
+from photogram.show.methods import report_of
+from photogram.show.summary import Brief
 from photogram.statistics.components import WORTH_CHANGING
 
 __all__ = ["Cleaned", "clean"]

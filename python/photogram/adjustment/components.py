@@ -12,15 +12,15 @@ from photogram.adjustment.adjustment import adjust, adjusted_again
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block
 from photogram.network.observations.observation import Observation
 from photogram.results.components import VarianceComponents
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.show.ways import Way
+from photogram.show.methods import Way
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 
 __all__ = ["Settings", "Weighing", "first_adjusted", "of_grouping", "scaled", "variance_components"]

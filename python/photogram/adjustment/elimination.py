@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from photogram.adjustment.adjustment import UnitVariance, adjust
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.model_tests import EFFECT, KEPT, TermsTest, groups_of_terms, terms_test

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.adjustment.resection import Resection
 from photogram.arguments.types import Floats
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 

@@ -12,20 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.known import Cartesian, Known
+from photogram.adjustment.a_priori import Cartesian, Known
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message, counted, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block, flown_by
-from photogram.network.chosen import kept_images, of_photos
 from photogram.network.directions import direction_deviations, image_directions
+from photogram.network.film_reduction import as_seen, is_scanned
 from photogram.network.motion import at_rest, timed_photos
 from photogram.network.observations import Distance
-from photogram.network.refined import as_seen, is_scanned
-from photogram.show.brief import Brief
+from photogram.network.subset import kept_images, of_photos
+from photogram.show.summary import Brief
 
 __all__ = ["FirstValues", "first_values"]
 

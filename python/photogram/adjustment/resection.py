@@ -25,12 +25,12 @@ from photogram.arguments.arrays import (
     whole_number,
 )
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.geometry import Spheroid
 from photogram.results.iteration import Iteration
-from photogram.show.ways import Judged
+from photogram.show.methods import Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
 

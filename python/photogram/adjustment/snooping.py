@@ -18,11 +18,11 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.network.block import Block, checked
-from photogram.network.core import CoreOptions, block_network
+from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.motion import timed_photos
 from photogram.network.refracted import check_cameras
-from photogram.results.exchanged import Exchange, exchanged_names
-from photogram.results.held import held_remark, held_tested
+from photogram.results.exchanged_names import Exchange, exchanged_names
+from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import (
     ATTITUDE,
@@ -33,9 +33,9 @@ from photogram.results.network_trial import (
     NetworkTrial,
 )
 from photogram.results.result import Result
-from photogram.results.snooped import Snooped
+from photogram.results.snooping_result import Snooped
 from photogram.results.suspects import network_trial
-from photogram.show.ways import Way
+from photogram.show.methods import Way
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.adjustment.coefficients import named_unknowns, of_motion
-from photogram.declared import dataclass
 from photogram.errors import RankError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.network.block import Block, flown_by
 from photogram.network.geometry import rotation_matrix, viewing_directions

@@ -9,7 +9,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from photogram.cli.ending import end_by_signals, ignore_signals
+from photogram.cli.signals import end_by_signals, ignore_signals
 
 if TYPE_CHECKING:
     from photogram.cli.commands import app

@@ -209,7 +209,7 @@ def absolute_orientation(
         from photogram import orient
         from photogram.absolute_orientation.report import summary
         from photogram.messages import Message
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
 
         target = points_out
         if file is None:

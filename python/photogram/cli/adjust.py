@@ -39,8 +39,8 @@ from photogram.cli.projects import (
     with_additions,
     with_options,
 )
-from photogram.cli.stating import stated, statement_files
-from photogram.declared import replace
+from photogram.cli.statement_output import stated, statement_files
+from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from photogram.cli.pictures import Pictures
     from photogram.distributed import Division
     from photogram.formats import Project
-    from photogram.results.snooped import Snooped
+    from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
     from photogram.show.page import Section
 
@@ -112,7 +112,7 @@ def adjust(
         if not quiet:
             print_sections(sections, "`photogram info`")
         if documents.crs is not None:
-            from photogram.formats.placing import check_place
+            from photogram.formats.crs_results import check_place
 
             check_place(project.block, documents.crs)
         block, started = started_block(project, keep_all=keep_all)
@@ -169,7 +169,7 @@ def _finish(
 ) -> None:
     """Write all that was found and asked for, say it in short, and end by the verdict."""
     from photogram.formats.adjusted import excel_file
-    from photogram.show.ways import page_of
+    from photogram.show.methods import page_of
 
     told = removed or result
     in_crs, more = _in_system(result, documents.crs)
@@ -219,8 +219,8 @@ def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[
     """Return the tables of a result in another system, and a section of the page, where one is asked for."""
     if crs is None:
         return {}, []
-    from photogram.formats.placed_page import placed_section
-    from photogram.formats.placing import placed, placed_files
+    from photogram.formats.crs_page import placed_section
+    from photogram.formats.crs_results import placed, placed_files
 
     found = placed(result, crs)
     return {f"in_crs/{name}": each for name, each in placed_files(found).items()}, [placed_section(found)]
@@ -264,7 +264,7 @@ def _snooped(
 ) -> Snooped:
     """Take gross errors out of a block, of what is kept where first values have set images aside."""
     from photogram import Result, snoop
-    from photogram.diagnosis.adjusted import diagnosed, errors_explained
+    from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.results.fitting import with_features
 
     aside: tuple[str, ...] = ()
@@ -296,9 +296,9 @@ def adjusted_block(
 ) -> Result:
     """Adjust a block as its project says, but for what a user chooses, with its features."""
     from photogram import FirstValues, InputError, adjust_started
-    from photogram.diagnosis.adjusted import diagnosed, errors_explained
+    from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
-    from photogram.formats.additions import repeated_remarks
+    from photogram.formats.supplements import repeated_remarks
     from photogram.results.fitting import with_features
 
     chosen = choices.datum_of(project)
@@ -356,7 +356,7 @@ def _files(
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.formats import FORMATS, to_files
     from photogram.formats.adjusted import adjusted, table_files
-    from photogram.network.refined import is_scanned
+    from photogram.network.film_reduction import is_scanned
 
     read = "\n".join(line for title, lines in sections for line in (title, *(f"  {each}" for each in lines)))
     files = {"report.txt": f"{report}\n{read}\n".encode(), **table_files(result)}

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from photogram.cli.calibration_input import AS_FOUND, PriorName, Seen
+from photogram.cli.calibration_plan import UNPLANNED, Planned
 from photogram.cli.choices import LossName
 from photogram.cli.components import COMPONENTS
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
-from photogram.cli.planned import UNPLANNED, Planned
 from photogram.cli.progress import shown
 from photogram.cli.projects import with_options
-from photogram.cli.seen import AS_FOUND, PriorName, Seen
 from photogram.cli.uncertainty import AS_USUAL, Uncertainty
-from photogram.declared import replace
+from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
@@ -165,8 +165,8 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     from photogram.formats.targets.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
+    from photogram.targets.appraisal_files import worth_files
     from photogram.targets.tables import views
-    from photogram.targets.worth_files import worth_files
 
     files = {"report.txt": found.report().encode(), **table_files(found.result)}
     files["views.csv"] = csv_text(frame(views(found)))
@@ -212,7 +212,7 @@ def _weights(
 
 def _page(found: Calibrated, weights: VarianceComponents | None) -> Page:
     from photogram.results.page.weights import components_section
-    from photogram.show.ways import page_of
+    from photogram.show.methods import page_of
 
     page = page_of(found)
     more = [] if weights is None else [components_section(weights)]

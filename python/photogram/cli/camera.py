@@ -77,8 +77,8 @@ def compare(
     """
     with job:
         from photogram.film.years import compare_cameras
+        from photogram.show.methods import page_of
         from photogram.show.sections import verdict_sections
-        from photogram.show.ways import page_of
 
         if example:
             from photogram.film.years.example import simulated_certificates

@@ -55,7 +55,7 @@ def certificate(
     """
     with job:
         from photogram.film import Certificate
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
 
         found = Certificate.read(job.packaged(*EXAMPLE) if path is None else path, camera)
         place = html_place(html, no_html, out)

@@ -77,7 +77,7 @@ def check(
     with job:
         from photogram.giant import Limits, read_project
         from photogram.giant.checking import check as check_project
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
 
         if directory is None:
             directory = job.packaged(EXAMPLE)

@@ -45,7 +45,7 @@ def check_project(
     """
     with job:
         from photogram import diagnose
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
 
         path = project_path(job, path)
         out = out or (Path("example-checked") if example else default_out(path, "-checked"))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.components import UnitVarianceName
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
@@ -87,7 +87,7 @@ class Choices:
 
     def of(self, project: Project) -> Project:
         """Return the project with what is chosen of cameras, coordinates and the variance of unit weight."""
-        from photogram.formats.additions import held_points, self_calibrated
+        from photogram.formats.supplements import held_points, self_calibrated
 
         wanted = [name.strip() for name in self.self_calibrate.split(",")] if self.self_calibrate else []
         project = self_calibrated(project, wanted)

@@ -26,7 +26,7 @@ from photogram.cli.options import (
 )
 from photogram.cli.progress import shown
 from photogram.cli.projects import with_options
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.adjustment import robust

@@ -236,7 +236,7 @@ def _pages(
     job: Job, calibrations: list[Calibration], folder: Path, html: Path | None, no_html: bool
 ) -> dict[Path, bytes]:
     """Make the reports for the browser, one for each calibration."""
-    from photogram.show.ways import page_of
+    from photogram.show.methods import page_of
 
     written: dict[Path, bytes] = {}
     for number, calibration in enumerate(calibrations, 1):
@@ -362,8 +362,8 @@ def compare(
     """
     with job:
         from photogram.comparator import compare as compared
+        from photogram.show.methods import page_of
         from photogram.show.sections import verdict_sections
-        from photogram.show.ways import page_of
 
         if example:
             from photogram.comparator.years.example import simulated_years

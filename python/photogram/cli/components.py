@@ -11,13 +11,13 @@ import typer
 
 from photogram.cli.console import ON_TOP
 from photogram.cli.job import Job
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.adjustment.cleaning import Cleaned
     from photogram.results.components import VarianceComponents
     from photogram.results.network import AdjustedNetwork
-    from photogram.results.snooped import Snooped
+    from photogram.results.snooping_result import Snooped
     from photogram.show.page import Page
     from photogram.show.sections import Section
     from photogram.statistics.verdict import Verdict
@@ -130,7 +130,7 @@ class Found(Generic[Network]):
     def page(self) -> Page:
         """Return the report for the browser, with what components say."""
         from photogram.results.page.weights import reweighed_page, weighed_page
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
 
         page = page_of(self.told)
         if self.made is not None:

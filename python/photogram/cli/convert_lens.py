@@ -12,7 +12,7 @@ from photogram.cli.console import output
 from photogram.cli.job import Job, Reads, Writes, with_job
 from photogram.cli.options import JsonFile, Plots, Quiet, out_option, pair
 from photogram.cli.projects import with_options
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.network.cameras import Camera

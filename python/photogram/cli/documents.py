@@ -13,7 +13,7 @@ from photogram.cli.job import Job, Writes
 from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, drawn_maps, point_clouds
 from photogram.cli.options import JsonFile, ParquetFolder, PictureFormat, PlotFormat, Plots, as_data
 from photogram.cli.pictures import Pictures
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.io.writing import Content

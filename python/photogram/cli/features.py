@@ -19,7 +19,7 @@ from photogram.cli.projects import (
     with_options,
 )
 from photogram.cli.results import result_at
-from photogram.declared import dataclass, fields
+from photogram.lazy_dataclasses import dataclass, fields
 
 if TYPE_CHECKING:
     from photogram.results.features import Definition

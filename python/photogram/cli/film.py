@@ -15,7 +15,7 @@ from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.options import JsonFile, Quiet, Strict, Threads, default_out, out_option
 from photogram.cli.projects import NOTHING, Additions, Example, ProjectPath, read_project, with_additions
-from photogram.declared import replace
+from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -56,7 +56,7 @@ def film(
     target = out or (Path("example-film") if example else default_out(source, "-film"))
     with job:
         from photogram.film import compare_steps
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
 
         found = compare_steps(*(_adjusted(job, source, added, how, threads) for how in ("inside", "before")))
         place = html_place(html, no_html, target)

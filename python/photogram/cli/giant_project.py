@@ -15,7 +15,7 @@ from photogram.cli.job import Job
 from photogram.cli.options import Ordering, OrderingName, Snooping
 from photogram.cli.progress import shown
 from photogram.cli.refraction import AirModel, WaterModel
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram import Block, Progress, Result
@@ -106,7 +106,7 @@ def adjusted_project(
     job: Job, project: Project, block: Block, how: How, threads: int | None, snooping: Snooping
 ) -> Found[Result]:
     """Adjust the block as COMMON asks, or snoop it, and find the components that are asked for."""
-    from photogram.diagnosis.adjusted import errors_explained
+    from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.errors import AdjustmentError
 
     try:
@@ -143,7 +143,7 @@ def _snooped(
 ) -> Found[Result]:
     """Take gross errors out of the block, with its weights where components are asked for."""
     from photogram import Result, snoop
-    from photogram.diagnosis.adjusted import diagnosed
+    from photogram.diagnosis.after_adjustment import diagnosed
 
     options = snooping.options | {"unit_variance": _basis(project.common, how), "progress": progress}
     made = cleaned(block, how.components, threads, options) if how.components else None
@@ -158,7 +158,7 @@ def _adjusted(
 ) -> Found[Result]:
     """Adjust the block by the rules of today, or those of 1987."""
     from photogram import AsPublished, adjust
-    from photogram.diagnosis.adjusted import diagnosed
+    from photogram.diagnosis.after_adjustment import diagnosed
 
     common = project.common
     rules: dict[str, Any] = {}

@@ -58,7 +58,7 @@ def _asked(project: Project) -> list[Section]:
     """Return what an accuracy statement would be about, in a line; nothing where none is asked for."""
     if not project.statement:
         return []
-    from photogram.results.statement.asked import Asked
+    from photogram.results.statement.request import Asked
     from photogram.results.statement.texts import Texts
 
     asked, texts = Asked.checked(**project.statement), Texts(unit=project.block.linear_unit)

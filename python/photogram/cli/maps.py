@@ -99,8 +99,8 @@ def point_clouds(
     if cloud is None:
         return {}
     from photogram import Result
+    from photogram.formats.crs_results import placed
     from photogram.formats.maps import point_cloud
-    from photogram.formats.placing import placed
 
     found = placed(result, crs) if crs is not None and isinstance(result, Result) else None
     return {cloud: point_cloud(result, found, origin=origin or (0.0, 0.0, 0.0))}

@@ -43,8 +43,8 @@ def metadata(
     """
     with job:
         from photogram.formats import read_metadata
-        from photogram.formats.additions import deviations
         from photogram.formats.metadata.tables import gnss_files
+        from photogram.formats.supplements import deviations
 
         given = deviations(sd or [])
         found = read_metadata(path, mrk_antenna=mrk_antenna)

@@ -39,7 +39,7 @@ def adjusted_on_disk(
     if division is None:
         return False
     from photogram.formats import Wishes
-    from photogram.formats.plain.streamed import streamable
+    from photogram.formats.plain.batches import streamable
 
     if not streamable(path):
         return False

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from photogram.cli.job import Writes
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.io.writing import Content
@@ -174,7 +174,7 @@ def as_data(result: AdjustedNetwork, folder: Path | None) -> dict[Path, Content]
     """Return the files of `--parquet DIR`; none without it."""
     if folder is None:
         return {}
-    from photogram.show.ways import files_of
+    from photogram.show.methods import files_of
 
     return {folder / name: content for name, content in files_of(result).items()}
 

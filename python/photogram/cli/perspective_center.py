@@ -85,7 +85,7 @@ def perspective_center(
     """
     with job:
         from photogram.perspective_center import run_deck
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
         from photogram.statistics.verdict import worst
 
         if deck is None:

@@ -24,7 +24,7 @@ from photogram.cli.options import (
     out_option,
     picture_places,
 )
-from photogram.cli.simulated import Control, NetworkOptions, takes_network
+from photogram.cli.simulation_options import Control, NetworkOptions, takes_network
 
 if TYPE_CHECKING:
     from photogram import Block
@@ -83,7 +83,7 @@ def plan(
     """
     with job:
         from photogram.planning import plan as predict
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
 
         if packaged:
             if projects:

@@ -14,7 +14,7 @@ import typer
 from photogram.cli.job import Job, Reads
 from photogram.cli.photographs import MrkAntenna, PhotosCrs, PhotosFolder
 from photogram.cli.planetary import CubesFile, JigsawSettings
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:
@@ -240,9 +240,9 @@ def project_path(job: Job, path: Path | None) -> Path:
 def read_project(job: Job, path: Path, added: Additions) -> Project:
     """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
     from photogram.formats import PhotoFiles, Wishes, read
-    from photogram.formats.additions import deviations, with_control, with_images, with_repeated, with_sd
     from photogram.formats.columns import columns_given
     from photogram.formats.names import with_names
+    from photogram.formats.supplements import deviations, with_control, with_images, with_repeated, with_sd
 
     if added.photos_dir is None and (added.photos_crs or added.mrk_antenna):
         raise typer.BadParameter("says something of --photos-dir", param_hint="--photos-crs, --mrk-antenna")
@@ -285,10 +285,10 @@ def described(project: Project) -> list[Section]:
     """Return what was read, as titled sections."""
     import numpy as np
 
-    from photogram.formats.moving import motions
+    from photogram.formats.motion_summary import motions
     from photogram.formats.plain.writing import known_cameras
     from photogram.formats.self_check import agreement, doubts
-    from photogram.network.refined import camera_unit
+    from photogram.network.film_reduction import camera_unit
 
     block = project.block
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))

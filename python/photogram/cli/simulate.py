@@ -12,7 +12,7 @@ from rich.markup import escape
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.options import Quiet
-from photogram.cli.simulated import NetworkOptions, takes_network
+from photogram.cli.simulation_options import NetworkOptions, takes_network
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.declared import dataclass, fields
+from photogram.lazy_dataclasses import dataclass, fields
 
 if TYPE_CHECKING:
     from photogram.network.simulated_motion import LineScanner, RollingShutter

@@ -21,8 +21,8 @@ from photogram.cli.projects import (
     with_options,
 )
 from photogram.cli.results import project_beside, result_at
-from photogram.cli.stating import stated, statement_files
-from photogram.declared import dataclass
+from photogram.cli.statement_output import stated, statement_files
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.results.statement.statement import Statement
@@ -109,7 +109,7 @@ class Wanted:
     def options(self, unit: str) -> dict[str, Any]:
         """Return what :meth:`photogram.Result.statement` takes of it; `unit` is that of the block."""
         from photogram.formats.sentences import read_sentences
-        from photogram.results.statement.asked import length_of
+        from photogram.results.statement.request import length_of
 
         sizes = {"h": self.class_h, "v": self.class_v, "3d": self.class_3d}
         classes = {name: length_of(size, unit) for name, size in sizes.items() if size is not None}
@@ -168,7 +168,7 @@ def statement(
     source = job.packaged("survey") if path is None else path
     target = out or (Path("example-statement") if example else default_out(source, "-statement"))
     with job:
-        from photogram.formats.additions import deviations
+        from photogram.formats.supplements import deviations
 
         result, project = result_at(job, source, added, threads)
         project = project or project_beside(job, source, result)

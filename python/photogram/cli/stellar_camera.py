@@ -17,7 +17,7 @@ from photogram.cli.options import Quiet, Strict, Threads, out_option
 from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
-    from photogram.stellar.night import CalibratedNight
+    from photogram.stellar.night_calibration import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
@@ -82,7 +82,7 @@ def stellar_camera(
     `photogram stellar-camera exposures` does so by digital exposures of the sky.
     """
     with job:
-        from photogram.show.ways import page_of
+        from photogram.show.methods import page_of
         from photogram.statistics.verdict import worst
         from photogram.stellar import calibrate
         from photogram.stellar.cameras import camera_document
@@ -175,8 +175,8 @@ def exposures(
     """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
     with job:
         from photogram.errors import InputError
-        from photogram.show.ways import page_of
-        from photogram.stellar.night import calibrate_night
+        from photogram.show.methods import page_of
+        from photogram.stellar.night_calibration import calibrate_night
         from photogram.stellar.night_document import to_json
         from photogram.stellar.night_file import inputs, read_night
         from photogram.stellar.night_report import summary

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from photogram.cli.job import Job, Reads
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
+    from photogram.targets.appraisal_report import WorthOptions
     from photogram.targets.cross_validation import Into
-    from photogram.targets.worth import WorthOptions
 
 __all__ = ["AS_USUAL", "NOT_GOOD_ENOUGH", "Uncertainty", "distances_of"]
 
@@ -80,7 +80,7 @@ class Uncertainty:
 
     def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""
-        from photogram.targets.worth import WorthOptions
+        from photogram.targets.appraisal_report import WorthOptions
 
         return WorthOptions(
             distances=self.distances,

@@ -2,9 +2,9 @@
 
 from photogram.arguments.annotations import check_arguments
 from photogram.collection.adjust import adjust
-from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import PARAMETERS, Collection
 from photogram.collection.formats import read, to_bytes
+from photogram.collection.result import AdjustedCollection
 from photogram.collection.simulation import Simulation, simulate, simulate_turntable
 
 __all__ = [
@@ -25,18 +25,18 @@ WAYS = {
     "adjusted_again": ("adjust",),
     "check_of": ("checking",),
     "columns_of": ("tables",),
-    "core_network": ("core",),
+    "core_network": ("core_arrays",),
     "determined": ("weakest",),
     "document_of": ("document",),
-    "files_of": ("saved",),
+    "files_of": ("result_files",),
     "findings_of": ("findings",),
     "first_adjusted": ("components",),
     "observables": ("components",),
     "page_of": ("page",),
-    "pictured": ("pictured",),
+    "pictured": ("picture_data",),
     "report_of": ("report",),
     "scaled": ("components",),
     "snooped_network": ("snooping",),
     "terms_of": ("tables",),
 }
-"""The files that show results and work on collections, by the names of ways: see `photogram.show.ways`."""
+"""The files that show results and work on collections, by the names of ways: see `photogram.show.methods`."""

@@ -12,12 +12,12 @@ from photogram import _photocore
 from photogram.arguments.arrays import indices, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation
 from photogram.network.tables import numbered
-from photogram.show.brief import Brief, Rows
+from photogram.show.summary import Brief, Rows
 
 __all__ = ["PARAMETERS", "Collection"]
 

@@ -7,8 +7,8 @@ import numpy as np
 from photogram.adjustment.components import first_adjusted, scaled
 from photogram.arguments.types import Floats
 from photogram.collection.adjust import adjusted, options_of
-from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import Collection
+from photogram.collection.result import AdjustedCollection
 from photogram.results.group_sums import observables
 from photogram.results.grouping import Grouping, Observables
 

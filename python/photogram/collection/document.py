@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.result import AdjustedCollection
 from photogram.io import json
 from photogram.results.document import network_members
-from photogram.show.ways import document_of
+from photogram.show.methods import document_of
 
 __all__ = ["to_json"]
 

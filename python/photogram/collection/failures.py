@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from photogram import _photocore
-from photogram.adjustment.ends import too_coarse
+from photogram.adjustment.remarks import too_coarse
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.messages import listed
 

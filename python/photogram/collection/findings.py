@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.collection.adjusted import AdjustedCollection
-from photogram.collection.held import collection_held
+from photogram.collection.fixed_tests import collection_held
+from photogram.collection.result import AdjustedCollection
 from photogram.results.findings import network_findings
 from photogram.results.patterns import CameraImages, patterns
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings
 
 __all__ = ["collection_findings"]

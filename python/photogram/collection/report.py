@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
-from photogram.collection.adjusted import AdjustedCollection
-from photogram.results.iterations_told import iteration_lines
+from photogram.collection.result import AdjustedCollection
+from photogram.results.iteration_text import iteration_lines
 from photogram.results.network_tables import control, iterations, photos, stations
-from photogram.results.observed import image_lines, observed_lines
+from photogram.results.observation_rows import image_lines, observed_lines
 from photogram.results.report import first_sections, reliability_lines, suspects_section
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
+from photogram.show.methods import report_of
 from photogram.show.sections import Section, composed, headline
-from photogram.show.ways import report_of
 
 __all__ = ["report", "size_of", "summary"]
 

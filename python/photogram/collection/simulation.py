@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Simulation", "simulate", "simulate_turntable"]
 

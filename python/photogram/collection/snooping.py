@@ -15,17 +15,17 @@ from photogram.adjustment.snooping import finished, gone, snooped_network, used_
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
-from photogram.collection.adjusted import POSE, AdjustedCollection
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
-from photogram.collection.core import collection_network
-from photogram.collection.held import collection_held
+from photogram.collection.core_arrays import collection_network
+from photogram.collection.fixed_tests import collection_held
+from photogram.collection.result import POSE, AdjustedCollection
 from photogram.collection.suspects import collection_trial
 from photogram.errors import AdjustmentError
-from photogram.network.core import CoreOptions
-from photogram.results.exchanged import exchanged_names
+from photogram.network.core_arrays import CoreOptions
+from photogram.results.exchanged_names import exchanged_names
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
-from photogram.results.snooped import Snooped
+from photogram.results.snooping_result import Snooped
 from photogram.statistics.snooping.factors import MEDIAN_OF_TWO
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from photogram.collection.adjusted import AdjustedCollection
+from photogram.collection.result import AdjustedCollection
 from photogram.results.axes import image_axes
 from photogram.results.network_tables import TABLES, Terms, terms_of
+from photogram.show.methods import columns_of
 from photogram.show.quantity import Axis, Quantity, frame
-from photogram.show.ways import columns_of
 
 __all__: list[str] = []
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from photogram import _photocore
-from photogram.collection.adjusted import AdjustedCollection
 from photogram.collection.collection import POSE
+from photogram.collection.result import AdjustedCollection
 from photogram.results.weakest import Determined, determined
 
 __all__: list[str] = []

@@ -81,4 +81,4 @@ check_arguments(
 )
 
 WAYS = {"findings_of": ("findings",), "page_of": ("page",)}
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

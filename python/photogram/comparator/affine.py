@@ -8,8 +8,8 @@ import numpy as np
 
 from photogram.comparator.decomposition import Decomposition, decomposition_jacobian
 from photogram.comparator.residuals import Residuals
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

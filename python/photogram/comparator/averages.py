@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.orientation import exchanged, locations
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
+    from photogram.comparator.case import PlacedCase
     from photogram.comparator.grid import Grid
-    from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
     from photogram.comparator.residuals import Residuals
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from photogram.comparator.affine import AffineFit, fit_affine
 from photogram.comparator.averages import PlateAverages, average_residuals
+from photogram.comparator.case import PlacedCase, place_case
 from photogram.comparator.closeout import Closeout, close_out
-from photogram.comparator.combined import (
+from photogram.comparator.combined_solution import (
     CombinedLinear,
     CombinedPolynomial,
     SinglePolynomial,
@@ -30,7 +31,6 @@ from photogram.comparator.identity import Identity
 from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
 from photogram.comparator.options import Options
 from photogram.comparator.outliers import FarPointing, Screening, far_pointings, screen
-from photogram.comparator.placed import PlacedCase, place_case
 from photogram.comparator.pointing import Precision, pool_points
 from photogram.comparator.remarks import plate_remarks, problems
 from photogram.comparator.residuals import Residuals
@@ -42,12 +42,12 @@ from photogram.comparator.significance import (
     polynomial_tests,
 )
 from photogram.comparator.variance import VarianceAnalysis, analyse_variance
-from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
 from photogram.messages import Message
-from photogram.show.brief import Brief
-from photogram.show.ways import Judged, Paged
+from photogram.show.methods import Judged, Paged
+from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
     from photogram.comparator.readings import Session

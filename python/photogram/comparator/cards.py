@@ -13,9 +13,9 @@ import numpy as np
 
 from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid
 from photogram.comparator.readings import Reading, Session, collect_cases
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io.records import Record, Source
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 
 __all__ = ["Header", "join_least_count", "read_cards", "to_cards"]

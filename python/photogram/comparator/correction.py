@@ -13,10 +13,10 @@ import orjson
 from photogram.arguments.arrays import is_covariance
 from photogram.comparator.identity import Identity
 from photogram.comparator.polynomial import Frame, Polynomial, design
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
 from photogram.network.cameras import Camera
 

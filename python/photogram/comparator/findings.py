@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.joint import JointFit
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Systematic, Tested
 
 __all__ = ["comparator_findings"]

@@ -11,10 +11,10 @@ import numpy as np
 
 from photogram.arguments.annotations import path
 from photogram.comparator.csvfile import read_table
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number, whole_number
-from photogram.show.brief import Brief
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

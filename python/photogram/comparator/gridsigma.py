@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
+from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
 from photogram.comparator.reduction import GridErrors, Reduction
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.comparator.averages import PlateAverages
-    from photogram.comparator.placed import PlacedCase
+    from photogram.comparator.case import PlacedCase
     from photogram.comparator.readings import Integers
 
 __all__ = [

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.comparator.polynomial import Frame
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

@@ -19,15 +19,15 @@ from photogram.comparator.correction import PARAMETERS, Correction
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial
 from photogram.comparator.residuals import Residuals
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.comparator.combined import CombinedLinear
+    from photogram.comparator.case import PlacedCase
+    from photogram.comparator.combined_solution import CombinedLinear
     from photogram.comparator.grid import Grid
-    from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Integers
 
 __all__ = ["JointCase", "JointFit", "JointPlate", "Weights", "adjust_jointly"]

@@ -8,8 +8,8 @@ import numpy as np
 
 from photogram.comparator.grouping import rows_by_point
 from photogram.comparator.readings import Case
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

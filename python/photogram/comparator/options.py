@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Options"]
 

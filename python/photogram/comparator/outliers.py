@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.affine import fit_affine
-from photogram.comparator.combined import (
+from photogram.comparator.combined_solution import (
     CombinedLinear,
     CombinedPolynomial,
     combine_linear,
@@ -24,16 +24,16 @@ from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.reduction import Reduction
 from photogram.comparator.rigid import fit_rigid
-from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.limits import externally_studentized, studentized_limit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photogram.arguments.types import Floats
+    from photogram.comparator.case import PlacedCase
     from photogram.comparator.grid import Grid
-    from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Case
 
     Bools = NDArray[np.bool_]

@@ -17,8 +17,8 @@ from photogram.comparator.tables import (
 from photogram.show.angles import ARCSEC
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Section, Table, significant
-from photogram.show.ways import page_of
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.grouping import group
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.io.places import Place
 from photogram.messages import Message
-from photogram.show.brief import Brief
+from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
+from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.polynomial import Frame, design
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.comparator.placed import PlacedCase
+    from photogram.comparator.case import PlacedCase
     from photogram.comparator.readings import Integers
 
 __all__ = ["GridErrors", "Reduction"]

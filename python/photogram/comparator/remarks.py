@@ -9,9 +9,9 @@ from photogram.io.places import Place
 from photogram.messages import Message
 
 if TYPE_CHECKING:
+    from photogram.comparator.case import PlacedCase
     from photogram.comparator.joint import JointFit
     from photogram.comparator.outliers import FarPointing, Outlier, Screening
-    from photogram.comparator.placed import PlacedCase
     from photogram.comparator.readings import Session
 
 __all__ = ["plate_remarks", "problems"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.residuals import Residuals
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.polynomial import TERMS
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
+    from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
 
 __all__ = ["CaseVarianceTest", "PolynomialTest", "TermTest", "compare_case_variances", "polynomial_tests"]
 

@@ -13,9 +13,9 @@ from photogram.comparator.correction import Correction
 from photogram.comparator.decomposition import rotation_matrix
 from photogram.comparator.orientation import exchanged
 from photogram.comparator.readings import Case, Session
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

@@ -14,7 +14,7 @@ from photogram.show.quantity import Axis, Quantity, component, of_each
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
-    from photogram.comparator.combined import CombinedPolynomial
+    from photogram.comparator.combined_solution import CombinedPolynomial
     from photogram.comparator.correction import Correction
     from photogram.comparator.outliers import FarPointing, Outlier
     from photogram.comparator.pointing import Precision

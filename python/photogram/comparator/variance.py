@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
-    from photogram.comparator.combined import CombinedLinear, CombinedPolynomial
+    from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
     from photogram.comparator.pointing import Precision
     from photogram.comparator.rigid import RigidFit
 

@@ -12,7 +12,7 @@ from photogram.diagnosis.findings import Finding
 from photogram.diagnosis.time_bases import named
 from photogram.messages import Message, listed
 from photogram.network.block import Block
-from photogram.network.timed import Timed
+from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Clock
 from photogram.results.result import Result
 

@@ -19,7 +19,6 @@ from itertools import combinations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.editing import tests
 from photogram.diagnosis.findings import Explained
@@ -27,6 +26,7 @@ from photogram.diagnosis.hypotheses import FOOT
 from photogram.diagnosis.predictions import freed
 from photogram.diagnosis.regression import spread
 from photogram.diagnosis.robust import critical, mad_sd
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.observations import Control

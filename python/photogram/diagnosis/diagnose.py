@@ -16,15 +16,13 @@ import numpy as np
 from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import shown
-from photogram.declared import dataclass, field, replace
-from photogram.diagnosis.adjusted import diagnosis_of
 from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.after_adjustment import diagnosis_of
 from photogram.diagnosis.control import control
 from photogram.diagnosis.control_sets import doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
 from photogram.diagnosis.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
 from photogram.diagnosis.findings import Diagnosis, Explained, Finding, Level, Section, Words
-from photogram.diagnosis.flown import flown_checked
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
 from photogram.diagnosis.heights import two_ray_heights
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
@@ -35,16 +33,18 @@ from photogram.diagnosis.residuals import residuals
 from photogram.diagnosis.rolling import rolling_hints
 from photogram.diagnosis.stations import stations
 from photogram.diagnosis.structure import structure_section
+from photogram.diagnosis.trajectories import flown_checked
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block, flown_by
-from photogram.network.chosen import kept_images, of_photos
+from photogram.network.film_reduction import as_seen
 from photogram.network.observations import Position
 from photogram.network.rays import Rays
-from photogram.network.refined import as_seen
+from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
-from photogram.results.snooped import Snooped
-from photogram.show.ways import Way
+from photogram.results.snooping_result import Snooped
+from photogram.show.methods import Way
 
 __all__ = ["Manner", "check_block", "check_of", "diagnose"]
 

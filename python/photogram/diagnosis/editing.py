@@ -11,7 +11,6 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
 from photogram.diagnosis.gross import Suspects
@@ -26,10 +25,11 @@ from photogram.diagnosis.rivals import ODDS, rival_images
 from photogram.diagnosis.robust import critical, mad_sd
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block
-from photogram.network.chosen import kept_images, of_photos
 from photogram.network.rays import Rays
-from photogram.results.kinds import ObservedKind
+from photogram.network.subset import kept_images, of_photos
+from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
 

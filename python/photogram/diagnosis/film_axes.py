@@ -16,12 +16,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
 from photogram.network.unknowns import Unknown
-from photogram.results.films_drawn import mark_residuals
+from photogram.results.film_pictures import mark_residuals
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
 

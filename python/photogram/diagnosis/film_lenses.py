@@ -18,7 +18,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result

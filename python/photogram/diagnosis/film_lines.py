@@ -18,8 +18,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.diagnosis.robust import critical
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
 

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from photogram.declared import dataclass
 from photogram.diagnosis.robust import critical
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted, listed
 from photogram.network.films import Mark
 from photogram.network.observations import Fiducial, KnownTogether
-from photogram.results.kinds import ObservedKind
+from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 
 __all__ = ["mark_hints"]

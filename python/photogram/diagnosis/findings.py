@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from photogram import _photocore
 from photogram.arguments.types import Bools
-from photogram.declared import asdict, dataclass, field
 from photogram.io import json
-from photogram.show.brief import Brief, Rows
+from photogram.lazy_dataclasses import asdict, dataclass, field
+from photogram.show.methods import Paged
 from photogram.show.sections import composed, headline
-from photogram.show.ways import Paged
+from photogram.show.summary import Brief, Rows
 from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
 from photogram.diagnosis.findings import Finding, Level, Section
 from photogram.diagnosis.robust import fit, mad_sd
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays, meet
 from photogram.results.result import Result

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.diagnosis.regression import Regression, given_points
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 

@@ -9,9 +9,9 @@ from photogram.diagnosis.editing import Edited
 from photogram.diagnosis.findings import Finding, Level, Section, Words, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
-from photogram.results.held import HELD
+from photogram.results.fixed_tests import HELD
 from photogram.results.result import Result
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.evidence import WITHHELD, Evidence
 
 __all__ = ["disagreeing", "held_values", "key_numbers", "points_left_out"]

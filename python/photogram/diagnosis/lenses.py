@@ -16,7 +16,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.results.lenses import usual_parameters
 from photogram.results.result import Result
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.evidence import Evidence
 
 __all__ = ["half_pixel", "lenses_estimated", "lenses_put_right"]

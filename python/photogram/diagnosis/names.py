@@ -3,7 +3,7 @@
 Names of two points that are exchanged bend an adjustment by hundreds of standard deviations, if it converges
 at all: where photos have ended tells nothing then. So some photos around the worst images are oriented by
 their images alone, by consensus, which no minority moves; and there the names of what is set aside are
-exchanged on trial (:mod:`photogram.results.exchanged`).
+exchanged on trial (:mod:`photogram.results.exchanged_names`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
-from photogram.network.chosen import kept_images, of_photos
-from photogram.results.exchanged import Exchange, exchanged_names
+from photogram.network.subset import kept_images, of_photos
+from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit

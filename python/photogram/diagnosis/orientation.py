@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.diagnosis.findings import Finding, Section, Words
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
 

@@ -10,9 +10,9 @@ from typing import Any
 from photogram.diagnosis.findings import Diagnosis, Figure, Finding, Listing, Names, Section
 from photogram.results.page.pictures import drawings
 from photogram.show.judgement import judged, verdict_table
+from photogram.show.methods import page_of
 from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
 from photogram.show.page import Section as Chapter
-from photogram.show.ways import page_of
 
 __all__ = ["check_page"]
 

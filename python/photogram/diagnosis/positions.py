@@ -19,10 +19,10 @@ from itertools import permutations, product
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.findings import Explained
 from photogram.diagnosis.hypotheses import FOOT
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.observations import Position
 from photogram.network.rays import local_axes

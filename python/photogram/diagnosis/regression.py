@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 

@@ -11,9 +11,9 @@ from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.trials import put_right
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.timed import Direction, Shutter, Timed
+from photogram.network.moving_photos import Direction, Shutter, Timed
 from photogram.network.trajectories import Readout
-from photogram.results.held import is_suspected
+from photogram.results.fixed_tests import is_suspected
 from photogram.results.result import Result
 
 __all__ = ["backward_readouts", "shutter_hints"]

@@ -7,9 +7,9 @@ from collections.abc import Collection
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.diagnosis.findings import Finding, Level, Section
 from photogram.diagnosis.robust import MAD_TO_SD, fit
+from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.rays import local_axes

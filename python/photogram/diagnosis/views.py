@@ -7,11 +7,11 @@ from typing import Self
 import numpy as np
 
 from photogram.arguments.types import Bools, Indices
-from photogram.declared import dataclass, replace
 from photogram.diagnosis.hypotheses import Change
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
-from photogram.network.chosen import kept_images
 from photogram.network.directions import seen_without_lenses
+from photogram.network.subset import kept_images
 
 __all__ = ["View"]
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.diagnosis.robust import mad_sd
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
 from photogram.statistics import global_test

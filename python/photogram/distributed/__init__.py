@@ -2,6 +2,6 @@
 
 from photogram.distributed.adjust import adjust_in_parts, plan_in_parts
 from photogram.distributed.division import Division
-from photogram.distributed.planned import PartsPlan
+from photogram.distributed.plan import PartsPlan
 
 __all__ = ["Division", "PartsPlan", "adjust_in_parts", "plan_in_parts"]

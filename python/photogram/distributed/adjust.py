@@ -21,8 +21,8 @@ from photogram.adjustment.adjustment import (
     core_threads,
     with_datum,
 )
+from photogram.adjustment.first_features import started
 from photogram.adjustment.robust import Loss
-from photogram.adjustment.started import started
 from photogram.arguments.annotations import check_arguments
 from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
 from photogram.distributed.division import Division
@@ -30,13 +30,13 @@ from photogram.distributed.files import alone
 from photogram.distributed.graph import alone_of, incidence_of, vertices_of
 from photogram.distributed.merging import merged
 from photogram.distributed.parts import IN_TABLES
-from photogram.distributed.planned import PartsPlan
+from photogram.distributed.plan import PartsPlan
 from photogram.distributed.run import partition, places_of
 from photogram.distributed.running import Run, opened
 from photogram.errors import InputError
 from photogram.io.structure import Encoder
 from photogram.network.block import Block, checked, refuse_passages
-from photogram.network.core import CoreOptions
+from photogram.network.core_arrays import CoreOptions
 from photogram.network.datum import (
     DatumRow,
     InnerConstraints,
@@ -46,7 +46,7 @@ from photogram.network.datum import (
 from photogram.network.films import Scan
 from photogram.network.refracted import check_cameras
 from photogram.results.result import Result
-from photogram.results.saved_trajectories import STANDS
+from photogram.results.trajectory_files import STANDS
 
 __all__ = ["adjust_in_parts", "fingerprint", "plan_in_parts"]
 

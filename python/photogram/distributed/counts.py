@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.distributed.cut import Incidence, Tree, cut, homes, tree_of
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["UNKNOWNS", "Counts", "counted_work", "outer_vertices"]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Cut", "Incidence", "Tree", "cut", "homes", "joined", "tree_of"]
 

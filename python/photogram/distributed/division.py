@@ -8,8 +8,8 @@ from typing import Any
 
 from photogram.arguments.annotations import path
 from photogram.arguments.arrays import shown, whole_number
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Division", "bytes_of"]
 

@@ -15,11 +15,10 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
-from photogram.distributed.course import Course
 from photogram.distributed.cut import Tree
 from photogram.distributed.datum import InDatum, Mover
 from photogram.distributed.executors import Executor, Handle
+from photogram.distributed.progress import Course
 from photogram.distributed.tasks import (
     Chord,
     Job,
@@ -38,6 +37,7 @@ from photogram.distributed.tasks import (
 )
 from photogram.distributed.walks import Up, Walks
 from photogram.errors import AdjustmentError, RankError
+from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 
 __all__ = ["Driver", "Outcome", "Stop"]

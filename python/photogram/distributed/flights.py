@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from photogram.declared import replace
+from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block, flown_by
-from photogram.network.flown import timed_images
 from photogram.network.motion import timed_photos
 from photogram.network.observations import Observation
 from photogram.network.trajectories import Spline, Trajectory
-from photogram.results.saved_trajectories import KeptTrajectory
+from photogram.network.trajectory_arrays import timed_images
+from photogram.results.trajectory_files import KeptTrajectory
 
 __all__ = ["with_flights"]
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.declared import dataclass
 from photogram.distributed.cut import Incidence, homes, joined
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, flown_by
 from photogram.network.films import Scan
 from photogram.network.observations import Observation

@@ -13,16 +13,16 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import messages_of
 from photogram.arguments.types import Floats, Indices
-from photogram.distributed.core import read_outcome
 from photogram.distributed.driver import Outcome
 from photogram.distributed.graph import shared_cameras
+from photogram.distributed.nodes import read_outcome
 from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
+from photogram.results.block_files import read_block_result
 from photogram.results.datum import datum_of
 from photogram.results.result import Result
-from photogram.results.saved import read_summary
-from photogram.results.saved_block import read_block_result
+from photogram.results.result_files import read_summary
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution

@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.graph import Homes, alone_of, photos_of, vertices_of
 from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, parquet_content, read_sheet
 from photogram.io.seals import Seals, check_seal, seal
 from photogram.io.structure import Decoder, Encoder
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.chosen import IMAGES, PHOTOS
 from photogram.network.films import Film, Pattern, Readings, Reseau, Scan
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
@@ -26,8 +25,9 @@ from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
+from photogram.network.subset import IMAGES, PHOTOS
 from photogram.network.unknowns import Unknown
-from photogram.results.saved_trajectories import CLASSES, STANDS
+from photogram.results.trajectory_files import CLASSES, STANDS
 
 __all__ = [
     "IN_TABLES",

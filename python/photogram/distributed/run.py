@@ -11,7 +11,6 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import asdict, dataclass
 from photogram.distributed.cut import Tree, cut, tree_of
 from photogram.distributed.files import read_json, write_json
 from photogram.distributed.flights import with_flights
@@ -25,8 +24,9 @@ from photogram.distributed.graph import (
 )
 from photogram.distributed.parts import Names, Part, names_above, part_of, read_part, write_part
 from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.network.block import Block
-from photogram.network.core import CoreOptions, block_network
+from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow
 from photogram.network.observations.position import with_epochs
 from photogram.network.unknowns import Unknown

@@ -8,19 +8,19 @@ from pathlib import Path
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
-from photogram.declared import dataclass
-from photogram.distributed.core import CoreEngine
 from photogram.distributed.counts import Counts
 from photogram.distributed.datum import Mover
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Driver, Outcome, Stop
 from photogram.distributed.executors import Executor, Serial
-from photogram.distributed.planned import SHARE, PartsPlan, measured_rates
+from photogram.distributed.nodes import CoreEngine
+from photogram.distributed.plan import SHARE, PartsPlan, measured_rates
 from photogram.distributed.run import MANIFEST, Manifest, read_manifest
 from photogram.distributed.shelf import shelf
 from photogram.distributed.tasks import Job, predicted
 from photogram.distributed.workers import Workers, check_workers, connected
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.memory import resident_memory
 from photogram.network.block import Block
 

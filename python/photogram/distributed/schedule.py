@@ -7,8 +7,8 @@ import heapq
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.distributed.cut import Tree
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Rates", "Times", "scheduled"]
 

@@ -18,12 +18,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.distributed.datum import InDatum, rights_of, with_columns
 from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.shelf import shelf
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.memory import give_back
 
 __all__ = [

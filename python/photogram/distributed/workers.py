@@ -220,7 +220,7 @@ def _held() -> int:
     # What is imported here is what takes memory; nothing is called.
     import pyarrow.parquet  # noqa: F401
 
-    import photogram.distributed.core  # noqa: F401
+    import photogram.distributed.nodes  # noqa: F401
 
     shelf.clear_unless_used()
     return resident_memory() or 0

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
     from photogram.film.interior import Affine, Interior, interior_orientation
     from photogram.film.lens_table import Curve, LensParameters, RadialTable
+    from photogram.film.mark_identity import FilmWay, WhichMark, which_mark
     from photogram.film.steps import StepsCompared, compare_steps
-    from photogram.film.which import FilmWay, WhichMark, which_mark
     from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
 __all__ = [
@@ -59,7 +59,7 @@ _HOMES = {
     "DatedCamera": "years",
     "DistanceDifference": "certificate_check",
     "Explanation": "certificate_check",
-    "FilmWay": "which",
+    "FilmWay": "mark_identity",
     "Interior": "interior",
     "interior_orientation": "interior",
     "LensParameters": "lens_table",
@@ -68,18 +68,18 @@ _HOMES = {
     "RightAngle": "distances",
     "StepsCompared": "steps",
     "Tangential": "decentring",
-    "which_mark": "which",
-    "WhichMark": "which",
+    "which_mark": "mark_identity",
+    "WhichMark": "mark_identity",
 }
 """The module of each name, loaded when it is first asked for: most blocks are not on film."""
 
 WAYS = {
-    "document_of": {"Certificate": ("certificate_document",), "StepsCompared": ("steps_told",)},
+    "document_of": {"Certificate": ("certificate_document",), "StepsCompared": ("steps_report",)},
     "findings_of": {"Certificate": ("certificate_findings",)},
-    "page_of": {"Certificate": ("certificate_page",), "StepsCompared": ("steps_told",)},
-    "report_of": {"Certificate": ("certificate_report",), "StepsCompared": ("steps_told",)},
+    "page_of": {"Certificate": ("certificate_page",), "StepsCompared": ("steps_report",)},
+    "report_of": {"Certificate": ("certificate_report",), "StepsCompared": ("steps_report",)},
 }
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 
 _CLASSES = {name for name in __all__ if name[0].isupper()}
 

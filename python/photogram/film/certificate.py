@@ -13,7 +13,6 @@ import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.film.certificate_check import DistanceDifference, difference_of
 from photogram.film.certificate_file import REFERENCES, read_toml
@@ -37,10 +36,11 @@ from photogram.film.lens_table import (
     forward,
 )
 from photogram.film.marks import usual_places
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.cameras import Camera
-from photogram.show.brief import Brief, Rows
-from photogram.show.ways import Shown
+from photogram.show.methods import Shown
+from photogram.show.summary import Brief, Rows
 
 __all__ = ["CalibratedMarks", "Certificate"]
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, get_args
 
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 
 __all__ = ["DistanceDifference", "Explanation", "difference_of", "explained"]
 

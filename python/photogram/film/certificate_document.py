@@ -18,8 +18,8 @@ from photogram.film.certificate_tables import (
 )
 from photogram.io import json
 from photogram.network.cameras import Camera
+from photogram.show.methods import document_of
 from photogram.show.quantity import records
-from photogram.show.ways import document_of
 from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal
 
 __all__ = ["certificate_document", "limit_of"]

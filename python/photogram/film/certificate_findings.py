@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.film.certificate import Certificate
 from photogram.messages import counted
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import GlobalTest, global_test
 

@@ -21,10 +21,10 @@ from photogram.film.certificate_tables import (
 )
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, tests_section
+from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Facts, Page, Part, Section
 from photogram.show.pictures import new_figure
 from photogram.show.style import FAINT, INK, MARKED, in_style
-from photogram.show.ways import page_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

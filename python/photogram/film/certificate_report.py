@@ -18,8 +18,8 @@ from photogram.film.certificate_tables import (
 from photogram.network.cameras import Camera
 from photogram.show.lines import fact_lines, field, table_lines
 from photogram.show.lines import marks as marked
+from photogram.show.methods import report_of
 from photogram.show.sections import Section, composed, headline, verdict_sections
-from photogram.show.ways import report_of
 
 __all__ = ["certificate_report"]
 

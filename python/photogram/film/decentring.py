@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.fits import Fit
 
 __all__ = ["SEMI_DIAGONALS", "SemiDiagonals", "Tangential", "of_profile", "of_semi_diagonals"]

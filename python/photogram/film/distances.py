@@ -17,8 +17,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import ContradictionError, InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.film_form import Affine, affine_form
 from photogram.network.films import (
     Film,

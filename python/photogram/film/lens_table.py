@@ -17,8 +17,8 @@ from itertools import pairwise
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test

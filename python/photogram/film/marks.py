@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["SIDES", "DataStrip", "UsualPlaces", "by_side", "turned", "turned_name", "usual_places"]
 

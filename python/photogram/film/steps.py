@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
-from photogram.show.brief import Brief, Rows
-from photogram.show.ways import Paged, document_of, report_of
+from photogram.lazy_dataclasses import dataclass
+from photogram.show.methods import Paged, document_of, report_of
+from photogram.show.summary import Brief, Rows
 
 if TYPE_CHECKING:
     from photogram.results.result import Result

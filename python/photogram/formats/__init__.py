@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from photogram.on_demand import on_demand
 
 if TYPE_CHECKING:
+    from photogram.formats.crs_results import Placed, placed
     from photogram.formats.format import Format, PhotoFiles, Wishes
     from photogram.formats.metadata.merged import Metadata, PhotoRecord, read_metadata
-    from photogram.formats.metadata.said import Said
-    from photogram.formats.placing import Placed, placed
+    from photogram.formats.metadata.record import Said
     from photogram.formats.project import Frame, Options, Project
     from photogram.formats.registry import (
         FORMATS,
@@ -50,10 +50,10 @@ _HOMES = {
     "Wishes": "format",
     "Metadata": "metadata.merged",
     "PhotoRecord": "metadata.merged",
-    "Said": "metadata.said",
+    "Said": "metadata.record",
     "read_metadata": "metadata.merged",
-    "Placed": "placing",
-    "placed": "placing",
+    "Placed": "crs_results",
+    "placed": "crs_results",
     "Frame": "project",
     "Options": "project",
     "Project": "project",

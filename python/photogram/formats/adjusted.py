@@ -13,7 +13,7 @@ from photogram.io.csv_text import csv_text
 from photogram.io.sheets import workbook
 from photogram.results.features import Features
 from photogram.results.result import Result
-from photogram.show.ways import columns_of
+from photogram.show.methods import columns_of
 
 __all__ = ["adjusted", "excel_file", "feature_files", "table_files"]
 

@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.cards import Card, cards, one_file
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Project, Size, assembled
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.formats.column_words import (
     ANGULAR,
@@ -22,6 +21,7 @@ from photogram.formats.column_words import (
 )
 from photogram.io.delimited import FALSE, NAMELESS, TRUE, ColumnTable
 from photogram.io.numbers import finite_number
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed, quoted
 
 __all__ = [

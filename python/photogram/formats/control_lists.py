@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from photogram.declared import dataclass
 from photogram.formats.project import Project
 from photogram.io.delimited import ColumnTable
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.io.tree import read_json
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
 __all__ = ["ControlList", "read_control_list", "system_of"]

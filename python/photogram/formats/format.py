@@ -7,9 +7,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from photogram.declared import dataclass, field
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.project import Project
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.results.result import Result
 
 __all__ = ["Format", "PhotoFiles", "Wishes", "later"]

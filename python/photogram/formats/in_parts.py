@@ -8,16 +8,16 @@ from pathlib import Path
 
 from photogram.adjustment.adjustment import Progress, UnitVariance, core_options
 from photogram.adjustment.robust import Loss
-from photogram.declared import dataclass
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone
-from photogram.distributed.planned import PartsPlan
+from photogram.distributed.plan import PartsPlan
 from photogram.distributed.run import Manifest, result_folder
 from photogram.distributed.running import Run, opened
 from photogram.formats.format import Wishes
-from photogram.formats.plain.streamed import Streamed
+from photogram.formats.plain.batches import Streamed
 from photogram.formats.project import Project
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["OnDisk", "adjusted_on_disk", "planned_on_disk"]
 
@@ -89,7 +89,7 @@ def adjusted_on_disk(
     Parameters
     ----------
     path, wishes
-        The project (:func:`photogram.formats.plain.streamed.streamable`).
+        The project (:func:`photogram.formats.plain.batches.streamable`).
     folder
         Of the run, on a disk that all workers see: a run that died is taken up there.
     division

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from photogram.declared import dataclass
 from photogram.formats.project import Size
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 
 __all__ = ["Lens", "lens_of"]

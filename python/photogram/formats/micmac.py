@@ -10,7 +10,6 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.film.interior import is_mirrored
 from photogram.formats.plain.films_written import WrittenFilms
@@ -18,6 +17,7 @@ from photogram.formats.plain.writing import known_cameras
 from photogram.formats.project import Project
 from photogram.formats.xml_stream import Element, read_stream, root_of
 from photogram.io.files import read_lines
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 
 __all__ = ["MicmacMarks", "has_marks", "read_marks", "write_marks"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from photogram.formats.plain.tables import indices_of
 from photogram.formats.project import Project
-from photogram.formats.stated import asked_by_other_names
+from photogram.formats.statement_request import asked_by_other_names
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.messages import Message

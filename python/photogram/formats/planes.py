@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.refraction import METRES_PER_UNIT

@@ -11,21 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
+from photogram.network.moving_photos import Timed
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.rigs import Mount
-from photogram.network.timed import Timed
 from photogram.results.features import Definition
-from photogram.show.brief import Brief
+from photogram.show.summary import Brief
 from photogram.targets.board import Board
 
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]

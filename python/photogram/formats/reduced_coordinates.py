@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.intersection import complete_positions
 from photogram.formats.project import Project, assembled
 from photogram.formats.self_check import agreement
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.directions import image_directions
 from photogram.network.observations import Control
 

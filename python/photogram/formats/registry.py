@@ -6,18 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from photogram.declared import dataclass
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.block_contents import check_films
 from photogram.formats.cameras_alone import FORMATS_OF_CAMERAS
 from photogram.formats.format import Format, Wishes
 from photogram.formats.millimetres import in_pixels, nominal_pixels
-from photogram.formats.moving import check_held, lost_motions
+from photogram.formats.motion_summary import check_held, lost_motions
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
-from photogram.formats.stated import parts_of_asked
+from photogram.formats.statement_request import parts_of_asked
 from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.io.files import reading
+from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
 from photogram.messages import counted, listed
 from photogram.results.result import Result

@@ -13,13 +13,13 @@ from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import DatumName, Options, Project
+from photogram.results.block_files import KIND as BLOCK
+from photogram.results.block_files import read_block_result
 from photogram.results.result import Result
-from photogram.results.saved import SUMMARY, read_summary
-from photogram.results.saved_block import KIND as BLOCK
-from photogram.results.saved_block import read_block_result
+from photogram.results.result_files import SUMMARY, read_summary
 
 if TYPE_CHECKING:
-    from photogram.collection.adjusted import AdjustedCollection
+    from photogram.collection.result import AdjustedCollection
 
 __all__ = ["FORMAT", "TITLE", "is_result", "read_result"]
 
@@ -44,8 +44,8 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     ModuleNotFoundError
         pyarrow is not installed.
     """
-    from photogram.collection.saved import KIND as COLLECTION
-    from photogram.collection.saved import read_collection_result
+    from photogram.collection.result_files import KIND as COLLECTION
+    from photogram.collection.result_files import read_collection_result
 
     readers: Mapping[str, Callable[[Path, Mapping[str, Any]], Result | AdjustedCollection]] = {
         BLOCK: read_block_result,

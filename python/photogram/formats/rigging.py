@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor

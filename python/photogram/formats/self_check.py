@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
+from photogram.network.film_reduction import camera_images, camera_unit
 from photogram.network.motion import on_shared
-from photogram.network.refined import camera_images, camera_unit
-from photogram.network.timed import Timed
+from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import given_poses
 

@@ -14,11 +14,11 @@ from typing import IO, Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass, field
 
 __all__ = ["Element", "read_stream", "root_of"]
 

@@ -50,7 +50,7 @@ _HOMES = {
 """The module of each name, loaded when it is first asked for."""
 
 WAYS = {"check_of": ("checking",)}
-"""The file that says how a project is diagnosed: see `photogram.show.ways`."""
+"""The file that says how a project is diagnosed: see `photogram.show.methods`."""
 
 __getattr__, __dir__ = on_demand(
     __name__, _HOMES, check_arguments, unchecked={"ErrorWarning", "ImageFrame", "Project"}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from photogram.declared import dataclass, field
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
+from photogram.lazy_dataclasses import dataclass, field
 
 __all__ = ["Camera", "camera_records", "parse_cameras"]
 

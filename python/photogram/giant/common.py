@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from photogram.declared import dataclass
 from photogram.giant.fields import format_deviations, format_real
 from photogram.giant.records import Record, Source
+from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import ARCSEC
 
 __all__ = ["Common", "common_records", "parse_common"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera, camera_records
 from photogram.giant.common import Common, common_records
@@ -14,8 +13,9 @@ from photogram.giant.files import written
 from photogram.giant.frames import Frame, frame_records
 from photogram.giant.ground import GroundPoint, ground_records
 from photogram.giant.images import ImageFrame, image_records
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
-from photogram.show.brief import Brief, Rows, few
+from photogram.show.summary import Brief, Rows, few
 
 __all__ = ["Contents"]
 

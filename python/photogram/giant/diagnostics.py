@@ -6,9 +6,9 @@ from collections import Counter
 
 import numpy as np
 
-from photogram.declared import dataclass
 from photogram.giant.contents import Contents
 from photogram.giant.limits import Limits
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 
 __all__ = ["ErrorWarning", "error_warnings"]

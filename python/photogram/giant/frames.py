@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from photogram.declared import dataclass, field
 from photogram.giant.columns import Columns, angle_fields, deviation_fields, position_fields, texts
 from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
 
 __all__ = ["ATTITUDE_SD", "Frame", "frame_records", "parse_frames"]

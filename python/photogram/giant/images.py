@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.declared import dataclass, field
 from photogram.giant.columns import Columns, deviation_fields, real_fields, texts
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
+from photogram.lazy_dataclasses import dataclass, field
 
 __all__ = ["IMAGE_SD", "ImageFrame", "image_records", "parse_images"]
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.declared import dataclass, fields
 from photogram.errors import InputError
 from photogram.giant.records import error_at, message_at
+from photogram.lazy_dataclasses import dataclass, fields
 from photogram.messages import Message, listed
 
 if TYPE_CHECKING:

@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.io.files import read_text
 from photogram.io.marks import Marks, marks_of
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import listed, quoted
 
 __all__ = ["FALSE", "NAMELESS", "TRUE", "ColumnTable", "Names", "Spelling", "read_columns", "read_rows"]

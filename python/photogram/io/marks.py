@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
 __all__ = ["Marks", "marks_of"]

@@ -10,8 +10,8 @@ import re
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
 
 __all__ = ["Group", "Quantity", "Value", "label_text", "parsed"]

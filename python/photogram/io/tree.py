@@ -11,9 +11,9 @@ import numpy as np
 import orjson
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import read_bytes
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
 __all__ = ["Tree", "read_json", "unknown"]

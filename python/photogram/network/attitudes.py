@@ -17,8 +17,8 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import frozen, length, numbers, one_of, shaped
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Callable

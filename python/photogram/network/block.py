@@ -15,14 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import frozen, indices, length, shaped, shown, text, truth_value
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.messages import listed
 from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import check_scans, reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.knots import Knots
+from photogram.network.moving_photos import Poses, Timed, checked_timed, own_trajectories
 from photogram.network.observations import (
     Observation,
     Rate,
@@ -48,10 +49,9 @@ from photogram.network.tables import (
     numbered,
     table_arguments,
 )
-from photogram.network.timed import Poses, Timed, checked_timed, own_trajectories
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
-from photogram.show.brief import Brief, Rows, few
+from photogram.show.summary import Brief, Rows, few
 
 __all__ = ["ATTITUDE_COLUMNS", "Block"]
 
@@ -130,7 +130,7 @@ class Block(Valued, Brief):
     mounts
         Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
     timed
-        Which photos are on trajectories: rolling shutters, line scanners (:mod:`photogram.network.timed`).
+        Photos on trajectories: rolling shutters, line scanners (:mod:`photogram.network.moving_photos`).
     passages
         What images pass beside pose, point and camera: boards that bend (:mod:`photogram.network.passages`).
     frame

@@ -15,10 +15,10 @@ from photogram import _photocore
 from photogram.arguments.arrays import is_covariance, number, one_of, shaped, shown, text
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
-from photogram.show.brief import Brief, Rows
+from photogram.show.summary import Brief, Rows
 
 __all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "images_of", "rays_of_row"]
 

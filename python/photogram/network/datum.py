@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 from photogram.arguments.arrays import names, number, shown, text, truth_value
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
 
 __all__ = [

@@ -8,8 +8,8 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.cameras import rays_of_row
-from photogram.network.chosen import kept_images
 from photogram.network.motion import focal_images, scanners
+from photogram.network.subset import kept_images
 
 __all__ = ["direction_deviations", "image_directions", "seen_without_lenses", "without_lenses"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.films import Film
 
 __all__ = ["Affine", "affine_form"]

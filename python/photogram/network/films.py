@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown

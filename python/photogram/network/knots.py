@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import frozen, numbers, shaped
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
 

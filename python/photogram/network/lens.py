@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.arguments.arrays import number, numbers, one_of, shown
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Lens", "LensModel"]
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.network.block import Block, flown_by, refuse_trajectories
-from photogram.network.chosen import kept_images, of_photos
-from photogram.network.flown import timed_images
-from photogram.network.given import Given
+from photogram.network.film_reduction import camera_images
 from photogram.network.observations import Smoothness
-from photogram.network.refined import camera_images
+from photogram.network.subset import kept_images, of_photos
+from photogram.network.trajectory_arrays import timed_images
+from photogram.network.unadjusted import Given
 
 __all__ = [
     "at_rest",

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.unknowns import Numbers, Unknown
 
 __all__ = ["Bend", "Figure", "Passage", "PassageRow", "checked_passages", "passage_rows"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.motion import on_shared

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Literal, get_args
 
 from photogram.arguments.annotations import check_arguments
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram._photocore import RefractionRow

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.arguments.arrays import names, shown
-from photogram.declared import dataclass
 from photogram.errors import InputError
-from photogram.network.timed import Timed
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.moving_photos import Timed
 from photogram.network.unknowns import Sensor, Unknown
 
 __all__ = ["Mount", "MountRow", "checked_mounts", "mount_rows"]

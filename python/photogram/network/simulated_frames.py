@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network import geometry
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction

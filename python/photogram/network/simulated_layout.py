@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.memory import available_memory
 from photogram.network import geometry
 from photogram.network.geometry import Spheroid

@@ -15,15 +15,15 @@ import numpy as np
 
 from photogram.arguments.arrays import number, one_of, shown, truth_value, whole_number
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.network import geometry
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
+from photogram.network.moving_photos import Direction, Shutter, Timed
 from photogram.network.observations import Attitude
 from photogram.network.projecting import camera_of, projected_images
 from photogram.network.simulated_layout import Layout
-from photogram.network.timed import Direction, Shutter, Timed
 from photogram.network.trajectories import Polynomial, Readout, Spline
 
 __all__ = ["LineScanner", "RollingShutter", "photo_angles", "photo_axes", "rolled", "rotations_of"]

@@ -10,8 +10,8 @@ import numpy as np
 
 from photogram.arguments.arrays import number, one_of, shaped, shown, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted
 from photogram.network import geometry
 from photogram.network.block import Block

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Overflow", "Structure", "structure"]
 

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import names, number, numbers, one_of, shaped, shown, whole_number
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.unknowns import Unknown
 
 __all__ = [

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import names, number, shaped
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 
 __all__ = [
     "Boresight",

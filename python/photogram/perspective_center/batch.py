@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from photogram.declared import dataclass, field
 from photogram.errors import InputError, PhotogramError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.perspective_center.deck import Deck
 from photogram.perspective_center.grid import Grid, joined
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
-from photogram.show.brief import Brief
-from photogram.show.ways import Paged
+from photogram.show.methods import Paged
+from photogram.show.summary import Brief
 
 __all__ = ["Run", "Stop", "run_deck"]
 

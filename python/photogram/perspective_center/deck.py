@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.io.records import Record, Source
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.perspective_center.formats import CardFormat
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Coordinatograph, Grid, reduce

@@ -12,8 +12,8 @@ import re
 
 import fortranformat
 
-from photogram.declared import dataclass
 from photogram.io.records import Record
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["CardFormat"]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from photogram.arguments.arrays import names, number, shaped
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
-from photogram.show.brief import Brief
+from photogram.lazy_dataclasses import dataclass, field
+from photogram.show.summary import Brief
 
 __all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce", "single"]
 

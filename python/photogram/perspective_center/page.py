@@ -11,8 +11,8 @@ from photogram.perspective_center.solution import PerspectiveCenter
 from photogram.perspective_center.tables import cycles, points, size_of, unknowns
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section
+from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Judgement, Layers, Page, Part, Section, Table, significant
-from photogram.show.ways import page_of
 
 __all__ = ["run_page"]
 

@@ -15,17 +15,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.adjustment.ends import hidden
+from photogram.adjustment.remarks import hidden
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.arrays import one_of, shaped
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError, RankError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message, listed
 from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid, single
-from photogram.show.brief import Brief
-from photogram.show.ways import Judged
+from photogram.show.methods import Judged
+from photogram.show.summary import Brief
 from photogram.statistics.limits import externally_studentized, studentized_limit
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]

@@ -8,4 +8,4 @@ from photogram.planning.statistics import ControlQuality, PhotoQuality, PointQua
 __all__ = ["ControlQuality", "MotionQuality", "Pattern", "PhotoQuality", "Plan", "PointQuality", "plan"]
 
 WAYS = {"page_of": ("page",)}
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.trajectories import Readout
 from photogram.results.result import Result

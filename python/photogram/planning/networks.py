@@ -11,15 +11,15 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
 from photogram.arguments.annotations import check_arguments
-from photogram.declared import asdict, dataclass
 from photogram.errors import InputError, RankError
 from photogram.io import json
+from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.planning.motion import with_known_readout
 from photogram.planning.pattern import Pattern
 from photogram.planning.text import report, what_next
-from photogram.show.ways import Paged
+from photogram.show.methods import Paged
 from photogram.statistics.reliability import TESTABLE, noncentrality
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from photogram.planning.statistics import PointQuality
 from photogram.planning.text import motion_shown, remarks, what_next
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
+from photogram.show.methods import page_of
 from photogram.show.page import (
     Column,
     Drawing,
@@ -25,7 +26,6 @@ from photogram.show.page import (
     Table,
     significant,
 )
-from photogram.show.ways import page_of
 
 __all__ = ["plan_page"]
 

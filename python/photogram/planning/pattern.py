@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from photogram.adjustment.prediction import image_depths
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.motion import on_shared

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.planning.locations import LOCATIONS
 from photogram.planning.motion import photo_redundancy
 from photogram.results.result import Result

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Cells", "cells"]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, note, panels
-from photogram.plots.pictured import Correlated, pictured
+from photogram.plots.picture_data import Correlated, pictured
 from photogram.show.style import signed
 
 if TYPE_CHECKING:

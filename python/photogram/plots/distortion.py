@@ -9,7 +9,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, panels
-from photogram.plots.pictured import Curves, pictured
+from photogram.plots.picture_data import Curves, pictured
 from photogram.show.style import COLOURS, FAINT, INK
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, note, panels
-from photogram.plots.pictured import Deviations, pictured
+from photogram.plots.picture_data import Deviations, pictured
 from photogram.show.style import COLOURS, FAINT
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, labels, note, panels, scale_bars
-from photogram.plots.pictured import VectorField, pictured
+from photogram.plots.picture_data import VectorField, pictured
 from photogram.show.pictures import round_length
 from photogram.show.style import FAINT, INK
 

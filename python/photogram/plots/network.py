@@ -9,7 +9,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.plots.panels import NOWHERE, Where, labels, note, panels, scale_bars
-from photogram.plots.pictured import Pictured, Plan, pictured
+from photogram.plots.picture_data import Pictured, Plan, pictured
 from photogram.show.pictures import round_length
 from photogram.show.style import BLUE, FAINT, INK, ORDERED, PURPLE, SOFT, VERMILION
 

@@ -11,7 +11,7 @@ from photogram.errors import InputError
 from photogram.plots.cells import Cells, cells
 from photogram.plots.network import thinned, view_of_plan
 from photogram.plots.panels import Where, handed_out, note, panels
-from photogram.plots.pictured import Images, Pictured, pictured
+from photogram.plots.picture_data import Images, Pictured, pictured
 from photogram.plots.residuals import frame
 from photogram.show.style import INK, ORDERED
 

@@ -9,7 +9,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.plots.cells import Cells, cells
 from photogram.plots.panels import Where, handed_out, note, panels, scale_bars
-from photogram.plots.pictured import Images, pictured
+from photogram.plots.picture_data import Images, pictured
 from photogram.show.pictures import round_length
 from photogram.show.style import FAINT, INK, MARKED
 

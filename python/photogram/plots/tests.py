@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, labels, note, panels
-from photogram.plots.pictured import pictured
+from photogram.plots.picture_data import pictured
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.statistics.patterns import SPEAKING

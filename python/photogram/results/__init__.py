@@ -4,16 +4,16 @@ WAYS = {
     "axes_of": ("components_picture",),
     "columns_of": ("tables",),
     "document_of": ("document",),
-    "files_of": ("saved_block",),
-    "findings_of": ("findings", "judged"),
+    "files_of": ("block_files",),
+    "findings_of": ("findings", "snooping_verdict"),
     "page_of": {
         "Result": ("page.block",),
-        "Snooped": ("page.removed",),
+        "Snooped": ("page.snooping",),
         "VarianceComponents": ("page.weights",),
     },
-    "pictured": ("pictured",),
+    "pictured": ("picture_data",),
     "report_of": ("report",),
-    "statement_of": ("statement.made",),
+    "statement_of": ("statement.making",),
     "terms_of": ("tables",),
 }
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

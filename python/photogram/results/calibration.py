@@ -16,7 +16,7 @@ import re
 import numpy as np
 
 from photogram import _photocore
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import ATTITUDE_COLUMNS, position_columns
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances

@@ -14,7 +14,7 @@ from photogram.plots.panels import Where, handed_out, panels, placed
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
 from photogram.results.lens_field import LensField, lens_field
-from photogram.results.pictured import curves_of
+from photogram.results.picture_data import curves_of
 from photogram.results.result import Result
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, INK

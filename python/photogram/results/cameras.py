@@ -8,11 +8,11 @@ import numpy as np
 
 from photogram.arguments.arrays import freeze_fields, standard_deviations
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.show.brief import Brief
+from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
     from photogram import _photocore

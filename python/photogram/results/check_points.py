@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.observations.control import Control
 from photogram.results.network import AdjustedNetwork

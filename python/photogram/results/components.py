@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from photogram import _photocore
-from photogram.declared import dataclass, replace
 from photogram.io import json
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.network import AdjustedNetwork
-from photogram.show.brief import Brief
+from photogram.show.methods import Shown, axes_of, columns_of, document_of, findings_of, report_of
 from photogram.show.sections import Section, composed, headline, verdict_sections
-from photogram.show.ways import Shown, axes_of, columns_of, document_of, findings_of, report_of
+from photogram.show.summary import Brief
 from photogram.statistics.components import Component, Estimate
 from photogram.statistics.findings import Findings, GroupFactor
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from photogram.plots.panels import Where, figure_of, panels, placed
 from photogram.results.components import VarianceComponents
+from photogram.show.methods import axes_of
 from photogram.show.style import FAINT, INK, MARKED
-from photogram.show.ways import axes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import Knot
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 from photogram.results.result import Result

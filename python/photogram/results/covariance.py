@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.results.selection import Adjusted, Selected, Selection
 
 __all__ = ["Covariances", "Failure", "Propagated"]

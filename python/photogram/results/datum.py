@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.declared import dataclass, field
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 from photogram.network.datum import DatumRow, InnerConstraints

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.results.result import Result, adjusted
 

@@ -11,15 +11,15 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.results.calibration_report import calibration_members
 from photogram.results.features_report import features_document
-from photogram.results.films_told import fiducial_members, film_members, scanner_members
+from photogram.results.film_report import fiducial_members, film_members, scanner_members
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, images, iterations, photos, points, stations, terms_of
 from photogram.results.report import problems_of
 from photogram.results.result import Result, SumsByKind
 from photogram.results.tables import camera_parameters, check_points, observations
 from photogram.results.weakest import weakest_photos, weakest_points
+from photogram.show.methods import document_of
 from photogram.show.quantity import Quantity, Table, chosen, records
-from photogram.show.ways import document_of
 
 __all__ = ["block_members", "network_members", "to_json"]
 

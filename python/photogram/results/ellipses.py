@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
 from photogram.results.result import Result
 

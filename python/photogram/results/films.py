@@ -14,7 +14,7 @@ from photogram.network.block import Block
 from photogram.network.film_form import Affine, affine_form
 from photogram.network.films import Film, Mark, Scan
 from photogram.network.observations import Fiducial
-from photogram.results.kinds import ObservedKind
+from photogram.results.observation_kinds import ObservedKind
 from photogram.results.unknowns import AdjustedUnknown
 
 __all__ = ["OnFilm", "numbers_of_film"]

@@ -10,15 +10,15 @@ import numpy as np
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined, counted
 from photogram.results.axes import point_axes
-from photogram.results.groups_tested import groups_tested
-from photogram.results.held import held_tested
+from photogram.results.fixed_tests import held_tested
+from photogram.results.group_tests import groups_tested
 from photogram.results.lenses import fall_by_lens, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
-from photogram.results.observed import tested_singly
+from photogram.results.observation_rows import tested_singly
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners

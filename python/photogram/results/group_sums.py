@@ -18,10 +18,10 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.network.core import core_network
+from photogram.network.core_arrays import core_network
 from photogram.network.motion import on_shared
 from photogram.network.observations import moments
 from photogram.network.rays import local_axes
@@ -29,8 +29,8 @@ from photogram.network.strips import strips_of
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.brief import Brief
-from photogram.show.ways import Shown, Way, columns_of, report_of
+from photogram.show.methods import Shown, Way, columns_of, report_of
+from photogram.show.summary import Brief
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test

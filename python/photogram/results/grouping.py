@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
-from photogram.network.given import Given
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.unadjusted import Given
 from photogram.statistics.components import GroupsOf
 
 __all__ = ["BASES", "Grouping", "GroupsArgument", "Observables", "grouped"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR, RADIAL, own_images

@@ -8,8 +8,8 @@ from photogram.arguments.types import Bools, Floats
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
+from photogram.results.fixed_tests import is_suspected
 from photogram.results.group_sums import factored
-from photogram.results.held import is_suspected
 from photogram.results.result import Result
 from photogram.results.scores import score
 

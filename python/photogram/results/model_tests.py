@@ -24,8 +24,8 @@ from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
@@ -33,8 +33,8 @@ from photogram.results.distortion import INTERIOR
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
 from photogram.results.scores import quadratic, score
-from photogram.show.brief import Brief
-from photogram.show.ways import Shown, columns_of, report_of
+from photogram.show.methods import Shown, columns_of, report_of
+from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
     import pandas as pd

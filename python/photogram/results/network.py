@@ -17,15 +17,15 @@ from photogram import _photocore
 from photogram.arguments.arrays import finite_rows, freeze_fields, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, fields
+from photogram.lazy_dataclasses import dataclass, fields
 from photogram.messages import Message
-from photogram.network.core import CoreOptions, core_network
-from photogram.network.given import Given
+from photogram.network.core_arrays import CoreOptions, core_network
+from photogram.network.unadjusted import Given
 from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
 from photogram.results.selection import Adjusted, Selection
-from photogram.show.brief import Brief, Rows
-from photogram.show.ways import Shown, files_of
+from photogram.show.methods import Shown, files_of
+from photogram.show.summary import Brief, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, replace
-from photogram.results.iterations_told import iteration_table
-from photogram.results.kinds import ObservedKind
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.results.iteration_text import iteration_table
 from photogram.results.network import AdjustedNetwork, Observed
+from photogram.results.observation_kinds import ObservedKind
+from photogram.show.methods import Way
 from photogram.show.quantity import Axis, Link, Quantity
-from photogram.show.ways import Way
 
 __all__ = [
     "TABLES",

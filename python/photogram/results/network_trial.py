@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.network.given import Given
+from photogram.network.unadjusted import Given
 from photogram.statistics.groups import INVISIBLE
 from photogram.statistics.snooping.suspects import (
     LostSupportError,

@@ -13,7 +13,7 @@ import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import terms_of

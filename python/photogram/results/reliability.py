@@ -22,8 +22,8 @@ import numpy as np
 
 from photogram.arguments.arrays import number, one_of
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances
 from photogram.results.network_trial import NetworkTrial
 from photogram.results.selection import Selection

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import asdict, dataclass
+from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.results.reliability import Inseparable, Reliability
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Suspects, Tests

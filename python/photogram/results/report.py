@@ -19,12 +19,12 @@ from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
-from photogram.results.films_told import film_lines
-from photogram.results.iterations_told import iteration_lines
-from photogram.results.kinds import ObservedKind
+from photogram.results.film_report import film_lines
+from photogram.results.iteration_text import iteration_lines
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, iterations, part, photos, points, stations
-from photogram.results.observed import (
+from photogram.results.observation_kinds import ObservedKind
+from photogram.results.observation_rows import (
     NOTABLE,
     control_lines,
     image_lines,
@@ -42,9 +42,9 @@ from photogram.results.tables import (
 )
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, stacked, table_lines
+from photogram.show.methods import report_of
 from photogram.show.quantity import Axis, Quantity, chosen, labelled
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
-from photogram.show.ways import report_of
 from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 from photogram.statistics.outliers import outliers
 

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.core import CoreOptions, block_network
+from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
 from photogram.network.motion import refuse_datum, timed_photos
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
@@ -30,13 +30,13 @@ from photogram.results.datum import (
     relative_datum,
 )
 from photogram.results.films import OnFilm
-from photogram.results.kinds import ObservedKind, observed_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.restarted import restarted_motion
+from photogram.results.observation_kinds import ObservedKind, observed_kinds
+from photogram.results.restart import restarted_motion
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
 from photogram.results.trajectories import AdjustedTrajectory, adjusted_trajectories, project
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
-from photogram.show.ways import statement_of
+from photogram.show.methods import statement_of
 from photogram.statistics.limits import GlobalTest, global_test
 
 if TYPE_CHECKING:

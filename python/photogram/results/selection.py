@@ -10,8 +10,8 @@ import numpy as np
 
 from photogram.arguments.arrays import names, shown
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
 
 __all__ = [

@@ -16,7 +16,6 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
-from photogram.results.kinds import ObservedKind
 from photogram.results.network_tables import (
     Terms,
     deviation,
@@ -26,10 +25,11 @@ from photogram.results.network_tables import (
     terms_of,
     test_value,
 )
+from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.results.unknowns import AdjustedUnknown
+from photogram.show.methods import columns_of
 from photogram.show.quantity import Axis, Quantity, component, frame, joined, long
-from photogram.show.ways import columns_of
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = [

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import freeze_fields, shaped, standard_deviations
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.projecting import camera_of, projected

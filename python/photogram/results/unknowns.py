@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.arrays import standard_deviations
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 

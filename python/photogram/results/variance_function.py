@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from photogram import _photocore
-from photogram.declared import dataclass
 from photogram.io import json
+from photogram.lazy_dataclasses import dataclass
 from photogram.plots.panels import Where, panels, placed
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
-from photogram.show.brief import Brief
+from photogram.show.methods import Shown, axes_of, columns_of, document_of, report_of
 from photogram.show.sections import composed, headline
 from photogram.show.style import FAINT, INK, MARKED
-from photogram.show.ways import Shown, axes_of, columns_of, document_of, report_of
+from photogram.show.summary import Brief
 from photogram.statistics.variance_function import FunctionEstimate
 
 if TYPE_CHECKING:

@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
 from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.ways import Way
+from photogram.show.methods import Way
 
 __all__ = [
     "Determined",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field, replace
+from photogram.lazy_dataclasses import dataclass, field, replace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

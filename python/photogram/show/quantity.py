@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.angles import ARCSEC
 
 __all__ = [

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from photogram import _photocore
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import printable
 from photogram.show.page import Column, Fact, Facts, Part, Section, Table
 

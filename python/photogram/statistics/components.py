@@ -25,7 +25,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.statistics.distributions import bonferroni, critical_normal
 

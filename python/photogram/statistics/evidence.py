@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import listed
 from photogram.statistics.distributions import (
     bonferroni,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
 from photogram.statistics.groups import GroupTests
 from photogram.statistics.limits import GlobalTest, externally_studentized

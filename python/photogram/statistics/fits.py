@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Fit"]
 

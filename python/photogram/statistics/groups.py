@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import log_chi_square, log_fisher
 
 __all__ = ["INVISIBLE", "GroupTests", "group_tests", "parts_tests"]

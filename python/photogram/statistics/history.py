@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted
 from photogram.statistics.distributions import (
     LEVEL,

@@ -16,7 +16,7 @@ import math
 import sys
 from collections.abc import Sequence
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import global_test
 
 __all__ = ["CHANCE", "IMPROVEMENT", "RIVAL", "TESTED", "Judged", "judged", "likelihood"]

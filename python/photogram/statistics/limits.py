@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram import _photocore
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import (
     LEVEL,
     bonferroni,

@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["FunctionEstimate", "Residuals", "estimate_function", "nonnegative"]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from photogram.declared import asdict, dataclass
+from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.messages import counted, listed
 from photogram.statistics.evidence import NAMED, WITHHELD, Evidence, Test
 from photogram.statistics.findings import Findings

@@ -27,4 +27,4 @@ __all__ = [
 check_arguments(globals(), set(__all__) - {"Result"})
 
 WAYS = {"findings_of": ("findings",), "page_of": ("page", "night_page")}
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
-from photogram.stellar import published, strict
+from photogram.stellar import report_iteration, strict
 from photogram.stellar.combination import combine
 from photogram.stellar.counts import degrees_of_freedom
 from photogram.stellar.movement import movement, pairs_to_combine
@@ -58,7 +58,7 @@ def calibrate(
     if threads is not None and threads < 1:
         raise InputError(f"{threads} threads are too few")
     iterate = (
-        published.iterate
+        report_iteration.iterate
         if problem.options.as_published
         else partial(strict.iterate, threads=threads, progress=progress)
     )
@@ -115,11 +115,11 @@ def _from_far(problem: Problem, initial: Floats, free: Bools) -> tuple[Solved, l
     A deck starts all groups with the attitude of the event. Attitudes by the strict iteration, the camera
     held, begin where the report's steps lead to its solution, which does not depend on the beginning.
     """
-    run = partial(published.iterate, solution="maximum", limit=problem.options.max_iterations)
+    run = partial(report_iteration.iterate, solution="maximum", limit=problem.options.max_iterations)
     failed: AdjustmentError | None = None
     try:
         solved = run(problem, initial, free)
-        if solved.stop != published.DIVERGED:
+        if solved.stop != report_iteration.DIVERGED:
             return solved, []
     except AdjustmentError as error:
         failed = error

@@ -17,12 +17,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.stellar.inertial import equatorial_axes
 from photogram.stellar.places import Earth, sidereal_time, to_date
-from photogram.stellar.skies import Exposure
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_calibration import Exposure
 
 __all__ = ["ATTITUDE", "FIELD", "Located", "locate"]
 

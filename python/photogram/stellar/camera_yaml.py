@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 

@@ -11,9 +11,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.io import json
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
 from photogram.stellar.camera_files import read_any, read_camera, read_document, weight_of
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
+from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import ARCSEC
 
 __all__ = ["Catalogue"]

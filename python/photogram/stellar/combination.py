@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.stellar import published, strict
+from photogram.stellar import report_iteration, strict
 from photogram.stellar.parameters import GROUPS, NAMES
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
     misclosure = -(np.remainder(off + np.pi, 2 * np.pi) - np.pi)
     step, cofactors = modify(solved.cofactors, np.zeros(len(solved.parameters)), c, misclosure)
     parameters = solved.parameters + step
-    return published.residual_cycle(
+    return report_iteration.residual_cycle(
         problem,
         parameters,
         solved.free,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
 
 if TYPE_CHECKING:

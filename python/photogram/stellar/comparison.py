@@ -15,12 +15,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.odds import binomial_tail
 from photogram.stellar.places import Earth
-from photogram.stellar.skies import Exposure, SkyCalibration, partials
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_calibration import Exposure, SkyCalibration, partials
 
 __all__ = ["HeldOut", "fewer_stars", "held_out"]
 

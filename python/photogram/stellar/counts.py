@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.problem import Problem
 
 __all__ = ["Counts", "degrees_of_freedom"]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.sky import TAU, refraction
 

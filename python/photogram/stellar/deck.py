@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cards import Card, Cards
 from photogram.stellar.options import Options

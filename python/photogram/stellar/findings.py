@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested, by_t
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
-from photogram.stellar.nights import CalibratedNight
+from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.outliers import studentized
 from photogram.stellar.result import SIGNIFICANT, Result
 

@@ -8,15 +8,15 @@ from functools import partial
 
 import numpy as np
 
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.identification import identify
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.odds import ACCEPTED
 from photogram.stellar.places import Earth
 from photogram.stellar.pointing import attitude_of, axis_of, roll_of
-from photogram.stellar.skies import Exposure
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_calibration import Exposure
 from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["Hint", "Setting", "find_hint"]
@@ -42,7 +42,7 @@ class Setting:
     attitude_error, tolerance
         Radians; pixels.
     field_error, roll_known
-        As for `photogram.stellar.night.Night`.
+        As for `photogram.stellar.night_calibration.Night`.
     """
 
     site: Site

@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import FEWEST, STRETCH, Match, Search, match
 from photogram.stellar.odds import ACCEPTED, DOUBTFUL, expected_false, log_odds, star_probabilities
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.skies import Exposure, project_sky, stars_near
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_calibration import Exposure, project_sky, stars_near
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.start import local_directions, sky_share, turned_to
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.places import Earth, sidereal_time, to_date
 from photogram.stellar.sky import Site
 from photogram.stellar.transformation import pole_matrix, terrestrial

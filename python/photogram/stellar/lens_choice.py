@@ -14,12 +14,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools
-from photogram.declared import dataclass, replace
 from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth
-from photogram.stellar.skies import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky import Site
+from photogram.stellar.sky_calibration import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["DECISIVE", "POSITIVE", "LensFit", "as_lens", "compared_lenses"]

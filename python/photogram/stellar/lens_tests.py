@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["LEVEL", "LensTest", "equal", "test_scale", "test_terms"]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 

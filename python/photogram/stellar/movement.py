@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.stellar.moved import FictitiousPoint, Movement
+from photogram.stellar.movement_result import FictitiousPoint, Movement
 from photogram.stellar.parameters import GROUPS
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from photogram.io import json
 from photogram.show.angles import ARCSEC
 from photogram.show.quantity import records
 from photogram.stellar.lens_tests import LensTest
+from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.night_tables import exposures, images, stars
-from photogram.stellar.nights import CalibratedNight
 
 __all__ = ["to_json"]
 

@@ -19,11 +19,11 @@ from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.matching import STRETCH
-from photogram.stellar.nights import Night
+from photogram.stellar.night_result import Night
 from photogram.stellar.parameters import GRAD
 from photogram.stellar.places import Earth, epoch
 from photogram.stellar.pointing import attitude_of
-from photogram.stellar.skies import Exposure
+from photogram.stellar.sky_calibration import Exposure
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.tomlfile import effects, pole_arcsec, site
 

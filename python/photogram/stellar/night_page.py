@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
@@ -24,8 +25,8 @@ from photogram.show.page import (
     significant,
 )
 from photogram.show.quantity import chosen
-from photogram.show.ways import page_of
 from photogram.stellar.night_plots import figures
+from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.night_tables import (
     attitudes,
     facts,
@@ -35,7 +36,6 @@ from photogram.stellar.night_tables import (
     lens_tests,
     lenses,
 )
-from photogram.stellar.nights import CalibratedNight
 from photogram.stellar.page import plate_pictures
 
 __all__ = ["night_page"]

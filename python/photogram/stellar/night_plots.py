@@ -13,7 +13,7 @@ from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.stellar.nights import CalibratedNight
+    from photogram.stellar.night_result import CalibratedNight
 
 __all__ = ["figures"]
 

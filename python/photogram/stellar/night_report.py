@@ -12,6 +12,7 @@ from photogram.show.lines import Field, fact_lines, field, table_lines
 from photogram.show.quantity import Table, chosen
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
+from photogram.stellar.night_result import SIGNIFICANT, CalibratedNight
 from photogram.stellar.night_tables import (
     attitudes,
     facts,
@@ -23,7 +24,6 @@ from photogram.stellar.night_tables import (
     lenses,
     stars,
 )
-from photogram.stellar.nights import SIGNIFICANT, CalibratedNight
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
 from photogram.stellar.parameters import GRAD
 

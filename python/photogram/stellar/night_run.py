@@ -8,17 +8,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed
 from photogram.stellar.comparison import fewer_stars, held_out
 from photogram.stellar.hints import Hint, Setting, find_hint
 from photogram.stellar.identification import Found, identify, identify_again
 from photogram.stellar.matching import STRETCH
-from photogram.stellar.nights import Night
+from photogram.stellar.night_result import Night
 from photogram.stellar.odds import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS
 from photogram.stellar.pointing import turn_between
-from photogram.stellar.skies import Exposure, SkyCalibration, calibrate_exposures
+from photogram.stellar.sky_calibration import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["Run", "Seen", "adjusted", "setting_of"]

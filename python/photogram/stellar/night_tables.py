@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
 from photogram.show.page import Fact
 from photogram.show.quantity import Axis, Quantity, chosen, frame, of_each
-from photogram.stellar.nights import CalibratedNight, Night
+from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.pointing import axis_of
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from photogram.declared import dataclass, fields
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, fields
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import Site
 

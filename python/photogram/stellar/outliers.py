@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 from photogram.stellar.parameters import INDEX, NAMES

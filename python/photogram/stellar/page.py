@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
@@ -24,7 +25,6 @@ from photogram.show.page import (
     fixed,
     significant,
 )
-from photogram.show.ways import page_of
 from photogram.stellar import tables
 from photogram.stellar.curves import distortion_curves
 from photogram.stellar.outliers import studentized

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.angles import ARCSEC
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.sky import Effects, Site

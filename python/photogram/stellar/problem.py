@@ -6,10 +6,10 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import listed
-from photogram.show.brief import Brief
+from photogram.show.summary import Brief
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.sky import TAU, Site

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.show.brief import Brief
-from photogram.show.ways import Judged, Paged
+from photogram.show.methods import Judged, Paged
+from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.counts import Counts
-from photogram.stellar.moved import Movement
+from photogram.stellar.movement_result import Movement
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.plate_model import plate_camera
 from photogram.stellar.problem import Problem

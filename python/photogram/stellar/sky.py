@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
 
 __all__ = ["ABERRATION", "HECTOPASCAL", "TAU", "Air", "Effects", "Site", "refraction"]

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io import json
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.stellar.camera_files import read_camera, read_document
 from photogram.stellar.lenses import LENSES, Lens, lens_named

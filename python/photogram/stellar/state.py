@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.stellar.problem import Problem
 
 __all__ = ["Level", "Solved"]

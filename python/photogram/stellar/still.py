@@ -12,8 +12,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
-from photogram.stellar.skies import SkyCalibration
+from photogram.lazy_dataclasses import dataclass
+from photogram.stellar.sky_calibration import SkyCalibration
 
 __all__ = ["LEVEL", "Standstill", "stood_still"]
 

@@ -9,22 +9,22 @@ from photogram.on_demand import on_demand
 
 if TYPE_CHECKING:
     from photogram.targets.appraisal import appraise
+    from photogram.targets.appraisal_report import Worth, WorthOptions
     from photogram.targets.board import Board
-    from photogram.targets.calibrated import Calibrated
     from photogram.targets.calibration import Calibration
-    from photogram.targets.compared import CameraDifference
+    from photogram.targets.calibration_difference import CameraDifference
+    from photogram.targets.calibration_result import Calibrated
     from photogram.targets.conversion import Conversion, convert_lens
     from photogram.targets.corners import Corners
     from photogram.targets.cross_validated import cross_validate
     from photogram.targets.cross_validation import CrossValidation
     from photogram.targets.differences import difference
-    from photogram.targets.first import FirstCalibration, first_values
+    from photogram.targets.first_calibration import FirstCalibration, first_values
     from photogram.targets.grouping import residual_groups
     from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
     from photogram.targets.new_views import Candidate, NewView, Suggestions
     from photogram.targets.nominal import nominal_camera
     from photogram.targets.output.formats import camera_files
-    from photogram.targets.planned import PlannedView, ViewPlan
     from photogram.targets.reading import read
     from photogram.targets.simulation import simulate_corners
     from photogram.targets.stereo import distance_uncertainty, triangulate
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
         uncertainty_map,
     )
     from photogram.targets.view_plan import plan_views
+    from photogram.targets.view_plan_result import PlannedView, ViewPlan
     from photogram.targets.weighing import corner_components
-    from photogram.targets.worth import Worth, WorthOptions
 
 __all__ = [
     "Board",
@@ -98,10 +98,10 @@ _MADE = {
 _HOMES = {
     "appraise": "appraisal",
     "Board": "board",
-    "Calibrated": "calibrated",
+    "Calibrated": "calibration_result",
     "Calibration": "calibration",
     "camera_files": "output.formats",
-    "CameraDifference": "compared",
+    "CameraDifference": "calibration_difference",
     "Candidate": "new_views",
     "Conversion": "conversion",
     "convert_lens": "conversion",
@@ -111,12 +111,12 @@ _HOMES = {
     "CrossValidation": "cross_validation",
     "difference": "differences",
     "distance_uncertainty": "stereo",
-    "first_values": "first",
-    "FirstCalibration": "first",
+    "first_values": "first_calibration",
+    "FirstCalibration": "first_calibration",
     "NewView": "new_views",
     "nominal_camera": "nominal",
     "plan_views": "view_plan",
-    "PlannedView": "planned",
+    "PlannedView": "view_plan_result",
     "projection_uncertainty": "uncertainty",
     "read": "reading",
     "residual_groups": "grouping",
@@ -129,19 +129,19 @@ _HOMES = {
     "uncertainty_map": "uncertainty",
     "UncertaintyCurve": "maps",
     "UncertaintyMap": "maps",
-    "ViewPlan": "planned",
-    "Worth": "worth",
-    "WorthOptions": "worth",
+    "ViewPlan": "view_plan_result",
+    "Worth": "appraisal_report",
+    "WorthOptions": "appraisal_report",
 }
 """The module of each name, loaded when it is first asked for: most blocks are no boards."""
 
 WAYS = {
-    "document_of": {"Calibrated": ("document",), "ViewPlan": ("plan_shown",)},
+    "document_of": {"Calibrated": ("document",), "ViewPlan": ("view_plan_report",)},
     "findings_of": ("findings",),
-    "page_of": {"Calibrated": ("page",), "ViewPlan": ("plan_shown",)},
-    "report_of": {"Calibrated": ("report",), "ViewPlan": ("plan_shown",)},
+    "page_of": {"Calibrated": ("page",), "ViewPlan": ("view_plan_report",)},
+    "report_of": {"Calibrated": ("report",), "ViewPlan": ("view_plan_report",)},
 }
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 
 
 __getattr__, __dir__ = on_demand(__name__, _HOMES, check_arguments, unchecked=_MADE)

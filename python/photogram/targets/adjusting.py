@@ -15,7 +15,7 @@ from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.results.result import Result
-from photogram.targets.calibrated import Calibrated, deviation_of_corners, with_unknown_weight
+from photogram.targets.calibration_result import Calibrated, deviation_of_corners, with_unknown_weight
 from photogram.targets.clocks import checked_clocks
 from photogram.targets.findings import judged
 from photogram.targets.outliers import marked_as_mrcal

@@ -8,14 +8,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.errors import InputError, RankError
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.appraisal_report import Worth, WorthOptions
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.cross_validated import cross_validate
 from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.housings import housed_with, housing_of
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.suggestions import suggest_views
 from photogram.targets.uncertainty import uncertainty_map
-from photogram.targets.worth import Worth, WorthOptions
 
 __all__ = ["appraise", "median_distance", "model_verdict"]
 

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import frozen, length, names, number, one_of, shaped, text, whole_number
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
-from photogram.show.brief import Brief, Rows
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.show.summary import Brief, Rows
 
 __all__ = ["Board", "BoardKind", "Shape"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
-from photogram.targets.calibrated import Calibrated
+from photogram.lazy_dataclasses import dataclass
+from photogram.targets.calibration_result import Calibrated
 
 __all__ = ["BoardFit", "board_fit"]
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.robust import Loss
 from photogram.targets.adjusting import adjusted_start, snooped_start
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.start import Start
 
 __all__ = ["Calibration"]

@@ -7,7 +7,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import RankError
 from photogram.messages import Message
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.motion import dated, errors_of_speeds
 
 __all__ = ["checked_clocks"]

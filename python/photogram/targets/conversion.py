@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import is_covariance, number, whole_number
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.csv_text import csv_text
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.brief import Brief, Rows
-from photogram.targets.compared import CameraDifference
+from photogram.show.summary import Brief, Rows
+from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.imaging import TURNED
 from photogram.targets.least_lens import HELD, Moved, Points
 from photogram.targets.lens_fit import GRID, KNOTS, fitted_in_stages, free_names, lens_of, shows, within

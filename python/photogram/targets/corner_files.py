@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from photogram.declared import dataclass
 from photogram.io.files import read_beginning, reading
+from photogram.lazy_dataclasses import dataclass
 from photogram.targets.board import Board
 from photogram.targets.board_files import is_board
 from photogram.targets.corner_tables import (
@@ -17,7 +17,7 @@ from photogram.targets.corner_tables import (
     read_table,
     read_vnl,
 )
-from photogram.targets.measured import Measured
+from photogram.targets.corner_views import Measured
 from photogram.targets.opencv_corners import BEGIN, is_npz, is_storage, read_npz, read_storage
 
 __all__ = ["KEY", "Form", "files_at", "holds_targets", "is_picture", "sorted_files"]

@@ -13,7 +13,7 @@ from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.io.files import read_beginning
 from photogram.io.numbers import finite_number
 from photogram.targets.board import Board
-from photogram.targets.measured import Measured
+from photogram.targets.corner_views import Measured
 
 __all__ = ["is_headless", "is_table", "is_vnl", "read_headless", "read_table", "read_vnl"]
 

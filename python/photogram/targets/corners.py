@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import frozen, indices, length, names, shaped, whole_number
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
-from photogram.show.brief import Brief, Rows, few
+from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.show.summary import Brief, Rows, few
 
 __all__ = ["Corners"]
 

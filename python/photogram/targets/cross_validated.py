@@ -12,7 +12,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.cross_validation import CrossValidation, Into, parts_agree, splits
 from photogram.targets.housings import camera_number, housed_with, housing_of
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
-from photogram.show.brief import Brief, Rows
+from photogram.lazy_dataclasses import dataclass
+from photogram.show.summary import Brief, Rows
 from photogram.targets.datums import datum_rows
 from photogram.targets.difference_test import EXPLAINED, DifferenceTest
 from photogram.targets.housing import Housing

@@ -18,8 +18,8 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.messages import Message, counted, listed
 from photogram.targets.board import Board
+from photogram.targets.corner_views import Measured
 from photogram.targets.markers import charuco_tags, grid_tags
-from photogram.targets.measured import Measured
 from photogram.targets.saddles import Picture, refined
 
 __all__ = ["detected"]

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import log_chi_square, log_fisher
 
 __all__ = ["DifferenceTest"]

@@ -10,8 +10,8 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
-from photogram.targets.calibrated import Calibrated
-from photogram.targets.compared import CameraDifference, Side, compared
+from photogram.targets.calibration_difference import CameraDifference, Side, compared
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.datums import datum_rows
 from photogram.targets.housings import camera_number, housing_of, size_of
 from photogram.targets.motion_fit import Criterion

@@ -9,14 +9,14 @@ import numpy as np
 
 from photogram.io import json
 from photogram.results.document import block_members
+from photogram.show.methods import document_of
 from photogram.show.quantity import Quantity, records
-from photogram.show.ways import document_of
+from photogram.targets.appraisal_files import worth_members
 from photogram.targets.board_fit import STRETCHES, board_fit
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.prior_shift import prior_shift
 from photogram.targets.splined import splines
 from photogram.targets.tables import views
-from photogram.targets.worth_files import worth_members
 
 __all__ = ["calibration_document", "to_json"]
 

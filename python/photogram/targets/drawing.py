@@ -12,11 +12,11 @@ import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.plots.panels import Where, handed_out, note, panels, placed
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, INK, ORDERED, VERMILION
-from photogram.targets.compared import CameraDifference
+from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
 

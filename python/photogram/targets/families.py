@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.homographies import (
     angles_apart,

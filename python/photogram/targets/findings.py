@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 from photogram.network.knots import KNOTTED
 from photogram.results.findings import block_findings
-from photogram.results.snooped import Snooped
-from photogram.show.ways import findings_of
+from photogram.results.snooping_result import Snooped
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
-from photogram.targets.calibrated import Calibrated, UnknownWeight, deviation_of_corners
+from photogram.targets.calibration_result import Calibrated, UnknownWeight, deviation_of_corners
+from photogram.targets.coverage import showings
 from photogram.targets.difference_test import EXPLAINED
 from photogram.targets.first_camera import WIDEST, from_axis
-from photogram.targets.showing import showings
 
 if TYPE_CHECKING:
+    from photogram.targets.appraisal_report import Worth
     from photogram.targets.cross_validation import CrossValidation
-    from photogram.targets.worth import Worth
 
 __all__ = ["findings", "judged"]
 

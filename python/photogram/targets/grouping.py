@@ -16,7 +16,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.show.quantity import Axis, Quantity
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 
 __all__ = ["CELLS", "Groups", "mean_residuals", "residual_groups"]
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
 from photogram.targets.imaging import unknown_of
 from photogram.targets.vision import cross_matrices

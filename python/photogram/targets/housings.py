@@ -10,7 +10,7 @@ from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.knots import Knot
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.imaging import unknown_of
 from photogram.targets.vision import sensor_steps

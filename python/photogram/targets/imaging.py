@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.vision import FLIP, cross_matrices
 

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.imaging import TURNED, motion_partials, values_of

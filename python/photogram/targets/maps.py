@@ -8,10 +8,10 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.io.csv_text import csv_text
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import hull, outside
-from photogram.show.brief import Brief, Rows
+from photogram.show.summary import Brief, Rows
 from photogram.targets.datums import DatumName
 from photogram.targets.projection import worst
 

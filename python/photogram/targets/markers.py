@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.targets.board import Board
 from photogram.targets.saddles import settled
 

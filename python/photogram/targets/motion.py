@@ -16,7 +16,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.network.timed import Timed
+from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
 from photogram.network.unknowns import Sensor
 from photogram.targets.corners import Corners

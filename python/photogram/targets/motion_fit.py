@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.imaging import imaged, motion_partials, rays

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.files import read_text
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration

@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.show.brief import Brief, Rows
+from photogram.show.summary import Brief, Rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.imaging import TURNED, rays
 from photogram.targets.maps import distance_text

@@ -17,7 +17,7 @@ from photogram.io.tree import Tree, read_json
 from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import Message
 from photogram.targets.board import Board
-from photogram.targets.measured import Measured
+from photogram.targets.corner_views import Measured
 from photogram.targets.npz_arrays import read_arrays
 
 __all__ = ["BEGIN", "is_npz", "is_storage", "read_npz", "read_storage"]

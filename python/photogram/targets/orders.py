@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.targets.families import POOR, rays_of

@@ -10,15 +10,15 @@ import numpy as np
 
 from photogram.plots.panels import figure_of
 from photogram.show.cells import page_table
+from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Facts, Layers, Page, Part, Remarks, Section
-from photogram.show.ways import page_of
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.appraisal_page import worth_facts, worth_section
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.grouping import Groups, residual_groups
 from photogram.targets.prior_shift import prior_shift
 from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
 from photogram.targets.splined import spline_lines
 from photogram.targets.tables import board_facts, views, worst_points
-from photogram.targets.worth_page import worth_facts, worth_section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

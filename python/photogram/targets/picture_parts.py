@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["PARTS", "PicturePart", "parts_of"]
 

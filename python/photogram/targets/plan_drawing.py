@@ -11,7 +11,7 @@ from photogram.network.hull import hull
 from photogram.plots.panels import Where, handed_out, panels, placed
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.drawing import in_pixels
-from photogram.targets.planned import ViewPlan
+from photogram.targets.view_plan_result import ViewPlan
 
 __all__ = ["draw_planned_views"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.show.quantity import Axis, Quantity
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 
 __all__ = ["moved_lines", "prior_shift"]
 

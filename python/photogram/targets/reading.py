@@ -15,12 +15,12 @@ from photogram.targets.board import Board, Shape
 from photogram.targets.board_files import picture_size, read_board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corner_files import Form, files_at, is_picture, sorted_files
+from photogram.targets.corner_views import Grouping, Measured, ViewBy, grouped
 from photogram.targets.corners import Corners
 from photogram.targets.detection import detected
-from photogram.targets.first import first_values
+from photogram.targets.first_calibration import first_values
 from photogram.targets.knot_weights import with_knot_sd
 from photogram.targets.lens_fit import KNOTS
-from photogram.targets.measured import Grouping, Measured, ViewBy, grouped
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz
 from photogram.targets.start import Regularisation, Synchronisation

@@ -7,10 +7,10 @@ import numpy as np
 from photogram.results.network_tables import points
 from photogram.results.report import details, summary
 from photogram.show.lines import fact_lines, field, table_lines
+from photogram.show.methods import report_of
 from photogram.show.quantity import Quantity
 from photogram.show.sections import Section, composed, headline
-from photogram.show.ways import report_of
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.prior_shift import moved_lines
 from photogram.targets.splined import spline_lines
 from photogram.targets.tables import board_facts, views, worst_points

@@ -13,7 +13,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.plots.panels import Where, handed_out, panels, placed, scale_bars
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, FAINT, VERMILION
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.grouping import NOTABLE, mean_residuals
 from photogram.targets.tables import view_rms
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.targets.homographies import nearest_rotations
 from photogram.targets.vision import composed, inverted
 

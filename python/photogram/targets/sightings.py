@@ -7,8 +7,8 @@ from typing import Self
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.targets.board import Board
 from photogram.targets.corners import Corners
 from photogram.targets.homographies import nearest_rotations

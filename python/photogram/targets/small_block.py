@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.adjustment.adjustment import adjust
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Undetermined
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from photogram import _photocore
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import Knot, beyond_knots
 from photogram.network.observations.prior import Prior
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.imaging import TURNED
 from photogram.targets.lens_fit import field_of, grid_of_pixels
 

@@ -11,17 +11,17 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import indices, one_of, shaped, shown
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
+from photogram.network.moving_photos import Timed
 from photogram.network.passages import Bend, Figure
 from photogram.network.rigs import Mount
-from photogram.network.timed import Timed
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
-from photogram.show.brief import Brief, Rows, few
+from photogram.show.summary import Brief, Rows, few
 from photogram.targets.board import Board, Shape
 from photogram.targets.corners import Corners
 from photogram.targets.motion import NEAR, POWERS, dated, moved, moving, pictures_in_motion

@@ -12,7 +12,7 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import length, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.datums import housing_rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.housings import camera_number, housed_with, housing_of, size_of

@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.housings import camera_number, housed_with, housing_of, size_of

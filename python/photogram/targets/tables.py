@@ -10,7 +10,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.show.page import Fact, Tone, significant
 from photogram.show.quantity import Axis, Quantity
 from photogram.targets.board_fit import STRETCHES, board_fit
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 
 __all__ = ["board_facts", "view_rms", "views", "worst_points"]
 

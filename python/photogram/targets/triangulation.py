@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.targets.housing import Housing
 from photogram.targets.imaging import imaged, motion_partials, rays
 

@@ -12,7 +12,7 @@ from photogram.arguments.arrays import length, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.knots import beyond_knots
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.datums import DatumName, datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.housings import camera_number, housing_of, size_of

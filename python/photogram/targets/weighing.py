@@ -14,7 +14,7 @@ from photogram.errors import InputError
 from photogram.results.components import VarianceComponents
 from photogram.results.grouping import GroupsArgument
 from photogram.targets.adjusting import weighted_block
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 
 __all__ = ["CornerBasis", "corner_components"]
 

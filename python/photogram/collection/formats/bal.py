@@ -15,9 +15,9 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
 from photogram.collection.formats.format import Format
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.packed_numbers import PIECE, at, whole
+from photogram.lazy_dataclasses import dataclass
 from photogram.memory import require
 
 __all__ = ["FORMAT"]

@@ -15,7 +15,7 @@ from photogram.show.angles import ARCSEC
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration, CaseResult
-    from photogram.comparator.combined import SinglePolynomial
+    from photogram.comparator.combined_solution import SinglePolynomial
 
 __all__ = [
     "case_linear_page",

@@ -14,13 +14,13 @@ from photogram.comparator.correction import Correction
 from photogram.comparator.grid import Grid
 from photogram.comparator.gridfile import corrected
 from photogram.comparator.polynomial import Frame, Polynomial
+from photogram.comparator.years.joint import Together, adjust_together
 from photogram.comparator.years.quantities import common_range, quantities_of
 from photogram.comparator.years.record import RecordedCalibration
-from photogram.comparator.years.together import Together, adjust_together
-from photogram.declared import dataclass
 from photogram.errors import InputError
-from photogram.show.brief import Brief
-from photogram.show.ways import Shown
+from photogram.lazy_dataclasses import dataclass
+from photogram.show.methods import Shown
+from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.history import History, dates_of, history
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.comparator.years.comparison import Comparison
-from photogram.show.ways import findings_of
+from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.history import changed_of, unchanged_of
 

@@ -18,8 +18,8 @@ from photogram.arguments.types import Floats
 from photogram.comparator.correction import Correction
 from photogram.comparator.polynomial import Frame
 from photogram.comparator.years.record import RecordedCalibration
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Quantities", "common_range", "quantities_of"]
 

@@ -17,10 +17,10 @@ from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
 from photogram.comparator.document import to_json
 from photogram.comparator.grid import Grid
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
 __all__ = ["RecordedCalibration", "RecordedCase"]

@@ -11,4 +11,4 @@ WAYS = {
     "page_of": ("page",),
     "report_of": ("document",),
 }
-"""The files that show a result, by the names of the ways: see `photogram.show.ways`."""
+"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

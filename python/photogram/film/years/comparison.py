@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.film.certificate import Certificate
 from photogram.film.years.dated import DatedCamera
 from photogram.film.years.figures import figures_of
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
-from photogram.show.brief import Brief
-from photogram.show.ways import Shown
+from photogram.show.methods import Shown
+from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.history import History, dates_of, history
 

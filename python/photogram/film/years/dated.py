@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from datetime import date
 
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.film.certificate import Certificate
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 
 __all__ = ["DatedCamera"]

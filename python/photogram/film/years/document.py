@@ -10,8 +10,8 @@ from photogram.film.years.tables import calibrations
 from photogram.io import json
 from photogram.show.history import history_document, series_lines
 from photogram.show.lines import field, table_lines
+from photogram.show.methods import document_of, report_of
 from photogram.show.quantity import records
-from photogram.show.ways import document_of, report_of
 
 __all__ = ["comparison_document", "comparison_text"]
 

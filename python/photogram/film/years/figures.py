@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 
 __all__ = ["CameraFigures", "figures_of"]

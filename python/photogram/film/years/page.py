@@ -9,8 +9,8 @@ from photogram.film.years.tables import calibrations
 from photogram.show.cells import page_table
 from photogram.show.history import charts_section, series_table, values_table
 from photogram.show.judgement import judged, tests_section
+from photogram.show.methods import page_of
 from photogram.show.page import Fact, Page, Section
-from photogram.show.ways import page_of
 
 __all__ = ["comparison_page"]
 

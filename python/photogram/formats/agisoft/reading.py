@@ -8,13 +8,13 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN, checked_rotation
 from photogram.formats.xml_stream import Element, read_stream
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Observation, Position

@@ -8,7 +8,6 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.agisoft import FILE
 from photogram.formats.block_contents import correlated_control, lost_observations, posed
@@ -17,6 +16,7 @@ from photogram.formats.lenses import lens_of
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.rotations import Y_DOWN
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.observations import Position
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.blocks_exchange import TITLE
 from photogram.formats.blocks_exchange.systems import PhotoRecord, PointRecord, Systems
@@ -18,6 +17,7 @@ from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rotations import checked_rotation
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame
 from photogram.formats.xml_stream import Element
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.observations import Control, Observation, Position
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass, field
 
 __all__ = [
     "CAMERA",

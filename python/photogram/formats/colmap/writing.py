@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.colmap.binary import binary_files
@@ -32,6 +31,7 @@ from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.formats.rotations import Y_DOWN
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.rigs import Mount

@@ -17,7 +17,7 @@ from photogram.formats.csm.optics import from_pixels, not_zero, transformed
 from photogram.io.pvl import Group
 from photogram.io.tree import Tree
 from photogram.network.lens import Lens
-from photogram.network.timed import Lines
+from photogram.network.moving_photos import Lines
 
 __all__ = ["read_cube", "serial_number"]
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.lens import Lens
-from photogram.network.timed import Lines
+from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation
 
 __all__ = ["Detector", "Framelets", "Isd", "Jitter", "Pixels", "Plane", "Positions", "Turns"]

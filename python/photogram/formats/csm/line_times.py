@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.io.tree import Tree
-from photogram.network.timed import Lines
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.moving_photos import Lines
 
 __all__ = ["Drift", "fitting", "read_drift", "read_lines"]
 

@@ -9,14 +9,14 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.formats.csm.angles import fitted_angles, of_angles
 from photogram.formats.csm.isd import Framelets, Isd, Pixels, Turns, check_choice
 from photogram.formats.csm.spheroids import nearest_intersection
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.cameras import Camera
+from photogram.network.moving_photos import LineSensor, Timed
 from photogram.network.projecting import projected
-from photogram.network.timed import LineSensor, Timed
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
 
 __all__ = ["SupportedImage", "camera_of", "to_camera", "trajectory_of", "with_polynomial_pointing"]

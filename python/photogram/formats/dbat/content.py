@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.project import Options, Project, Size, assembled
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.cards import Card
 from photogram.formats.dbat.content import Content, Sensor, sensor_of
@@ -21,6 +20,7 @@ from photogram.formats.format import Wishes
 from photogram.formats.project import Size
 from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 
 __all__ = ["TITLE", "is_export", "read_export"]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photogram.adjustment.known import Cartesian
+from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.csm.lists import read_list, read_support
@@ -26,7 +26,7 @@ from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import Message, counted, listed
 from photogram.network.geometry import Spheroid
-from photogram.network.timed import Timed
+from photogram.network.moving_photos import Timed
 from photogram.network.whereabouts import about
 
 __all__ = ["read"]

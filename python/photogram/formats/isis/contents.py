@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.formats.isis.solving import Solving
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["PITCHES", "Image", "PlanetaryContents", "contents_of", "rows_of_each"]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass, field, fields
 from photogram.errors import InputError
 from photogram.io.pvl import Group
+from photogram.lazy_dataclasses import dataclass, field, fields
 
 __all__ = [
     "MEASURE_TYPES",

@@ -6,11 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from photogram.adjustment.known import Cartesian
+from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
 from photogram.formats.isis.contents import Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.points import per_metre
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import local_frames
 from photogram.network.motion import focal_images
 from photogram.results.result import Result

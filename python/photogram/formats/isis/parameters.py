@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.formats.csm.angles import to_angles
 from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.contents import Image
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.trajectories import Trajectory
 from photogram.network.whereabouts import about
 from photogram.results.trajectories import AdjustedTrajectory

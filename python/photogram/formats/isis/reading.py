@@ -11,12 +11,12 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.isis.columns import measures_of, points_of
 from photogram.formats.isis.network import MESSAGE, ControlNetwork
 from photogram.io.files import read_bytes, reading
 from photogram.io.pvl import Group, Quantity, Value, parsed
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["is_binary", "is_network", "read_network"]
 

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.io.files import read_lines
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import nearest
 
 __all__ = ["OTHERWISE", "PARAMETERS", "REFUSED", "Settings", "Sigmas", "Solved", "read_settings"]

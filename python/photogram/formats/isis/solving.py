@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
 from photogram.formats.csm.angles import Polynomials, fitted, fitted_angles, of_angles
 from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import trajectory_of
 from photogram.formats.isis.settings import Settings
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.trajectories import Polynomial, Trajectory
 
 __all__ = ["Solving", "solving"]

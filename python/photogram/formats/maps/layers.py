@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
-from photogram.formats.placing import Placed, placed
+from photogram.formats.crs_results import Placed, placed
 from photogram.formats.project import frame_of
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
-from photogram.network.timed import Moment
+from photogram.network.moving_photos import Moment
 from photogram.results.axes import point_axes
 from photogram.results.ellipses import CONFIDENCE, ellipses, fitting_scale
 from photogram.results.footprints import footprints

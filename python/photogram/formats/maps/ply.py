@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.placing import Placed
+from photogram.formats.crs_results import Placed
 from photogram.network.rays import local_axes
 from photogram.results.ellipses import metric_covariances
 from photogram.results.network import AdjustedNetwork

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from photogram.formats.metadata.said import (
+from photogram.formats.metadata.record import (
     SEA_LEVEL,
     UNSAID,
     UNSAID_SYSTEM,

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from photogram.formats.control_lists import system_of
-from photogram.formats.metadata.said import (
+from photogram.formats.metadata.record import (
     ELLIPSOIDAL,
     UNSAID_SYSTEM,
     Said,

@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from photogram.declared import dataclass
-from photogram.formats.metadata.found import found_in
-from photogram.formats.metadata.said import FIXED, Said
+from photogram.formats.metadata.record import FIXED, Said
+from photogram.formats.metadata.search import found_in
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted, listed
-from photogram.show.brief import Brief
 from photogram.show.sections import Section
+from photogram.show.summary import Brief
 
 __all__ = ["WITHOUT", "Metadata", "PhotoRecord", "counts", "read_metadata", "remarks_on", "told"]
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.declared import dataclass
-from photogram.formats.metadata.said import (
+from photogram.formats.metadata.record import (
     ELLIPSOIDAL,
     Said,
     Triple,
@@ -19,6 +18,7 @@ from photogram.formats.metadata.said import (
 )
 from photogram.io.files import read_lines
 from photogram.io.places import Place
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 from photogram.network.geometry import Spheroid, lengths_of_units
 
@@ -47,7 +47,7 @@ class Exposure:
     sd
         Standard deviations of east, north and height, metres; None without usable ones.
     flag
-        Of the solution, as :func:`photogram.formats.metadata.said.fix_of` knows it.
+        Of the solution, as :func:`photogram.formats.metadata.record.fix_of` knows it.
     place
         Where it stands.
     """

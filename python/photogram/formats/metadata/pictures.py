@@ -9,7 +9,7 @@ from typing import Any
 
 from photogram.errors import InputError
 from photogram.formats.metadata.exif import said_by_tags
-from photogram.formats.metadata.said import Said
+from photogram.formats.metadata.record import Said
 from photogram.formats.metadata.xmp import said_by_packet
 from photogram.io.files import reading
 from photogram.io.places import Place

@@ -14,7 +14,7 @@ from photogram.arguments.types import Floats
 from photogram.formats.column_words import words_of
 from photogram.formats.columns import PLAIN, is_geographic, settled
 from photogram.formats.metadata.pictures import ENDINGS
-from photogram.formats.metadata.said import (
+from photogram.formats.metadata.record import (
     UNSAID,
     UNSAID_SYSTEM,
     Said,

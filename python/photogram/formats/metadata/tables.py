@@ -8,9 +8,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from photogram.errors import InputError
-from photogram.formats.metadata.located import LEVER_SD, SHIFT_SD, Located, located
 from photogram.formats.metadata.merged import Metadata
-from photogram.formats.metadata.said import ELLIPSOIDAL
+from photogram.formats.metadata.record import ELLIPSOIDAL
+from photogram.formats.metadata.systems import LEVER_SD, SHIFT_SD, Located, located
 from photogram.formats.plain.schema import AXES, deviation_columns
 from photogram.io.csv_text import csv_text
 
@@ -35,7 +35,7 @@ def gnss_files(
     path
         Of the table.
     crs, sd
-        As :func:`photogram.formats.metadata.located.located` takes them.
+        As :func:`photogram.formats.metadata.systems.located` takes them.
 
     Raises
     ------

@@ -10,7 +10,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from pathlib import Path
 
-from photogram.formats.metadata.said import (
+from photogram.formats.metadata.record import (
     ELLIPSOIDAL,
     UNSAID,
     UNSAID_SYSTEM,

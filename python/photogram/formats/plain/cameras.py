@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, cast, get_args
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field, replace
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
@@ -17,9 +16,10 @@ from photogram.formats.plain.knots import with_knots
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera, Weights
-from photogram.network.timed import LineSensor, Shutter
+from photogram.network.moving_photos import LineSensor, Shutter
 
 if TYPE_CHECKING:
     from photogram.film import Certificate

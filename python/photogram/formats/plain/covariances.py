@@ -9,11 +9,11 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
+from photogram.formats.plain.common_unknowns import made, word_of
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.shared import made, word_of
 from photogram.formats.plain.tables import DEGREE, Tables
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed, quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera

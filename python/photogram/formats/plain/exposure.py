@@ -11,15 +11,15 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.image_axes import from_tables, in_unit, to_tables
-from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.timed import Direction, LineSensor, Shutter, Timed
+from photogram.network.moving_photos import Direction, LineSensor, Shutter, Timed
 from photogram.network.trajectories import Readout
 
 __all__ = ["LINE", "OF_LINES", "Exposure", "exposure_columns", "line_sensors", "of_cameras", "shutters"]

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.plain.certificates import certificate_marks, definite
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.tables import Tables
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.films import Mark
 from photogram.network.observations import KnownTogether, Observation
 

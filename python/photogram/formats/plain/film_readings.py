@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import is_mirrored, mirror_message, side_residuals, true_places
-from photogram.film.which import which_mark
+from photogram.film.mark_identity import which_mark
 from photogram.formats.plain.film_sides import Laid, Lying, Seen, way_by_images
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import FALSE, TRUE, ColumnTable
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, quoted
 
 __all__ = ["MarkReadings", "ScannedPhoto"]

@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.film.interior import conformal
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.images import Images
 from photogram.formats.plain.photos import Photos
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Expected", "Laid", "Lying", "Seen", "way_by_images"]
 

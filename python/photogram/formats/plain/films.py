@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass, field, replace
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import (
     FilmModel,
@@ -18,6 +17,7 @@ from photogram.film.interior import (
     interior_orientation,
 )
 from photogram.formats.plain.cameras import Cameras
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.fiducials import read_fiducials
 from photogram.formats.plain.film_mistakes import beyond_message, mark_remarks, scale_message
@@ -26,8 +26,8 @@ from photogram.formats.plain.film_sides import Lying, Seen
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
-from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
 from photogram.network.films import (

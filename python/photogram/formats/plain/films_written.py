@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field, replace
 from photogram.errors import InputError
 from photogram.formats.plain.scanners import BENDS, CURVES, GRID, LOCAL, Machine
 from photogram.formats.project import Project
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.films import Film, Mark, Reseau, Scan
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 from photogram.network.unknowns import Unknown

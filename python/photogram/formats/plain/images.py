@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.image_axes import from_tables, in_unit
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 
 __all__ = ["Images", "image_coordinates", "read_images", "sd_is_given"]

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.schema import ANGLES, AXES, deviation_columns
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.transform import Transform
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed, quoted
 from photogram.network.observations import Attitude, Observation
 

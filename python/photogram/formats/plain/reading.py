@@ -11,7 +11,6 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
@@ -28,8 +27,8 @@ from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.film_sides import Seen
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
-from photogram.formats.plain.moving import placed, read_timed
-from photogram.formats.plain.observed import read_observations
+from photogram.formats.plain.moving_photos import placed, read_timed
+from photogram.formats.plain.observed_poses import read_observations
 from photogram.formats.plain.photos import Photos, read_photos
 from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames
 from photogram.formats.plain.schema import AXES
@@ -43,11 +42,12 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, Unused, assembled
 from photogram.formats.rigging import Stand, mounted
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import quoted
 from photogram.network.geometry import Spheroid
+from photogram.network.moving_photos import Timed
 from photogram.network.observations import Control, Observation, of_records
 from photogram.network.rigs import Mount
-from photogram.network.timed import Timed
 from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
 
@@ -167,7 +167,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     project = project.replace(block=read_bends(tables, boards, project.block))
     _check_features(settings, points.names)
     if control is not None and given is not None:
-        from photogram.formats.exchanged import check_systems
+        from photogram.formats.control_system import check_systems
 
         rows = np.array([places[name] for name in given.names], dtype=np.int64)
         check_systems(project, settings, control, rows, control.vectors(AXES), free=False)

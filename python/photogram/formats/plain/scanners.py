@@ -10,11 +10,11 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
-from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, nearest, quoted
 from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, Scanner, ScannerCurve, Weights
 from photogram.network.observations import KnownTogether

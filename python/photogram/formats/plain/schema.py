@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from photogram import _photocore
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 
 __all__ = [
     "ALL_ANGLES",

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from photogram.declared import dataclass, field, fields, replace
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable, Names
+from photogram.lazy_dataclasses import dataclass, field, fields, replace
+from photogram.network.moving_photos import Timed
 from photogram.network.rigs import Mount
-from photogram.network.timed import Timed
 from photogram.network.unknowns import Sensor
 
 __all__ = ["Seam", "mounted_halves", "with_seams"]

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, cast
 
 from photogram.arguments.arrays import shown
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes
@@ -20,6 +19,7 @@ from photogram.formats.plain.sections import Sections
 from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.toml import day_of
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 

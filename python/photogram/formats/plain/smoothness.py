@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, BASES, FACTORS, deviation_columns
-from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import DEGREE, Tables, correlations, covariances_of
 from photogram.formats.plain.trajectories import trajectory_rows
 from photogram.formats.plain.trajectories_written import shared_trajectories

@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.plain.sections import Sections
 from photogram.formats.sentences import read_sentences
 from photogram.io.toml import quoted_text
-from photogram.results.statement.asked import Asked, length_of
+from photogram.results.statement.request import Asked, length_of
 from photogram.results.statement.texts import Texts
 
 __all__ = ["KEYS", "asked_files", "asked_lines", "read_asked"]
@@ -28,7 +28,7 @@ KEYS: Mapping[str, tuple[str, ...]] = {
 """Of the sections."""
 CLASS = "class_"
 _NAMES = {"length_limit": "limit"}
-"""Keys that are called otherwise in :class:`photogram.results.statement.asked.Asked`."""
+"""Keys that are called otherwise in :class:`photogram.results.statement.request.Asked`."""
 SENTENCES = "sentences.toml"
 """The file that sentences are written to."""
 

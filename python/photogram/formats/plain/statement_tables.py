@@ -11,7 +11,7 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.io.toml import TomlFile
 from photogram.messages import quoted
-from photogram.results.statement.asked import Asked
+from photogram.results.statement.request import Asked
 
 __all__ = ["COVERS", "asked_of", "lengths_table", "read_cover"]
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from photogram.declared import dataclass
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted, quoted
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Range, Rate, Velocity

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
 from photogram.formats.column_words import UNITS
 from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
+from photogram.formats.plain.common_unknowns import Shared
 from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns
 from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.shared import Shared
 from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block

@@ -10,12 +10,12 @@ from typing import cast, get_args
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, replace
 from photogram.errors import InputError
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, BASES, VELOCITY, deviation_columns
-from photogram.formats.plain.shared import made
 from photogram.formats.plain.tables import Tables, indices_of, vectors_of
 from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import quoted
 from photogram.network.trajectories import (
     Angles,

@@ -15,8 +15,8 @@ from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_column
 from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.image_axes import to_tables
 from photogram.formats.plain.knots import knots_table
-from photogram.formats.plain.moving import line_times_table, moving_columns
-from photogram.formats.plain.observed import observed_tables
+from photogram.formats.plain.moving_photos import line_times_table, moving_columns
+from photogram.formats.plain.observed_poses import observed_tables
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
@@ -31,9 +31,9 @@ from photogram.io.toml import quoted_text
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.film_reduction import camera_unit
+from photogram.network.moving_photos import LineSensor
 from photogram.network.observations import Control, Position
-from photogram.network.refined import camera_unit
-from photogram.network.timed import LineSensor
 from photogram.results.features import Definition
 
 __all__ = ["attitude_matrices", "camera_table", "cannot_hold", "control_table", "known_cameras", "write"]

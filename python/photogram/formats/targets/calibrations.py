@@ -20,8 +20,8 @@ from photogram.network.cameras import Camera
 from photogram.network.passages import Figure
 from photogram.network.unknowns import Sensor
 from photogram.targets.board import Board
-from photogram.targets.calibrated import Calibrated
 from photogram.targets.calibration import Calibration
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners
 from photogram.targets.motion import motion_of
 from photogram.targets.reading import read

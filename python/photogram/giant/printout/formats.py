@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import degrees_minutes_seconds
 
 __all__ = ["VALUE", "Space", "attitude", "attitude_name", "dms", "exponential", "fixed"]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from photogram.declared import dataclass
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.printout.formats import Space, Values, attitude, attitude_name, dms, fixed
 from photogram.giant.printout.pages import Page, headed, paginate
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Station", "frame_pages"]
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.giant.printout.formats import fixed
 from photogram.giant.printout.pages import Page, headed, paginate
+from photogram.lazy_dataclasses import dataclass
 from photogram.results.result import SumsOfSquares
 
 __all__ = ["PointResiduals", "residual_pages", "statistics"]

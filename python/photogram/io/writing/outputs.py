@@ -13,12 +13,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO, Self
 
-from photogram.declared import dataclass
 from photogram.io.writing.guard import Guard
 from photogram.io.writing.interruption import deferred
 from photogram.io.writing.markers import clear_marks, mark, unmark
 from photogram.io.writing.staging import NEW, Staging, remove_leftovers, sync_directory
 from photogram.io.writing.targets import Target, naming
+from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer

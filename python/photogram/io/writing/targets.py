@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Target", "follow", "naming"]
 

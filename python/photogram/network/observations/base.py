@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Sensor
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import AXES, Observation
 
 __all__ = ["Control"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Instrument
 

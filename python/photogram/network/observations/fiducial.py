@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import names, shaped, shown
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
 from photogram.network.observations.observation import Observation

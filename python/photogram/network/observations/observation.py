@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.arrays import is_covariance, names, number, shaped, shown
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
-from photogram.network.timed import Moment
+from photogram.lazy_dataclasses import dataclass, field
+from photogram.network.moving_photos import Moment
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Unknown, rotation
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.observations.observation import AXES, Observation
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Drift, LeverArm, Shift, Unknown

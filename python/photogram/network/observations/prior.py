@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import shaped
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Unknown
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import Observation
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Instrument

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import ROTATIONS, Observation
 from photogram.network.trajectories import Clock, GyroBias, Trajectory
 from photogram.network.unknowns import Boresight

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import shaped, shown
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import Observation, all_trajectories
 from photogram.network.trajectories import Coefficient, Trajectory
 from photogram.network.unknowns import Unknown

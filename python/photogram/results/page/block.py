@@ -18,8 +18,8 @@ from photogram.results.report import size_of
 from photogram.results.result import Result
 from photogram.results.tables import redundancy_by_kind, unknowns
 from photogram.show.cells import page_table, unit_written
+from photogram.show.methods import page_of
 from photogram.show.page import Fact, Page, Section, Table, significant
-from photogram.show.ways import page_of
 
 __all__ = ["block_page"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photogram.results.films_told import film_table, form_table, mark_table, scanner_table
+from photogram.results.film_report import film_table, form_table, mark_table, scanner_table
 from photogram.results.result import Result
 from photogram.show.cells import page_table
 from photogram.show.page import Drawing, Part, Section

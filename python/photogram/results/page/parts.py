@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
-from photogram.results.observed import tested_singly
-from photogram.results.page.observed import Worst, limit_of, worst_images, worst_of, worst_table
+from photogram.results.observation_rows import tested_singly
+from photogram.results.page.observations import Worst, limit_of, worst_images, worst_of, worst_table
 from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import photos_section, points_section
 from photogram.results.report import ORDERINGS, problems_of

@@ -10,10 +10,10 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import counted
 from photogram.results.axes import point_axes
-from photogram.results.kinds import ObservedKind
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.network_tables import Terms, control, part, photos, points, stations, terms_of
-from photogram.results.observed import is_held
+from photogram.results.observation_kinds import ObservedKind
+from photogram.results.observation_rows import is_held
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observations, unheld
 from photogram.results.weakest import weakest_photos, weakest_points

@@ -9,8 +9,8 @@ from dataclasses import replace
 from photogram.results.components import VarianceComponents, statement
 from photogram.results.components_picture import figure_of_components
 from photogram.show.judgement import judged
+from photogram.show.methods import page_of
 from photogram.show.page import Column, Drawing, Page, Part, Remarks, Row, Section, Table
-from photogram.show.ways import page_of
 from photogram.statistics.components import Component
 
 __all__ = ["components_page", "components_section", "reweighed_page", "weighed_page"]

@@ -12,9 +12,9 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
-from photogram.results.statement import words
+from photogram.results.statement import translation
 from photogram.results.statement.budget import Budget, budget_line
-from photogram.results.statement.compared import in_order
+from photogram.results.statement.comparison import in_order
 from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import overlap
 from photogram.results.statement.figures import Figures
@@ -137,7 +137,7 @@ def left_out_annex(found: Statement) -> Section:
 def budgets_annex(found: Statement) -> Section:
     """Return annex C: what every source of error contributes."""
     texts = found.texts
-    held = words.held(texts, found.result) or texts("annex.c.nothing")
+    held = translation.held(texts, found.result) or texts("annex.c.nothing")
     parts: list[Part] = []
     for each in found.taken_apart:
         parts += _budget(found, each)
@@ -160,7 +160,7 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
         nu = own.freedom.of_kind.get(each.name, math.inf) if estimated else math.inf
         rows.append(
             [
-                words.kind(texts, each.name),
+                translation.kind(texts, each.name),
                 each.number,
                 cells.figures(each.u, 2),
                 cells.number(100 * each.share, 1),
@@ -172,7 +172,7 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
     if len(own.at("camera")) < 2:
         finer = [each for each in finer if each.level != "camera"]
     for each in sorted(finer, key=lambda one: -one.contribution)[:SOURCES]:
-        of = words.parameter(texts, each.name) if each.level == "parameter" else each.name
+        of = translation.parameter(texts, each.name) if each.level == "parameter" else each.name
         name = texts(f"level.{each.level}", name=of)
         share = cells.number(100 * each.share, 1)
         rows.append([f"– {name}", each.number, cells.figures(each.u, 2), share, None, ""])
@@ -186,7 +186,7 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
     ]
     observed: list[Row] = [
         [
-            words.observation(texts, each.observation),
+            translation.observation(texts, each.observation),
             cells.figures(each.sd),
             cells.figures(each.sensitivity),
             cells.figures(math.sqrt(each.contribution), 2),
@@ -196,7 +196,7 @@ def _budget(found: Statement, own: Budget) -> list[Part]:
     ]
     return [
         Table(title, columns, rows),
-        Table(texts("table.single", quantity=words.quantity(texts, own.quantity)), single, observed),
+        Table(texts("table.single", quantity=translation.quantity(texts, own.quantity)), single, observed),
     ]
 
 
@@ -270,15 +270,17 @@ def adjustment_annex(found: Statement) -> Section:
     ]
     rows: list[Row] = []
     for name, (count, redundancy, squares) in kinds_of(result).items():
-        rows.append([words.kind(texts, name), count, cells.number(redundancy, 1), cells.number(squares, 1)])
+        rows.append(
+            [translation.kind(texts, name), count, cells.number(redundancy, 1), cells.number(squares, 1)]
+        )
     parts: list[Part] = [Table(texts("table.kinds"), columns, rows)]
     if result.verdict.tests:
         parts.append(_tests(found))
     if found.removed:
-        removed = [words.named(texts, each) for each in found.removed]
+        removed = [translation.named(texts, each) for each in found.removed]
         parts += [Facts(texts("table.removed"), []), Remarks(removed, 60)]
     parts += [*_markers(found), _overlap(found)]
-    intro = words.verdict(texts, result.verdict)
+    intro = translation.verdict(texts, result.verdict)
     return Section("annex-e", texts("annex.e"), parts, intro, annex=True)
 
 
@@ -293,7 +295,7 @@ def _tests(found: Statement) -> Table:
     ]
     rows: list[Row] = [
         [
-            words.test(texts, each.name),
+            translation.test(texts, each.name),
             signs_of(each.statistic),
             *(cells.figures(value, 4) for value in (each.value, *each.limits)),
             cells.p(each.p, each.level),
@@ -357,7 +359,7 @@ def survey_annex(found: Statement) -> Section:
     columns = [
         cells.column("point", text=True),
         cells.column("use", text=True),
-        *(Column(words.axis(texts, name), texts.word("unit", of)) for name, of in own.system.axes),
+        *(Column(translation.axis(texts, name), texts.word("unit", of)) for name, of in own.system.axes),
         *cells.columns(("sd",), unit),
     ]
     places = [8 if axis == "deg" else decimals for _, axis in own.system.axes]

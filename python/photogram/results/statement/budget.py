@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import grouped
 from photogram.results.result import Result
-from photogram.results.statement import words
+from photogram.results.statement import translation
 from photogram.results.statement.quantities import Wanted
 from photogram.results.statement.sources import Rows, kind_of
 from photogram.results.statement.texts import Texts
@@ -242,7 +242,7 @@ def budget_line(texts: Texts, found: Budget) -> str:
     numbers = (texts.number(each * factor, decimals) for each in (found.value, found.sd, found.expanded))
     value, u, expanded = (f"{each} {unit}".rstrip() for each in numbers)
     k, p = texts.number(found.k, 2), texts.percent(found.coverage)
-    named = words.quantity(texts, found.quantity)
+    named = translation.quantity(texts, found.quantity)
     return texts("budget.line", quantity=named, value=value, u=u, expanded=expanded, k=k, p=p)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
-from photogram.results.statement.compared import Compared
+from photogram.results.statement.comparison import Compared
 from photogram.results.statement.standards import Lengths
 from photogram.show.pictures import arrows, decimal_sign, ellipses, new_figure, round_length
 from photogram.show.style import BLUE, INK, SOFT, VERMILION

@@ -12,8 +12,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
-from photogram.results.statement.compared import Compared
+from photogram.lazy_dataclasses import dataclass
+from photogram.results.statement.comparison import Compared
 from photogram.results.statement.honest import (
     Bias,
     PointTests,

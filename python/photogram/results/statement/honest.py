@@ -14,8 +14,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
-from photogram.results.statement.compared import PARTS, Compared
+from photogram.lazy_dataclasses import dataclass
+from photogram.results.statement.comparison import PARTS, Compared
 from photogram.statistics.agreement import SINGULAR, quadratic, root_of, scale_of
 from photogram.statistics.distributions import critical_normal
 from photogram.statistics.error_radii import circular_error

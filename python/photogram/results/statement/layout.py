@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
 from photogram.network.neighbours import nearest
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations import Control
 from photogram.results.result import Result
-from photogram.results.statement.compared import in_order, turned_to_east
+from photogram.results.statement.comparison import in_order, turned_to_east
 from photogram.results.statement.honest import LEVEL
 
 __all__ = ["LeftOut", "leave_one_out", "limit_of"]

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import frozen, indices, is_covariance, names, numbers, shaped
 from photogram.arguments.types import Bools, Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.results.statement.budget import Budget
-from photogram.results.statement.compared import Compared
+from photogram.results.statement.comparison import Compared
 from photogram.results.statement.figures import Figures, Radius
 from photogram.results.statement.honest import Bias, PointTests, Prediction, Surface
 from photogram.results.statement.leave_one_out import LeftOut

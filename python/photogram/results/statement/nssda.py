@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import numbers
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.error_radii import circular_error
 
 __all__ = ["ENOUGH", "Nssda", "nssda"]

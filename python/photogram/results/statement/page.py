@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from photogram.results.features import Features
-from photogram.results.statement import words
+from photogram.results.statement import translation
 from photogram.results.statement.annexes import (
     adjustment_annex,
     budgets_annex,
@@ -19,13 +19,14 @@ from photogram.results.statement.annexes import (
     left_out_annex,
     survey_annex,
 )
-from photogram.results.statement.compared import control_places
+from photogram.results.statement.comparison import control_places
 from photogram.results.statement.drawings import differences
 from photogram.results.statement.drawings import lengths as drawn_lengths
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
+from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
@@ -41,7 +42,6 @@ from photogram.show.page import (
     Text,
     decimals_of,
 )
-from photogram.show.ways import page_of
 
 __all__ = ["statement_page"]
 
@@ -203,7 +203,7 @@ def _features(texts: Texts, features: Features) -> Table:
     ]
     rows: list[Row] = []
     for each in features:
-        name = f"{each.name}: {words.feature(texts, each)}"
+        name = f"{each.name}: {translation.feature(texts, each)}"
         for own in each.quantities:
             alike = np.array([other.sd for other in each.quantities if other.unit == own.unit])
             decimals = decimals_of(alike, smallest=True)

@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Indices
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import nearest
 from photogram.network.block import Block
 from photogram.network.rays import local_axes

@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
 from photogram.results.statement.budget import Budget
-from photogram.results.statement.compared import Compared
+from photogram.results.statement.comparison import Compared
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.statement import Statement

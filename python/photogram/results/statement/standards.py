@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass, field
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import counted
 from photogram.network.observations import Control
 from photogram.results.result import Result
 from photogram.results.statement import asprs
-from photogram.results.statement.asked import Asked, lengths_in
-from photogram.results.statement.compared import Compared, plan_positions, turned_jointly, turned_to_east
+from photogram.results.statement.comparison import Compared, plan_positions, turned_jointly, turned_to_east
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.iso_19157 import RELATIVE, measures
 from photogram.results.statement.layout import area_in_plan
@@ -31,6 +30,7 @@ from photogram.results.statement.lengths import (
 )
 from photogram.results.statement.nssda import Nssda, nssda
 from photogram.results.statement.quantities import hint
+from photogram.results.statement.request import Asked, lengths_in
 
 __all__ = ["Asprs", "Lengths", "Standards", "standards"]
 

@@ -7,25 +7,25 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import nearest
 from photogram.results.result import Result
-from photogram.results.statement.asked import Asked
 from photogram.results.statement.budget import Budget, budgets
-from photogram.results.statement.compared import Compared
+from photogram.results.statement.comparison import Compared
 from photogram.results.statement.figures import Figures
-from photogram.results.statement.judged import Judged
+from photogram.results.statement.given_coordinates import NOTHING, Survey
+from photogram.results.statement.judgement import Judged
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.quantities import wanted
+from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import Standards
-from photogram.results.statement.surveyed import NOTHING, Survey
 from photogram.results.statement.texts import Texts
-from photogram.show.brief import Brief, Rows
+from photogram.show.methods import document_of, page_of
 from photogram.show.run import InputFile
-from photogram.show.ways import document_of, page_of
+from photogram.show.summary import Brief, Rows
 
 __all__ = ["Statement"]
 

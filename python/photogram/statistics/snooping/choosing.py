@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import LEVEL, critical_chi_square, critical_fisher
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial

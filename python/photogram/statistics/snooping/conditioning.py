@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.groups import INVISIBLE, GroupTests, group_tests
 
 __all__ = ["Chosen", "Conditional", "UnitWeight"]

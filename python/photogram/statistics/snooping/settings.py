@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import LEVEL
 
 __all__ = ["Settings"]

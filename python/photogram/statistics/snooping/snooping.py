@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.snooping.choosing import Choice
 from photogram.statistics.snooping.consensus import begun
 from photogram.statistics.snooping.factors import scales

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.declared import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["Aside", "LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]

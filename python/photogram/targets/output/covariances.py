@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from photogram.io import json
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 
 __all__ = ["FILE", "cameras_covariance"]
 

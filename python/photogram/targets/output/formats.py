@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.output.kalibr import kalibr_camchain
 from photogram.targets.output.mrcal import mrcal_models
 from photogram.targets.output.opencv import opencv_yaml

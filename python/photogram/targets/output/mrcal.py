@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.network.knots import KNOTTED
 from photogram.results.cameras import AdjustedCamera
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corner_files import KEY
 from photogram.targets.mrcal_lenses import PREFIX
 from photogram.targets.mrcal_model import INDICES

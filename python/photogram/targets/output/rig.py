@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.targets.calibrated import Calibrated
+from photogram.targets.calibration_result import Calibrated
 from photogram.targets.vision import inverted
 
 __all__ = ["Rig", "rig_of"]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.declared import dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 
 __all__ = ["FISHEYE_TERMS", "TERMS", "Terms", "terms_of"]

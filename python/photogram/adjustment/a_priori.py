@@ -1,0 +1,160 @@
+"""What is known of a block before its photos have poses, in cartesian axes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import dataclass
+from photogram.network import geometry
+from photogram.network.block import Block
+from photogram.network.geometry import Spheroid
+from photogram.network.motion import on_shared, scanners
+from photogram.network.observations import Attitude, Control, Position
+from photogram.network.unknowns import Boresight, LeverArm
+
+__all__ = ["Cartesian", "Known"]
+
+
+@dataclass(frozen=True)
+class Cartesian:
+    """The cartesian axes of a block: its own when rectangular, else geocentric.
+
+    Attributes
+    ----------
+    spheroid
+        Of geographic space; None for rectangular space.
+    """
+
+    spheroid: Spheroid | None
+
+    @classmethod
+    def of(cls, block: Block) -> Cartesian:
+        """Return the axes of a block."""
+        return cls(block.spheroid)
+
+    def positions(self, positions: Floats) -> Floats:
+        """(n, 3) positions of the block in these axes; NaN where unknown."""
+        if self.spheroid is None:
+            return positions
+        return geometry.geographic_to_geocentric(positions, self.spheroid)
+
+    def from_cartesian(self, positions: Floats) -> Floats:
+        """Turn positions of these axes back into those of the block."""
+        if self.spheroid is None or not len(positions):
+            return positions
+        return geometry.geocentric_to_geographic(positions, self.spheroid)
+
+    def from_local(self, attitudes: Floats, positions: Floats) -> Floats:
+        """(n, 3, 3) attitudes in these axes, of those in the local frames at positions of the block."""
+        if self.spheroid is None:
+            return attitudes
+        turned: Floats = geometry.local_frames(positions).transpose(0, 2, 1) @ attitudes
+        return turned
+
+    def to_local(self, attitudes: Floats, positions: Floats) -> Floats:
+        """Turn attitudes of these axes back into the local frames at positions of the block."""
+        if self.spheroid is None:
+            return attitudes
+        turned: Floats = geometry.local_frames(positions) @ attitudes
+        return turned
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is known of P photos and n points; NaN where nothing is.
+
+    Attributes
+    ----------
+    positions, attitudes
+        (P, 3) and (P, 3, 3), photo to object: given poses, both parts or none.
+    observed_positions, observed_attitudes
+        The same of photos without a given pose, as observed or given by halves.
+    points, point_sd
+        (n, 3) positions of control, and their standard deviations; infinite where they are not held.
+    """
+
+    positions: Floats
+    attitudes: Floats
+    observed_positions: Floats
+    observed_attitudes: Floats
+    points: Floats
+    point_sd: Floats
+
+    @classmethod
+    def of(cls, block: Block, axes: Cartesian) -> Known:
+        """Return what a block knows."""
+        positions = axes.positions(block.photo_positions)
+        attitudes = axes.from_local(_matrices(block, block.photo_attitudes), block.photo_positions)
+        given = np.asarray(np.isfinite(np.column_stack([positions, attitudes.reshape(-1, 9)])).all(axis=1))
+        # No picture has the pose of a photo that is on a trajectory with others, or line by line.
+        given &= ~(on_shared(block) | scanners(block))
+        observed = block.photo_positions_observed
+        centres = positions.copy()
+        if observed is not None:
+            weighted = np.isfinite(block.photo_position_sd).all(axis=1) & np.isfinite(observed).all(axis=1)
+            centres[weighted] = axes.positions(observed)[weighted]
+        turned = attitudes.copy()
+        if (angles := block.photo_attitudes_observed) is not None:
+            weighted = np.isfinite(block.photo_attitude_sd).all(axis=1) & np.isfinite(angles).all(axis=1)
+            turned[weighted] = axes.from_local(_matrices(block, angles), block.photo_positions)[weighted]
+        _take_observations(block, axes, centres, turned)
+        points, sd = _control(block, axes)
+        return cls(
+            positions=np.where(given[:, np.newaxis], positions, np.nan),
+            attitudes=np.where(given[:, np.newaxis, np.newaxis], attitudes, np.nan),
+            observed_positions=centres,
+            observed_attitudes=turned,
+            points=points,
+            point_sd=sd,
+        )
+
+
+def _matrices(block: Block, angles: Floats) -> Floats:
+    """(P, 3, 3) attitudes, photo to object (or to the local frame), of angles; NaN where they are."""
+    matrices = geometry.rotation_matrix(angles)
+    return matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
+
+
+def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: Floats) -> None:
+    """Put observed attitudes, A_obs B', and positions, less their lever arms, in place."""
+    place = {name: row for row, name in enumerate(block.photo_ids)}
+    of_photos = [each for each in block.observations if each.moment is None]
+    positions = [each for each in of_photos if isinstance(each, Position)]
+    for antenna in positions:
+        centres[place[antenna.photos[0]]] = axes.positions(antenna.observed[np.newaxis, :3])[0]
+        if antenna.shift is not None and axes.spheroid is None:
+            centres[place[antenna.photos[0]]] -= antenna.shift.position
+    for each in of_photos:
+        if isinstance(each, Attitude):
+            row = place[each.photos[0]]
+            given, known = each.boresight, each.observed[9:18].reshape(3, 3)
+            boresight = given.attitude if isinstance(given, Boresight) else known
+            own = each.observed[:9].reshape(3, 3) @ boresight.T
+            at = axes.from_cartesian(centres[row : row + 1])
+            turned[row] = axes.from_local(own[np.newaxis], at)[0]
+    for antenna in positions:
+        row = place[antenna.photos[0]]
+        if np.isfinite(turned[row]).all():
+            unknown = antenna.lever_arm
+            arm = unknown.position if isinstance(unknown, LeverArm) else antenna.observed[3:6]
+            centres[row] -= turned[row] @ arm
+
+
+def _control(block: Block, axes: Cartesian) -> tuple[Floats, Floats]:
+    """Return positions and standard deviations of control, in cartesian axes."""
+    points, sd = block.point_positions.copy(), block.point_sd.copy()
+    place = {name: row for row, name in enumerate(block.point_ids)}
+    for each in block.observations:
+        if isinstance(each, Control):
+            points[place[each.point]] = each.observed
+            sd[place[each.point]] = np.sqrt(np.diagonal(each.precision))
+    held = np.isfinite(sd)
+    points[~held.any(axis=1)] = np.nan
+    if axes.spheroid is not None:
+        # Only full control has a place in geocentric axes; one standard deviation stands for all three.
+        full = held.all(axis=1, keepdims=True)
+        metric = sd * [axes.spheroid.a, axes.spheroid.a, 1.0]
+        sd = np.where(full, np.broadcast_to(metric.max(axis=1, keepdims=True), sd.shape), np.inf)
+        points = np.where(full, axes.positions(points), np.nan)
+    return points, sd

@@ -1,0 +1,240 @@
+"""First values of planes, lines, levels, boresights and sensors of rigs, from points and photos."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from photogram.adjustment.a_priori import Cartesian, Known
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.network import geometry
+from photogram.network.block import Block
+from photogram.network.cameras import rays_of_row
+from photogram.network.observations import Attitude, Observation
+from photogram.network.rays import meet
+from photogram.network.rigs import Mount
+from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
+
+__all__ = ["started"]
+
+FLAT = 1e-3
+"""Points of a plane whose spread across their longest extent is less, in parts of this, lie on a line."""
+
+
+def started(block: Block) -> Block:
+    """Return a block whose common unknowns all have values to start from.
+
+    Planes and lines follow the principal axes of their points, which stand at their given places or where
+    their rays meet; plumb lines go through their middle, levels have their mean height. A boresight is the
+    chordal mean of A' A_obs, a sensor the median of positions and the chordal mean of rotations in the frames
+    of its photos (the rotation nearest to the mean of matrices).
+
+    Parameters
+    ----------
+    block
+        With poses of the photos that are needed.
+
+    Raises
+    ------
+    InputError
+        An unknown whose points or photos do not give it.
+    """
+    waiting = [each for each in block.unknowns if each.is_open]
+    if not waiting:
+        return block
+    sites = _Sites(block)
+    found: dict[int, Unknown] = {}
+    for each in waiting:
+        own = [one for one in block.observations if any(other is each for other in one.unknowns)]
+        found[id(each)] = _FINDERS[type(each)](sites, each, own)
+    return block.replace(
+        observations=[_with(each, found) for each in block.observations],
+        mounts=[_on(each, found) for each in block.mounts],
+    )
+
+
+def _with(observation: Observation, found: Mapping[int, Unknown]) -> Observation:
+    """Return an observation with unknowns that have their values."""
+    if not observation.UNKNOWNS:
+        return observation
+    changes: dict[str, Any] = {
+        name: found[id(each)]
+        for (name, _), each in zip(observation.UNKNOWNS, observation.unknowns, strict=True)
+        if id(each) in found
+    }
+    return replace(observation, **changes) if changes else observation
+
+
+def _on(mount: Mount, found: Mapping[int, Unknown]) -> Mount:
+    """Return a mount whose sensor has its values."""
+    sensor = found.get(id(mount.sensor))
+    return replace(mount, sensor=sensor) if isinstance(sensor, Sensor) else mount
+
+
+class _Sites:
+    """Where points and photos of a block are before its adjustment, in cartesian axes."""
+
+    def __init__(self, block: Block) -> None:
+        self.block, self.axes = block, Cartesian.of(block)
+        self.known = Known.of(block, self.axes)
+        self.points = {name: row for row, name in enumerate(block.point_ids)}
+        self.photos = {name: row for row, name in enumerate(block.photo_ids)}
+
+    def places(self, names: Sequence[str], of: Unknown, least: int) -> Floats:
+        """Return (k, 3) places of points, those that have one; `least` are needed."""
+        rows = np.array(sorted({self.points[name] for name in names}), dtype=np.int64)
+        places = self.axes.positions(self.block.point_positions)[rows]
+        unknown = ~np.isfinite(places).all(axis=1)
+        places[unknown] = self._met(rows[unknown])
+        found = places[np.isfinite(places).all(axis=1)]
+        if len(found) < least:
+            raise InputError(
+                f"{of.title} has no value to start from: {len(found)} of its {len(rows)} points have a place,"
+                f" by coordinates or by rays of photos with poses, and {least} are needed"
+            )
+        return np.asarray(found)
+
+    def _met(self, rows: Indices) -> Floats:
+        """Return (k, 3) where the rays of points meet."""
+        block, known = self.block, self.known
+        images = np.flatnonzero(np.isin(block.image_points, rows))
+        photos = block.image_photos[images]
+        posed = np.isfinite(known.attitudes[photos]).all(axis=(1, 2))
+        images, photos = images[posed], photos[posed]
+        inner = np.full((len(images), 3), np.nan)
+        cameras, of_photo = block.core_cameras()
+        for row in np.unique(of_photo[photos]):
+            own = of_photo[photos] == row
+            inner[own] = rays_of_row(cameras[row], block.image_xy[images[own]])
+        seen = np.isfinite(inner).all(axis=1)
+        images, photos = images[seen], photos[seen]
+        rays = np.einsum("mij,mj->mi", known.attitudes[photos], inner[seen])
+        across = np.eye(3) - rays[:, :, np.newaxis] * rays[:, np.newaxis]
+        # Counted from a photo: geocentric coordinates are large.
+        first = known.positions[photos[0]] if len(photos) else np.zeros(3)
+        right = np.einsum("mij,mj->mi", across, known.positions[photos] - first)
+        normal, constant, count = np.zeros((len(rows), 3, 3)), np.zeros((len(rows), 3)), np.zeros(len(rows))
+        place = np.searchsorted(rows, block.image_points[images])
+        np.add.at(normal, place, across)
+        np.add.at(constant, place, right)
+        np.add.at(count, place, 1.0)
+        return meet(normal, constant, count) + first
+
+    def local(self, middle: Floats) -> Floats:
+        """Return (3, 3) the axes X, Y, Z or, in geographic space, east, north, up at a place, as rows."""
+        if self.axes.spheroid is None:
+            return np.eye(3)
+        return np.asarray(geometry.local_frames(self.axes.from_cartesian(middle[np.newaxis]))[0])
+
+    def place(self, position: Floats) -> Floats:
+        """Return (3,) a place in coordinates of the block."""
+        return np.asarray(self.axes.from_cartesian(position[np.newaxis])[0])
+
+
+def _points(observations: Sequence[Observation]) -> list[str]:
+    return [name for each in observations for name in each.points]
+
+
+def _plane(sites: _Sites, plane: Unknown, own: Sequence[Observation]) -> Unknown:
+    places = sites.places(_points(own), plane, 3)
+    middle, axes, spread = _principal(places)
+    if spread[1] <= FLAT * spread[0]:
+        raise InputError(f"{plane.title} has no value to start from: its points lie on a line")
+    return plane.replace(normal=sites.local(middle) @ axes[2], through=sites.place(middle))
+
+
+def _line(sites: _Sites, line: Unknown, own: Sequence[Observation]) -> Unknown:
+    middle, axes, spread = _principal(sites.places(_points(own), line, 2))
+    if not spread[0] > 0:
+        raise InputError(f"{line.title} has no value to start from: its points lie at one place")
+    return line.replace(direction=sites.local(middle) @ axes[0], through=sites.place(middle))
+
+
+def _plumb_line(sites: _Sites, line: Unknown, own: Sequence[Observation]) -> Unknown:
+    return line.replace(through=sites.place(sites.places(_points(own), line, 1).mean(axis=0)))
+
+
+def _level(sites: _Sites, level: Unknown, own: Sequence[Observation]) -> Unknown:
+    heights = []
+    for each in own:
+        row = sites.points[each.points[0]]
+        height = sites.block.point_positions[row, 2]
+        if not np.isfinite(height):
+            met = sites._met(np.array([row]))
+            height = sites.axes.from_cartesian(met)[0, 2] if np.isfinite(met).all() else np.nan
+        heights.append(height - each.observed[0])
+    if not np.isfinite(heights).any():
+        raise InputError(f"{level.title} has no value to start from: none of its points has a height")
+    return level.replace(height=float(np.nanmean(heights)))
+
+
+def _boresight(sites: _Sites, boresight: Unknown, own: Sequence[Observation]) -> Unknown:
+    turns = []
+    for each in own:
+        if isinstance(each, Attitude) and each.moment is not None:
+            table, time = each.moment.trajectory.table, each.moment.time
+            about = table.attitudes[np.argmin(np.abs(table.attitude_times - time))]
+            turns.append(about.T @ each.observed[:9].reshape(3, 3))
+        elif isinstance(each, Attitude):
+            row = sites.photos[each.photos[0]]
+            at = sites.block.photo_positions[row : row + 1]
+            observed = sites.axes.from_local(each.observed[:9].reshape(1, 3, 3), at)[0]
+            turns.append(sites.known.attitudes[row].T @ observed)
+    # Photos that have no pose start from the observed attitude, as if the body were the photo.
+    posed = [turn for turn in turns if np.isfinite(turn).all()]
+    return boresight.replace(value=_mean_rotation(posed) if posed else np.eye(3))
+
+
+def _sensor(sites: _Sites, sensor: Unknown, own: Sequence[Observation]) -> Unknown:
+    known = sites.known
+    pairs = [
+        (sites.photos[each.frame], sites.photos[each.photo])
+        for each in sites.block.mounts
+        if each.sensor is sensor
+    ]
+    places, turns = [], []
+    for frame, photo in pairs:
+        to_frame = known.attitudes[frame].T
+        place, turn = (
+            to_frame @ (known.positions[photo] - known.positions[frame]),
+            to_frame @ known.attitudes[photo],
+        )
+        if np.isfinite(place).all() and np.isfinite(turn).all():
+            places.append(place)
+            turns.append(turn)
+    flown = [each.photo for each in sites.block.timed if each.sensor is sensor]
+    if not places and flown:
+        raise InputError(
+            f"{sensor.title} has no value to start from: the photo {flown[0]}, which has it, is on a"
+            " trajectory; give value and matrix"
+        )
+    if not places:
+        raise InputError(f"{sensor.title} has no value to start from: on no frame have both photos a pose")
+    return sensor.replace(value=np.median(places, axis=0), matrix=_mean_rotation(turns))
+
+
+_FINDERS: dict[type[Unknown], Callable[[_Sites, Unknown, Sequence[Observation]], Unknown]] = {
+    Plane: _plane,
+    Line: _line,
+    PlumbLine: _plumb_line,
+    Level: _level,
+    Boresight: _boresight,
+    Sensor: _sensor,
+}
+
+
+def _principal(places: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the middle of places, their principal axes (rows, the longest first), and spreads along them."""
+    middle = places.mean(axis=0)
+    _, spread, axes = np.linalg.svd(places - middle, full_matrices=True)
+    return middle, axes, np.concatenate([spread, np.zeros(3 - len(spread))])
+
+
+def _mean_rotation(turns: Sequence[Floats]) -> Floats:
+    """Return the rotation that is nearest to the mean of some."""
+    u, _, v = np.linalg.svd(np.mean(turns, axis=0))
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)

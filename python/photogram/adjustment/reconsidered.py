@@ -1,0 +1,151 @@
+"""What was left out before an adjustment, judged again by what it has found: its cameras, poses and points.
+
+First values come of cameras as they are given, and set aside what does not fit these: of a lens whose
+distortion is still unknown, images in the corners. Once cameras are calibrated, they are looked at again,
+until nothing returns. (What leaves an adjustment itself, points whose rays do not meet, is judged by cameras
+that are being calibrated, and anew in each of these adjustments.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from photogram.adjustment.a_priori import Cartesian, Known
+from photogram.adjustment.adjustment import adjust
+from photogram.adjustment.first_values import FirstValues, first_values
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.types import Bools
+from photogram.errors import AdjustmentError
+from photogram.messages import Message, counted
+from photogram.network.block import Block
+from photogram.network.directions import direction_deviations, image_directions
+from photogram.network.motion import timed_photos
+from photogram.network.subset import kept_images
+from photogram.results.result import Result
+
+__all__ = ["adjust_started"]
+
+FITS = 10.0
+"""Standard deviations, by the median of the images that take part, within which an image returns: the tests
+name what is wrong by so much, and the adjustment bears it; what is beyond would bend it."""
+MEDIAN_LENGTH = 1.1774
+"""The length of a vector with two components of standard deviation 1 has this median."""
+
+
+def adjust_started(started: FirstValues, *, by: Callable[..., Result] = adjust, **options: Any) -> Result:
+    """Adjust a block from first values, and judge what these set aside again by the adjusted block.
+
+    Images that fit the adjusted cameras, photos and points within ten standard deviations return, photos that
+    could not be started are tried again, and the block is adjusted again, until nothing returns. What stays
+    out is named in the verdict (`Result.set_aside`).
+
+    Parameters
+    ----------
+    started
+        First values of the block (:func:`photogram.first_values`).
+    by
+        What adjusts: :func:`photogram.adjust`, or :func:`photogram.adjust_in_parts`.
+    options
+        Those of the call that adjusts.
+
+    Raises
+    ------
+    InputError, AdjustmentError, RankError, OutOfMemoryError
+        As the call that adjusts.
+    """
+    first, result = started, by(started.usable(), **options)
+    while result.converged and (started.missing or started.set_aside.any()):
+        again = _judged(started, result)
+        if len(again.missing) == len(started.missing) and again.set_aside.sum() == started.set_aside.sum():
+            break
+        more = by(again.usable(), **options)
+        if not more.converged:
+            break
+        started, result = again, more
+    return replace(result, set_aside=_named(started), messages=[*_returned(first, started), *result.messages])
+
+
+def _judged(started: FirstValues, result: Result) -> FirstValues:
+    """Return first values without what does not fit the cameras, photos and points of an adjustment.
+
+    All start from where they did, but for photos that have a pose by these cameras only.
+    """
+    posed = np.array([photo in started.sources for photo in started.block.photo_ids])
+    changes: dict[str, Any] = {"cameras": [each.camera for each in result.cameras]} if result.cameras else {}
+    for name, adjusted in (("positions", result.photo_positions), ("attitudes", result.photo_attitudes)):
+        changes[f"photo_{name}"] = values = getattr(started.block, f"photo_{name}").copy()
+        values[posed] = adjusted
+    block = started.block.replace(**changes)
+    aside = started.set_aside & ~_fitting(block, started.set_aside, result)
+    found = replace(started, set_aside=aside)
+    try:
+        again = first_values(kept_images(block, ~aside)) if started.missing else None
+    except AdjustmentError:
+        again = None
+    if again is None:
+        return found
+    new = ~posed & [photo in again.sources for photo in block.photo_ids]
+    rows = np.flatnonzero(~aside)
+    aside[rows] = again.set_aside & new[block.image_photos[rows]]
+    poses = {
+        name: np.where(new[:, np.newaxis], getattr(again.block, name), getattr(started.block, name))
+        for name in ("photo_positions", "photo_attitudes")
+    }
+    sources = {**again.sources, **started.sources}
+    return replace(found, block=started.block.replace(**poses), sources=sources, missing=again.missing)
+
+
+def _fitting(block: Block, aside: Bools, result: Result) -> Bools:
+    """Return which images of a block are near the points of an adjustment, where these have a place."""
+    axes = Cartesian.of(block)
+    known = Known.of(block, axes)
+    photos, points = block.image_photos, block.image_points
+    to = axes.positions(np.where(result.used_points[:, np.newaxis], result.point_positions, np.nan))[points]
+    to -= known.positions[photos]
+    rays = np.einsum("mij,mj->mi", known.attitudes[photos], image_directions(block))
+    missed = np.linalg.norm(to / np.linalg.norm(to, axis=1, keepdims=True) - rays, axis=1)
+    missed /= direction_deviations(block)
+    # Of photos that move nothing was set aside, and their rays have no one pose.
+    missed[timed_photos(block)[photos]] = np.nan
+    usual = np.nanmedian(missed[~aside]) / MEDIAN_LENGTH
+    return np.asarray(missed <= FITS * max(float(usual), 1.0))
+
+
+def _named(started: FirstValues) -> tuple[str, ...]:
+    """Name what is still out: photos with the reason, and images."""
+    block = started.block
+    images = zip(
+        block.image_photos[started.set_aside].tolist(),
+        block.image_points[started.set_aside].tolist(),
+        strict=True,
+    )
+    return (
+        *(f"photo {photo} ({why})" for photo, why in started.missing.items()),
+        *(
+            f"image of point {block.point_ids[point]} on photo {block.photo_ids[photo]}"
+            for photo, point in images
+        ),
+    )
+
+
+def _returned(first: FirstValues, last: FirstValues) -> list[Message]:
+    """Say what has returned."""
+    aside, missing = int(first.set_aside.sum()), len(first.missing)
+    images, photos = aside - int(last.set_aside.sum()), missing - len(last.missing)
+    said = []
+    if images > 0:
+        said.append(
+            f"{images} of {counted(aside, 'image')} that were set aside fit the adjusted block and take part"
+        )
+    if photos:
+        said.append(
+            f"{photos} of {counted(missing, 'photo')} without a pose have one by the adjusted cameras"
+        )
+    return [Message(each) for each in said]
+
+
+check_arguments(globals(), ["adjust_started"])

@@ -1,0 +1,265 @@
+"""What a user of `photogram calibrate` says of board, pictures and lens: options, and reading by them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from photogram.cli.options import pair
+from photogram.cli.projects import Deviations, OriginName
+from photogram.lazy_dataclasses import dataclass
+
+if TYPE_CHECKING:
+    from photogram.targets import Board, Calibration
+
+__all__ = ["AS_FOUND", "PriorName", "Seen"]
+
+
+class ShapeName(StrEnum):
+    """What of a board is unknown."""
+
+    HELD = "held"
+    BEND = "bend"
+    POINTS = "points"
+
+
+class ViewName(StrEnum):
+    """What tells which images are of one view."""
+
+    NAME = "name"
+    TIME = "time"
+
+
+class SyncName(StrEnum):
+    """Whether images of one view were taken at one time."""
+
+    KNOWN = "known"
+    NONE = "none"
+    OFFSET = "offset"
+
+
+class PriorName(StrEnum):
+    """Whose priors cameras have."""
+
+    MRCAL = "mrcal"
+
+
+PLAIN_GOES = "--shape, --sd, --regularise, --sync offset, --offset alone"
+"""Options that go with a plain project."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a user says of the board, of images and of the lens, with the options that say it."""
+
+    board: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CxR|FILE",
+            help="Corners along x and y of a chessboard, or its description: board.toml, Kalibr's target."
+            " Default: what lies in PATH.",
+            show_default=False,
+        ),
+    ] = None
+    spacing: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="With --board CxR: from corner to corner.", show_default=False),
+    ] = None
+    unit: Annotated[
+        str | None, typer.Option(metavar="UNIT", help="Unit of the board. Default: m.", show_default=False)
+    ] = None
+    shape: Annotated[
+        ShapeName | None,
+        typer.Option(
+            help="What of the board is unknown. Default: points with 8 views or more, else held.",
+            show_default=False,
+        ),
+    ] = None
+    cameras: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PATTERN",
+            help="Names of the images of a camera, 'left*.jpg'; again for each camera. What is left of a name"
+            " is its view.",
+            show_default=False,
+        ),
+    ] = None
+    size: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WxH", help="Width and height of the pictures, where no file says it.", show_default=False
+        ),
+    ] = None
+    views: Annotated[ViewName, typer.Option(help="What tells the images of one view.")] = ViewName.NAME
+    within: Annotated[
+        float, typer.Option(min=0.0, metavar="S", help="With --views time: seconds between them at most.")
+    ] = 0.005
+    sync: Annotated[
+        SyncName,
+        typer.Option(
+            help="Whether images of one view were taken at one time; offset: by clocks of their cameras,"
+            " whose offsets are unknown."
+        ),
+    ] = SyncName.KNOWN
+    offsets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--offset",
+            metavar="CAMERA=S[,SD]",
+            help="What is known of the offset of a camera's clock, s; SD 0: held. Again for each.",
+            show_default=False,
+        ),
+    ] = None
+    pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
+        OriginName.CENTER
+    )
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="The lens: opencv4, opencv5, opencv8, opencv12, or a model of docs/cameras.md. Default:"
+            " opencv5 below 90 degrees of field, opencv8 above.",
+            show_default=False,
+        ),
+    ] = None
+    knots: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CxR",
+            help="With --model splined_stereographic: knots along columns and rows. Default: 30x20.",
+            show_default=False,
+        ),
+    ] = None
+    knot_sd: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R,T",
+            help="Standard deviations with which knots are 0, radial and tangential, in units of the"
+            " stereographic image. Default: 1,0.1.",
+            show_default=False,
+        ),
+    ] = None
+    sd: Deviations = None
+    regularise: Annotated[
+        PriorName | None,
+        typer.Option(
+            help="Weak priors of the lens and of its centre, as mrcal has them.", show_default=False
+        ),
+    ] = None
+
+    @property
+    def size_of_pictures(self) -> tuple[int, int] | None:
+        """Width and height, pixels."""
+        return None if self.size is None else pair(self.size, "--size")
+
+    @property
+    def knots_of_lens(self) -> tuple[int, int] | None:
+        """Along columns and rows."""
+        return None if self.knots is None else pair(self.knots, "--knots")
+
+    def read(self, path: Path, progress: Callable[[str], None] | None = None) -> Calibration:
+        """Read what lies at a path; `progress` is told which photograph is searched."""
+        from photogram.targets import read
+
+        if (path / "project.toml").exists():
+            return self._of_project(path)
+        given: dict[str, Any] = {
+            "views": self.views.value,
+            "sync": self.sync.value,
+            "pixel_origin": self.pixel_origin.value,
+            "shape": self.shape and self.shape.value,
+            "regularise": self.regularise and self.regularise.value,
+        }
+        return read(
+            path,
+            board=self.given_board(),
+            unit=self.unit,
+            model=self.model,
+            knots=self.knots_of_lens,
+            knot_sd=None if self.knot_sd is None else _deviations(self.knot_sd),
+            cameras=self.cameras or [],
+            within=self.within,
+            size=self.size_of_pictures,
+            sd0=self.sd0(),
+            offsets=_offsets(self.offsets or []),
+            progress=progress,
+            **given,
+        )
+
+    def _of_project(self, path: Path) -> Calibration:
+        """Return the calibration that a plain project is, with what a user says otherwise."""
+        from photogram import formats
+        from photogram.formats.targets.calibrations import calibration_of
+
+        found = calibration_of(formats.read(path))
+        said = Seen(
+            shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets, sync=self.sync
+        )
+        if self != said or self.sync is SyncName.NONE:
+            raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
+        changes: dict[str, Any] = {}
+        if self.sync is SyncName.OFFSET:
+            changes["sync"] = self.sync.value
+        if self.regularise is not None:
+            changes["regularise"] = self.regularise.value
+        if self.shape is not None:
+            changes["board"] = found.board.replace(shape=self.shape.value)
+        if self.sd is not None:
+            changes["sd0"] = self.sd0()
+        found = found.replace(**changes)
+        return found.with_offsets(_offsets(self.offsets)) if self.offsets else found
+
+    def given_board(self) -> Board | Path | None:
+        """Return the board of `--board` and `--spacing`, or the file that describes it."""
+        from photogram.targets import Board
+
+        if self.board is None or Path(self.board).is_file():
+            if self.spacing is not None:
+                raise typer.BadParameter("goes with --board CxR", param_hint="--spacing")
+            return None if self.board is None else Path(self.board)
+        columns, rows = pair(self.board, "--board")
+        if self.spacing is None:
+            raise typer.BadParameter("needs --spacing", param_hint="--board")
+        return Board(columns=columns, rows=rows, spacing=self.spacing)
+
+    def sd0(self) -> float | None:
+        """Return the standard deviation of a corner, pixels, of `--sd images=S`."""
+        from photogram.formats.supplements import deviations
+
+        found = deviations(self.sd or [])
+        if found.keys() - {"images"} or len(found.get("images", (1.0,))) > 1:
+            raise typer.BadParameter("is images=S here: of a corner in x and y", param_hint="--sd")
+        return found["images"][0] if found else None
+
+
+AS_FOUND = Seen()
+"""As the files say."""
+
+
+def _deviations(text: str) -> tuple[float, float]:
+    """Return two standard deviations with a comma between them."""
+    try:
+        radial, tangential = map(float, text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"is two numbers, 1,0.1, not {text}", param_hint="--knot-sd") from None
+    return radial, tangential
+
+
+def _offsets(given: list[str]) -> dict[str, tuple[float, float]]:
+    """Return offsets of clocks with their standard deviations by cameras, from words as `right=0,0.01`."""
+    found = {}
+    for each in given:
+        camera, _, numbers = each.rpartition("=")
+        try:
+            offset, sd = map(float, (numbers if "," in numbers else f"{numbers},inf").split(","))
+        except ValueError:
+            offset = sd = math.nan
+        if not (camera and math.isfinite(offset) and sd >= 0):
+            raise typer.BadParameter(f"is CAMERA=S or CAMERA=S,SD, not {each}", param_hint="--offset")
+        found[camera] = offset, sd
+    return found

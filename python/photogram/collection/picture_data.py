@@ -1,0 +1,149 @@
+"""What pictures draw of an adjusted collection."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.collection.collection import POSE
+from photogram.collection.result import AdjustedCollection
+from photogram.network.cameras import Camera
+from photogram.plots.picture_data import Correlated, Curve, Curves, Pictured, Plan, pictured
+from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part
+from photogram.results.picture_data import PicturedNetwork
+
+__all__ = ["PicturedCollection"]
+
+BEYOND = 1.1
+"""How far curves of distortion go on, of the largest observed radius."""
+ROWS = 51
+"""Radii of a curve."""
+SHOWN = 60
+"""Photos whose own curves are drawn at most."""
+
+
+class PicturedCollection(PicturedNetwork):
+    """What is drawn of an adjusted collection, whose photos have cameras of their own.
+
+    Parameters
+    ----------
+    result
+        The adjusted collection.
+    """
+
+    result: AdjustedCollection
+
+    def __init__(self, result: AdjustedCollection) -> None:
+        self.result = result
+
+    @property
+    def title(self) -> str:
+        """Nothing: collections have no name."""
+        return ""
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The network; a photo with P = R X + t stands at -R' t."""
+        result = self.result
+        rotations = _photocore.vector_rotations(np.ascontiguousarray(result.photo_parameters[:, :3]))
+        used = result.used_points
+        given = np.isfinite(result.point_given_sd).any(axis=1) & used
+        return Plan(
+            axes=("X", "Y", "Z"),
+            unit="",
+            photo_ids=result.given.photo_ids,
+            photos=-np.einsum("pji,pj->pi", rotations, result.photo_parameters[:, 3:6]),
+            point_ids=result.given.point_ids,
+            points=np.where(used[:, np.newaxis], result.point_positions, np.nan),
+            rays=result.point_rays,
+            kinds=np.where(given, "control", "pass"),
+            differences=-result.point_residuals,
+        )
+
+    def covariances(self, points: Indices) -> Floats:
+        """Return (k, 3, 3) covariances of points along the axes of the plan."""
+        return np.asarray(self.result.point_covariances[points])
+
+    @property
+    def footprints(self) -> Floats:
+        """None: nothing says which way is up."""
+        return np.empty((0, 1, 3))
+
+    @property
+    def cameras(self) -> tuple[Indices, list[str], bool]:
+        """One frame for the cameras of all photos."""
+        photos = len(self.result.photo_parameters)
+        together = np.zeros(photos, dtype=np.int64)
+        return together, [f"cameras of all {photos} photos"], self._camera(0).image_y == "down"
+
+    @property
+    def correlations(self) -> list[Correlated]:
+        """Medians over all photos of the correlations of the parameters of their cameras."""
+        result = self.result
+        own = np.arange(len(POSE), len(result.collection.parameters))
+        free = own[(result.photo_given_sd[:, own] > 0).all(axis=0)]
+        blocks = result.photo_cofactors[:, free[:, np.newaxis], free]
+        sd = np.sqrt(np.diagonal(blocks, axis1=1, axis2=2))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            tables = blocks / (sd[:, :, np.newaxis] * sd[:, np.newaxis])
+        good = np.isfinite(tables).all(axis=(1, 2))
+        if len(free) < 2 or not good.any():
+            return []
+        parameters = [result.collection.parameters[k] for k in free]
+        remark = f"medians of the {int(good.sum())} photos"
+        return [Correlated("cameras", parameters, np.median(tables[good], axis=0), remark)]
+
+    @property
+    def distortion(self) -> list[Curves]:
+        """One set of curves: of some photos faintly, and that of the photo whose distortion is the middle."""
+        result = self.result
+        model, values = result.collection.camera, result.photo_parameters[:, len(POSE) :]
+        names = result.collection.parameters[len(POSE) :]
+        terms = [k for k, name in enumerate(names) if RADIAL.fullmatch(name)]
+        used = np.flatnonzero(result.photo_images > 0)
+        if not terms or not len(used) or not values[:, terms].any():
+            return []
+        radii = np.linspace(0.0, BEYOND * self._reach, ROWS)
+        chosen = used[:: -(-len(used) // SHOWN)]
+        curves = np.array([added_along(self._camera(photo), radii) for photo in chosen.tolist()])
+        good = np.isfinite(curves).all(axis=1)
+        if not good.any():
+            return []
+        chosen, curves = chosen[good], curves[good]
+        middle = int(np.argsort(curves[:, -1])[len(curves) // 2])
+        photo = int(chosen[middle])
+        own = slice(len(POSE), None)
+        covariance = result.photo_covariances[photo][own, own]
+        _, partials = radial_curve(self._camera(photo), result.photo_sd[photo, own], terms, radii)
+        band = curve_deviations(covariance, terms, partials)
+        return [
+            Curves(
+                camera=f"{len(chosen)} of {len(used)} photos ({model}); black: photo {photo}, their middle",
+                unit="px",
+                radii=radii,
+                observed=self._reach,
+                curves=[Curve("", curves[middle], {"curve": band} if np.isfinite(band).all() else {})],
+                others=curves,
+            )
+        ]
+
+    @property
+    def _reach(self) -> float:
+        """How far images reach from the middle of the picture: the radius within which all but 1 % lie."""
+        xy = self.images.xy
+        middle = np.median(xy, axis=0) if self.images.down else np.zeros(2)
+        return float(np.quantile(np.hypot(*(xy - middle).T), 0.99))
+
+    def _camera(self, photo: int) -> Camera:
+        collection = self.result.collection
+        values = self.result.photo_parameters[photo, len(POSE) :].tolist()
+        given = dict(zip(collection.parameters[len(POSE) :], values, strict=True))
+        return radial_part(Camera(collection.camera, given))
+
+
+@pictured.register(AdjustedCollection)
+def _pictured(result: AdjustedCollection) -> Pictured:
+    return PicturedCollection(result)

@@ -1,0 +1,133 @@
+"""The result of the adjustment of a collection: arrays with their covariances, and the ways to show them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.collection.collection import Collection
+from photogram.collection.core_arrays import collection_network
+from photogram.collection.failures import named
+from photogram.collection.suspects import collection_trial
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.results.covariance import Failure
+from photogram.results.network import AdjustedNetwork
+from photogram.results.selection import Adjusted, Things
+
+if TYPE_CHECKING:
+    from photogram.results.network_trial import NetworkTrial
+
+__all__ = ["AdjustedCollection"]
+
+POSE = 6
+"""Parameters of a photo that are no camera's."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class AdjustedCollection(AdjustedNetwork):
+    """An adjusted collection; the arrays that every network has are those of `AdjustedNetwork`.
+
+    The k unknowns of a photo are its parameters in the collection. Of covariances kinds are `photo` (all
+    parameters), `pose` and `camera` (its first six, the others) and `point`; photos and points are called by
+    their numbers: `("photo", 3)`, `("point", [7, 8])`. Cofactors hold for the datum that the
+    observations and weights give; where these give none, for that of the held parameters in `datum`.
+
+    Attributes
+    ----------
+    collection
+        What was adjusted.
+    weighted_sum_of_squares
+        Of images and weighted unknowns, weights as the loss has modified them.
+    photo_parameters
+        (P, k) adjusted; see :class:`Collection`.
+    photo_images
+        (P,) number of image points.
+    point_rays_behind
+        (n,) how many image points have the point behind the camera.
+    datum
+        Photos and parameters that were held to give the cofactors a datum.
+    """
+
+    collection: Collection
+    weighted_sum_of_squares: float
+    photo_parameters: Floats
+    photo_images: Indices
+    point_rays_behind: Indices
+    datum: list[tuple[int, str]]
+
+    KNOWN: ClassVar[bool] = False
+
+    @property
+    def _what(self) -> str:
+        return "collection"
+
+    @property
+    def given(self) -> Collection:
+        """What was adjusted: the collection."""
+        return self.collection
+
+    @property
+    def sum_and_freedom(self) -> tuple[float, float]:
+        """The weighted sum of squares of all observations, and its degrees of freedom."""
+        return self.weighted_sum_of_squares, self.degrees_of_freedom
+
+    @property
+    def cost(self) -> float:
+        """Half the sum that was minimised, at the adjusted values."""
+        last = self.iterations[-1].weighted_sum_of_squares if self.iterations else None
+        return 0.5 * (self.initial_weighted_sum_of_squares if last is None else last)
+
+    @property
+    def photo_given_sd(self) -> Floats:
+        """(P, k) standard deviations of given parameters as observations: infinite free, zero fixed."""
+        return self.collection.photo_sd
+
+    @property
+    def photo_residuals(self) -> Floats:
+        """(P, k) given minus adjusted parameters; 0 where fixed, NaN where free."""
+        residuals = self.collection.photo_parameters - self.photo_parameters
+        return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
+
+    @property
+    def point_residuals(self) -> Floats:
+        """(n, 3) given minus adjusted coordinates; 0 where fixed, NaN where free."""
+        residuals = self.collection.point_positions - self.point_positions
+        return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
+
+    def _adjusted(self) -> Adjusted:
+        return _selectable(self)
+
+    def _refused(self, error: Failure) -> Exception:
+        return named(*error.args)
+
+    def _trial(self) -> NetworkTrial:
+        options = replace(self.options, covariance=True, loss=None)
+        core = collection_network(self.collection, options).trial(self.state, threads=0)
+        return collection_trial(self.collection, core)
+
+    def adjusted(self) -> Collection:
+        """Return the collection at its adjusted values; points that were left out stay as they were."""
+        positions = np.where(
+            self.used_points[:, np.newaxis], self.point_positions, self.collection.point_positions
+        )
+        return self.collection.replace(photo_parameters=self.photo_parameters, point_positions=positions)
+
+
+def _selectable(result: AdjustedCollection) -> Adjusted:
+    """Return the adjusted values of a collection by kinds and numbers."""
+    names, photos, points = result.collection.parameters, result.given.photo_ids, result.given.point_ids
+    values, sd, count = result.photo_parameters, result.photo_sd, len(photos)
+    pose, camera = slice(0, POSE), slice(POSE, None)
+    places = [("X", "Y", "Z")] * len(points)
+    return Adjusted(
+        network="collection",
+        things={
+            "photo": Things(photos, [names] * count, values, sd, ("photo", "camera")),
+            "pose": Things(photos, [names[pose]] * count, values[:, pose], sd[:, pose], ("photo",)),
+            "camera": Things(photos, [names[camera]] * count, values[:, camera], sd[:, camera]),
+            "point": Things(points, places, result.point_positions, result.point_sd),
+        },
+        numbered=True,
+    )

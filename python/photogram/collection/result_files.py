@@ -1,0 +1,104 @@
+"""The result of a collection as files of a folder, and back; photos and points are numbers from 0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.collection.collection import Collection
+from photogram.collection.result import AdjustedCollection
+from photogram.io.parquet import Column
+from photogram.io.writing import Content
+from photogram.messages import Message
+from photogram.network.core_arrays import CoreOptions
+from photogram.network.frame import Frame
+from photogram.results.iteration import Iteration
+from photogram.results.network_tables import TABLES
+from photogram.results.result_files import (
+    GIVEN_SD,
+    REDUNDANCY,
+    TRIANGLE,
+    Part,
+    image_parts,
+    point_parts,
+    read_saved,
+    sheet,
+    written,
+)
+from photogram.show.methods import files_of
+
+__all__ = ["KIND", "collection_files", "read_collection_result"]
+
+KIND = "collection"
+_AXES = ("x", "y", "z")
+_TABLES = {"control": "control", "stations": "station"}
+"""Tables for people, and the kind that each is in `collection.tables`."""
+
+
+@files_of.register(AdjustedCollection)
+def collection_files(result: AdjustedCollection) -> dict[str, Content]:
+    """Return the files of the result of a collection."""
+    given = result.collection
+    leading = {
+        "photos": [_numbers("photo", np.arange(len(given.photo_parameters)))],
+        "points": [_numbers("point", np.arange(len(given.point_positions)))],
+        "images": [_numbers("photo", given.image_photos), _numbers("point", given.image_points)],
+    }
+    tables = {name: sheet(TABLES[kind](result)) for name, kind in _TABLES.items()}
+    summary = {
+        "camera": given.camera,
+        "status": result.status,
+        "degrees_of_freedom": result.degrees_of_freedom,
+        "cost": result.cost,
+    }
+    parts = _parts(given.parameters, given.units)
+    return written(result, KIND, "collection", parts, leading, tables, Frame(), summary)
+
+
+def read_collection_result(folder: Path, document: Mapping[str, Any]) -> AdjustedCollection:
+    """Return the result of a collection that a folder keeps.
+
+    Raises
+    ------
+    InputError
+        Files that are missing, damaged or contradict each other.
+    """
+    saved = read_saved(folder, (CoreOptions, Iteration, Message), document)
+    given = saved.members("collection", Collection)
+    images = saved.sheets["images"]
+    for kind in ("photo", "point"):
+        given[f"image_{kind}s"] = images.numbers(kind)
+    names, units = Collection.parameters_of(given["camera"])
+    own, arrays = saved.arrays(_parts(names, units), "collection")
+    collection = Collection(**given, **arrays)
+    return AdjustedCollection(
+        **saved.members("result", AdjustedCollection), **own, collection=collection, state=saved.state()
+    )
+
+
+def _parts(names: tuple[str, ...], units: tuple[str, ...]) -> dict[str, list[Part]]:
+    """Return what the tables of a collection have."""
+    known = tuple(unit or "1" for unit in units)
+    plain = ("1",) * len(names)
+    photos = [
+        Part("photo_images", ("images",), ("1",), "number of image points"),
+        Part("photo_parameters", names, known, "adjusted {}"),
+        Part("photo_sd", names, known, "standard deviation of {}", "derived", "sd_"),
+        Part("photo_cofactors", names, known, TRIANGLE, "matrix", "covariance"),
+        Part("photo_redundancy", names, plain, REDUNDANCY, prefix="redundancy_"),
+        Part("collection.photo_parameters", names, known, "initial {}", prefix="initial_"),
+        Part("collection.photo_sd", names, known, GIVEN_SD, prefix="given_sd_"),
+    ]
+    behind = Part("point_rays_behind", ("rays_behind",), ("1",), "images with the point behind the camera")
+    return {
+        "photos": photos,
+        "points": [behind, *point_parts("collection", _AXES, ("",) * 3, last=False)],
+        "images": image_parts("collection", "px"),
+    }
+
+
+def _numbers(kind: str, rows: np.ndarray) -> Column:
+    return Column(kind, rows.astype(np.int64), "", f"number of the {kind}, from 0")

@@ -1,0 +1,193 @@
+"""All cases together: one set of comparator parameters (NOAA TR NOS 57, equations 56 to 63)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.affine import AffineFit
+from photogram.comparator.correction import Correction
+from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.polynomial import COUNT, Polynomial, fit_polynomial
+from photogram.comparator.residuals import Residuals
+from photogram.comparator.rigid import RigidFit, fit_rigid
+from photogram.lazy_dataclasses import dataclass, replace
+
+if TYPE_CHECKING:
+    from photogram.arguments.types import Floats
+    from photogram.comparator.case import PlacedCase
+
+__all__ = ["CombinedLinear", "CombinedPolynomial", "SinglePolynomial", "combine_linear", "combine_polynomial"]
+
+
+@dataclass(frozen=True, eq=False)
+class CombinedLinear:
+    """The linear parameters of all cases.
+
+    Attributes
+    ----------
+    correction
+        Scales and lack of orthogonality.
+    sigma0_um, degrees_of_freedom
+        Standard error of unit weight and its degrees of freedom (equation 57).
+    covariance
+        (3, 3) of scale x, scale y, lack of orthogonality in radians (equation 58).
+    cases
+        Rigid fit of each case after the correction.
+    """
+
+    correction: Correction
+    sigma0_um: float
+    degrees_of_freedom: int
+    covariance: Floats
+    cases: tuple[RigidFit, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SinglePolynomial:
+    """The polynomials of one case.
+
+    Attributes
+    ----------
+    polynomial
+        The polynomials.
+    residuals
+        What they leave of the residuals of the linear adjustment, in both systems.
+    """
+
+    polynomial: Polynomial
+    residuals: Residuals
+
+    @property
+    def covariance(self) -> Floats:
+        """(18, 18) of the coefficients in metre units (m^2 times powers of 1/m), x first (equation 61)."""
+        return self.residuals.sigma0_um**2 * self.polynomial.cofactors
+
+
+@dataclass(frozen=True, eq=False)
+class CombinedPolynomial:
+    """The polynomials of all cases.
+
+    Attributes
+    ----------
+    correction
+        Linear parameters and polynomials.
+    sigma_um
+        (2,) standard deviations of the residuals in x and in y (equation 62).
+    degrees_of_freedom
+        Of each of them.
+    cases
+        Rigid fit of each case after the whole correction.
+    """
+
+    correction: Correction
+    polynomial: Polynomial
+    sigma_um: tuple[float, float]
+    degrees_of_freedom: int
+    cases: tuple[RigidFit, ...]
+
+    @property
+    def sigma0_um(self) -> float:
+        """Standard error of unit weight of both axes (equation 62)."""
+        return math.sqrt(sum(sigma**2 for sigma in self.sigma_um) / 2)
+
+    @property
+    def covariance(self) -> Floats:
+        """(18, 18) of the coefficients in metre units, x first (equation 61)."""
+        return self.sigma0_um**2 * self.polynomial.cofactors
+
+
+def combine_linear(
+    cases: Sequence[PlacedCase], fits: Sequence[AffineFit], *, as_listed: bool = False
+) -> CombinedLinear:
+    """Form the generalised weighted mean of the linear parameters of the cases.
+
+    With P_j the inverse cofactors of case j: mean = (sum P)^-1 sum P x, and its sum of squares adds to those
+    of the cases.
+    """
+    values = np.array(
+        [
+            [fit.parameters.scale_x, fit.parameters.scale_y, fit.parameters.nonorthogonality_rad]
+            for fit in fits
+        ]
+    )
+    weights = [np.linalg.inv(fit.cofactors[:3, :3]) for fit in fits]
+    total = np.sum(weights, axis=0)
+    # Deviations from the first case: scales near one would lose digits.
+    offsets = values - values[0]
+    mean = np.linalg.solve(total, np.sum([w @ x for w, x in zip(weights, offsets, strict=True)], axis=0))
+    squares = sum(sum(fit.residuals.squares_um2[:2]) for fit in fits)
+    squares += sum(float((x - mean) @ w @ (x - mean)) for w, x in zip(weights, offsets, strict=True))
+    dof = 2 * sum(len(case.points) for case in cases) - 3 * (len(cases) + 1)
+    sigma0 = math.sqrt(squares / dof)
+    scale_x, scale_y, lean = (values[0] + mean).tolist()
+    covariance = sigma0**2 * np.linalg.inv(total)
+    correction = Correction(scale_x, scale_y, lean)
+    correction.covariance[:3, :3] = covariance
+    lost = 0.5 * (3 + 3 / len(cases))
+    return CombinedLinear(
+        correction, sigma0, dof, covariance, _refit(cases, correction, lost, as_listed=as_listed)
+    )
+
+
+def _refit(
+    cases: Sequence[PlacedCase], correction: Correction, lost: float, *, as_listed: bool
+) -> tuple[RigidFit, ...]:
+    """Fit each corrected case rigidly onto its grid."""
+    return tuple(
+        fit_rigid(case.points, correction.apply(case.means_um), case.grid_um, lost=lost, as_listed=as_listed)
+        for case in cases
+    )
+
+
+def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_listed: bool = False) -> SinglePolynomial:
+    """Fit polynomials to the residuals of the linear adjustment of one case (equations 59 to 61).
+
+    Parameters
+    ----------
+    case, fit
+        The case and its linear adjustment.
+    as_listed
+        Turn the residuals into the grid system without the change of sign that they have everywhere else.
+
+    Raises
+    ------
+    AdjustmentError
+        Too few points, or too few different coordinates.
+    """
+    parameters = fit.parameters
+    linear = case.means_um @ parameters.linear_matrix.T
+    polynomial = fit_polynomial(linear, fit.residuals.comparator_um)
+    values = polynomial.evaluate(linear)
+    comparator = fit.residuals.comparator_um - values
+    sign = 1.0 if as_listed else -1.0
+    grid = sign * comparator @ rotation_matrix(parameters.rotation_rad).T
+    return SinglePolynomial(
+        polynomial, Residuals(case.points, linear + values, comparator, grid, float(COUNT))
+    )
+
+
+def combine_polynomial(
+    cases: Sequence[PlacedCase], linear: CombinedLinear, *, as_listed: bool = False
+) -> CombinedPolynomial:
+    """Fit one pair of polynomials to the residuals that the combined linear parameters leave in all cases.
+
+    Raises
+    ------
+    AdjustmentError
+        Too few points, or too few different coordinates.
+    """
+    places = np.vstack([fit.residuals.xy_um for fit in linear.cases])
+    residuals = np.vstack([fit.residuals.comparator_um for fit in linear.cases])
+    polynomial = fit_polynomial(places, residuals)
+    dof = len(places) - COUNT
+    squares = ((residuals - polynomial.evaluate(places)) ** 2).sum(axis=0)
+    sigma = (math.sqrt(squares[0] / dof), math.sqrt(squares[1] / dof))
+    covariance = linear.correction.covariance.copy()
+    covariance[3:, 3:] = (sigma[0] ** 2 + sigma[1] ** 2) / 2 * polynomial.scaled_cofactors
+    correction = replace(linear.correction, polynomial=polynomial, covariance=covariance)
+    fits = _refit(cases, correction, COUNT / len(cases), as_listed=as_listed)
+    return CombinedPolynomial(correction, polynomial, sigma, dof, fits)

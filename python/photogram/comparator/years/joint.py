@@ -1,0 +1,303 @@
+"""All readings of many calibrations in one adjustment: each has its comparator and cases, plates are common.
+
+Linear about the joint adjustments of the calibrations: a reading x of the grid point g (plate, in the
+handedness of the comparator) leaves
+
+    v = -(M J)^-1 (M Q dp + M' C dtheta + dT - dg + w),   w = M C(x) + T - g,
+
+C the corrected reading with the partials J by the reading and Q by the parameters p, M the rotation and T the
+translation of the case. Parameters and cases of a calibration are eliminated, what is left are normal
+equations of the corrections of grid points, to which their given coordinates add 1 / sigma^2; what remains of
+common errors of plates between calibrations is in the covariance of their parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.comparator.correction import PARAMETERS
+from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.grid import Grid
+from photogram.comparator.orientation import exchanged
+from photogram.comparator.years.record import RecordedCalibration, RecordedCase
+from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import dataclass
+from photogram.memory import require
+from photogram.statistics.limits import GlobalTest, global_test
+
+__all__ = ["Together", "adjust_together"]
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """The adjustment of all calibrations.
+
+    Attributes
+    ----------
+    parameters
+        For each calibration (21,) those of its correction.
+    covariance
+        (k, 21, k, 21) of all of them; zero where a parameter is held.
+    grids
+        The plates as they were given to the first calibration that has each.
+    corrections_um, covariance_um2
+        For each plate (l, 2) adjusted less given coordinates, and (2 l, 2 l) of them, x and y of a point
+        behind each other.
+    standardized
+        For each calibration and case (n, 2) residuals over their standard deviations, unit weight known.
+    test
+        Of all residuals and corrections against their standard deviations.
+    """
+
+    parameters: list[Floats]
+    covariance: Floats
+    grids: dict[int, Grid]
+    corrections_um: dict[int, Floats]
+    covariance_um2: dict[int, Floats]
+    standardized: list[list[Floats]]
+    test: GlobalTest
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """Linear equations of a case: v = A a + G dg + v0 for its own unknowns a, weights of v."""
+
+    own: Floats
+    grid: Floats
+    rest: Floats
+    weight: Floats
+    rows: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class _Reduced:
+    """A calibration with its own unknowns eliminated."""
+
+    cases: list[_Case]
+    active: Indices
+    inverse: Floats
+    mixed: Floats
+    right: Floats
+    unknowns: int
+
+
+def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
+    """Adjust all calibrations in one; see the module.
+
+    Raises
+    ------
+    InputError
+        Plates of one number with other points or coordinates.
+    AdjustmentError
+        The measurements do not determine the unknowns.
+    OutOfMemoryError
+        There is not enough memory for the covariance of all grid points.
+    """
+    grids = _grids(records)
+    starts = dict(zip(grids, np.cumsum([0, *(len(grid.points) for grid in grids.values())]), strict=False))
+    size = 2 * sum(len(grid.points) for grid in grids.values())
+    require(4 * 8 * size**2, f"the covariance of {size // 2} grid points")
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    sigma = np.repeat(
+        [grid.sigma_um or 0.0 for grid in grids.values()], [2 * len(g.points) for g in grids.values()]
+    )
+    free = np.flatnonzero(sigma > 0)
+    reduced = [_reduce(record, grids, starts, normal, right) for record in records]
+    normal[free, free] += 1 / sigma[free] ** 2
+    cofactors, shift = np.zeros((size, size)), np.zeros(size)
+    cofactors[np.ix_(free, free)] = _inverse(normal[np.ix_(free, free)], "the grid")
+    shift[free] = cofactors[np.ix_(free, free)] @ right[free]
+    back = [each.inverse @ each.mixed for each in reduced]
+    values = [each.inverse @ each.right - own @ shift for each, own in zip(reduced, back, strict=True)]
+    standardized, squares, count = _residuals(reduced, back, values, cofactors, shift)
+    squares += float((shift[free] ** 2 / sigma[free] ** 2).sum())
+    # Every given coordinate is an observation and an unknown.
+    test = global_test(squares, count - sum(each.unknowns for each in reduced))
+    if test is None:
+        raise AdjustmentError("the calibrations have as many unknowns as observations")
+    scale = test.variance
+    places = {
+        plate: slice(2 * starts[plate], 2 * (starts[plate] + len(grid.points)))
+        for plate, grid in grids.items()
+    }
+    return Together(
+        parameters=[
+            _parameters(record) + _spread(each, own[: len(each.active)])
+            for record, each, own in zip(records, reduced, values, strict=True)
+        ],
+        covariance=scale * _covariance(reduced, back, cofactors),
+        grids=grids,
+        corrections_um={plate: shift[place].reshape(-1, 2) for plate, place in places.items()},
+        covariance_um2={plate: scale * cofactors[place, place] for plate, place in places.items()},
+        standardized=standardized,
+        test=test,
+    )
+
+
+def _grids(records: Sequence[RecordedCalibration]) -> dict[int, Grid]:
+    """Return all plates with all points that anybody measured, as the first calibrations took them."""
+    found: dict[int, Grid] = {}
+    for record in records:
+        for plate, grid in record.grids.items():
+            if plate not in found:
+                found[plate] = grid
+                continue
+            own = found[plate]
+            there = np.isin(grid.points, own.points)
+            given = own.xy_um[own.rows_of(grid.points[there])] * _growth(own, grid)
+            if there.any() and np.abs(given - grid.xy_um[there]).max() > SAME_UM:
+                raise InputError(
+                    f"plate {plate} has other coordinates in {record.name} than before: give all calibrations"
+                    " the same ones"
+                )
+            found[plate] = _joined(own, grid, ~there)
+    return found
+
+
+SAME_UM = 1e-3
+"""Given coordinates of a plate may differ by rounding."""
+
+
+def _joined(own: Grid, other: Grid, new: Bools) -> Grid:
+    return Grid(
+        own.number,
+        np.concatenate([own.points, other.points[new]]),
+        np.vstack([own.xy_um, other.xy_um[new] / _growth(own, other)]),
+        own.sigma_um,
+        own.adopted,
+        None,
+        own.temperature_c,
+        own.expansion_per_k,
+    )
+
+
+def _growth(own: Grid, other: Grid) -> float:
+    """Return by what the coordinates of a plate grew since the first calibration: its temperature differs."""
+    if own.temperature_c is None or other.temperature_c is None or own.expansion_per_k is None:
+        return 1.0
+    return 1.0 + own.expansion_per_k * (other.temperature_c - own.temperature_c)
+
+
+def _reduce(
+    record: RecordedCalibration,
+    grids: Mapping[int, Grid],
+    starts: Mapping[int, int],
+    normal: Floats,
+    right: Floats,
+) -> _Reduced:
+    """Add what a calibration says of the grid to the normal equations; keep what leads back to its own."""
+    active = np.flatnonzero(np.diag(record.correction.covariance) > 0)
+    unknowns = len(active) + 3 * len(record.cases)
+    inner, own_right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    mixed = np.zeros((unknowns, len(right)))
+    cases = []
+    for k, case in enumerate(record.cases):
+        columns = np.concatenate([np.arange(len(active)), len(active) + 3 * k + np.arange(3)])
+        made = _equations(record, case, grids[case.plate], starts[case.plate], active)
+        cases.append(made)
+        weighted = made.weight[..., np.newaxis] * made.own
+        inner[np.ix_(columns, columns)] += np.einsum("nia,nib->ab", made.own, weighted)
+        own_right[columns] -= np.einsum("nia,ni->a", weighted, made.rest)
+        places = 2 * made.rows[:, np.newaxis] + np.arange(2)
+        across = np.einsum("nia,nij->anj", weighted, made.grid)
+        np.add.at(mixed, np.ix_(columns, places.ravel()), across.reshape(len(columns), -1))
+        within = np.einsum("nij,ni,nik->njk", made.grid, made.weight, made.grid)
+        np.add.at(normal, (places[:, :, np.newaxis], places[:, np.newaxis, :]), within)
+        np.subtract.at(right, places, np.einsum("nij,ni->nj", made.grid, made.weight * made.rest))
+    inverse = _inverse(inner, record.name)
+    normal -= mixed.T @ inverse @ mixed
+    right -= mixed.T @ (inverse @ own_right)
+    return _Reduced(cases, active, inverse, mixed, own_right, unknowns)
+
+
+def _equations(
+    record: RecordedCalibration, case: RecordedCase, grid: Grid, start: int, active: Indices
+) -> _Case:
+    rows = grid.rows_of(case.points)
+    given = exchanged(grid.xy_um[rows] * _growth(grid, record.grids[case.plate]), case.left_handed)
+    correction = record.correction
+    by_parameters, by_reading = correction._partials(case.means_um)
+    corrected = correction.apply(case.means_um)
+    turn = rotation_matrix(case.rotation_rad)
+    # A shift of the corrected readings is one of the case: both count from its middle.
+    away = corrected - corrected.mean(axis=0)
+    turned = np.stack([away @ turn[1], -away @ turn[0]], axis=1)[..., np.newaxis]
+    back = -np.asarray(np.linalg.inv(turn @ by_reading))
+    ones = np.broadcast_to(np.eye(2), (len(rows), 2, 2))
+    own = back @ np.concatenate([turn @ by_parameters[:, :, active], turned, ones], axis=2)
+    rest = back @ (corrected @ turn.T + case.translation_um - given)[..., np.newaxis]
+    variance = record.random_um**2 + np.array(record.pointing_um) ** 2 / case.counts[:, np.newaxis]
+    to_grid = -back[:, :, ::-1] if case.left_handed else -back
+    return _Case(np.asarray(own), to_grid, rest[..., 0], 1 / variance, start + rows)
+
+
+def _inverse(normal: Floats, what: str) -> Floats:
+    """Return the inverse of normal equations, each unknown in its own unit."""
+    scale = np.sqrt(np.diag(normal))
+    try:
+        root = np.linalg.cholesky(normal / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        raise AdjustmentError(f"the measurements do not determine the unknowns of {what}") from None
+    inverse = np.linalg.inv(root)
+    return np.asarray((inverse.T @ inverse) / np.outer(scale, scale))
+
+
+def _residuals(
+    reduced: Sequence[_Reduced],
+    back: Sequence[Floats],
+    values: Sequence[Floats],
+    cofactors: Floats,
+    shift: Floats,
+) -> tuple[list[list[Floats]], float, int]:
+    """Return standardized residuals of all cases, the sum of weighted squares, and how many there are."""
+    standardized, squares, count = [], 0.0, 0
+    for each, own_back, own_values in zip(reduced, back, values, strict=True):
+        with_grid = own_back @ cofactors
+        own_cofactors = each.inverse + with_grid @ own_back.T
+        of_cases = []
+        for k, case in enumerate(each.cases):
+            columns = np.concatenate([np.arange(len(each.active)), len(each.active) + 3 * k + np.arange(3)])
+            places = 2 * case.rows[:, np.newaxis] + np.arange(2)
+            v = case.own @ own_values[columns] + case.rest
+            v += np.einsum("nij,nj->ni", case.grid, shift[places])
+            squares += float((case.weight * v**2).sum())
+            count += v.size
+            known = np.einsum("nia,ab,nib->ni", case.own, own_cofactors[np.ix_(columns, columns)], case.own)
+            crossed = with_grid[columns][:, places]
+            known -= 2 * np.einsum("nia,anj,nij->ni", case.own, crossed, case.grid)
+            blocks = cofactors[places[:, :, np.newaxis], places[:, np.newaxis, :]]
+            known += np.einsum("nij,njk,nik->ni", case.grid, blocks, case.grid)
+            left = 1 / case.weight - known
+            checked = left * case.weight > 1e-6
+            of_cases.append(np.divide(v, np.sqrt(np.abs(left)), out=np.full(v.shape, np.nan), where=checked))
+        standardized.append(of_cases)
+    return standardized, squares, count
+
+
+def _parameters(record: RecordedCalibration) -> Floats:
+    own = record.correction
+    coefficients = np.zeros(18) if own.polynomial is None else own.polynomial.scaled_um.ravel()
+    return np.concatenate([[own.scale_x, own.scale_y, own.nonorthogonality_rad], coefficients])
+
+
+def _spread(each: _Reduced, values: Floats) -> Floats:
+    full = np.zeros(PARAMETERS)
+    full[each.active] = values
+    return full
+
+
+def _covariance(reduced: Sequence[_Reduced], back: Sequence[Floats], cofactors: Floats) -> Floats:
+    """Return the cofactors of the parameters of all corrections, (k, 21, k, 21)."""
+    count = len(reduced)
+    blocks = np.zeros((count, count, PARAMETERS, PARAMETERS))
+    for i, first in enumerate(reduced):
+        own = first.active
+        blocks[i, i][np.ix_(own, own)] = first.inverse[: len(own), : len(own)]
+        common = back[i][: len(own)] @ cofactors
+        for j, second in enumerate(reduced):
+            other = second.active
+            blocks[i, j][np.ix_(own, other)] += common @ back[j][: len(other)].T
+    return blocks.transpose(0, 2, 1, 3)

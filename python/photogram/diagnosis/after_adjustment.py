@@ -1,0 +1,133 @@
+"""What is wrong where an adjustment has failed or fits badly: looked for when somebody asks.
+
+Most adjustments fit: what explains the others is loaded for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from photogram.diagnosis.names import with_exchanges
+from photogram.errors import AdjustmentError, OutOfMemoryError
+from photogram.messages import Message
+from photogram.network.block import Block
+from photogram.network.film_reduction import as_seen
+from photogram.results.fixed_tests import is_suspected
+from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram.adjustment.first_values import FirstValues
+    from photogram.diagnosis.findings import Diagnosis
+
+__all__ = ["diagnosed", "diagnosis_of", "errors_explained", "explained", "remarks"]
+
+BAD = 5.0
+"""Sigma0 above which an adjustment that has converged is doubted."""
+
+
+@contextmanager
+def errors_explained(block: Block | FirstValues) -> Iterator[None]:
+    """Let an adjustment that fails say which mistakes in the data of its block would explain it."""
+    try:
+        yield
+    except OutOfMemoryError:
+        raise
+    except AdjustmentError as error:
+        from photogram.diagnosis.adjusting import Adjuster
+        from photogram.diagnosis.shutters import shutter_hints
+
+        block = block if isinstance(block, Block) else block.usable()
+        found = _of_block(block) or shutter_hints(block, None, Adjuster({}))
+        error.args = (
+            "\n".join([str(error), *(f"  hint: {hint}" for hint in found)]),
+            *error.args[1:],
+        )
+        raise
+
+
+def diagnosed(result: Result) -> Result:
+    """Return a result, with what explains it where it has not converged or fits badly.
+
+    Mistakes in conventions (`hints`) and exchanged names (`exchanged`) are for its verdict. The hints stand
+    among its messages too, and so do those on standard deviations, which are no mistakes of conventions: the
+    verdict has tests of its own for them.
+    """
+    return with_exchanges(_with_hints(result))
+
+
+def explained(result: Result) -> list[Message]:
+    """Name mistakes in what the data of an adjustment mean that explain why it has failed, or fits badly."""
+    if result.loss is not None:
+        return []
+    found = _of_block(result.block) if _bad(result) else []
+    if result.WHOLE and not found and (not result.converged or is_suspected(result)):
+        from photogram.diagnosis.adjusting import Adjuster
+        from photogram.diagnosis.rolling import rolling_hints
+        from photogram.diagnosis.shutters import shutter_hints
+
+        found = shutter_hints(result.block, result, Adjuster({})) or rolling_hints(result)
+    return found
+
+
+def remarks(result: Result) -> list[Message]:
+    """Name what fits and is hardly what was meant: directions of readouts, offsets of clocks, marks."""
+    if not (result.converged and (result.unknowns or result.block.observations)):
+        return []
+    from photogram.diagnosis.clocks import known_offsets
+    from photogram.diagnosis.film_axes import axis_hints
+    from photogram.diagnosis.film_lenses import lens_hints
+    from photogram.diagnosis.film_lines import line_hints
+    from photogram.diagnosis.film_marks import mark_hints
+    from photogram.diagnosis.film_scans import seam_hints
+    from photogram.diagnosis.shutters import backward_readouts
+
+    # A film in two pieces makes marks fail, too, and so does one that has changed along one axis.
+    films = seam_hints(result) or axis_hints(result) or mark_hints(result)
+    films += [*lens_hints(result), *line_hints(result)]
+    return [*backward_readouts(result), *known_offsets(result), *films]
+
+
+def _of_block(block: Block) -> list[Message]:
+    """Try conventions of photos at rest, and of those on trajectories."""
+    from photogram.diagnosis.conventions import hints
+    from photogram.diagnosis.trajectory_hints import flown_hints
+
+    return [*hints(as_seen(block)), *flown_hints(block)]
+
+
+def _bad(result: Result) -> bool:
+    variance = result.variance_of_unit_weight
+    return not (result.converged and (variance is None or variance <= BAD**2))
+
+
+def _with_hints(result: Result) -> Result:
+    found, said = explained(result), remarks(result)
+    if not found and result.converged and result.loss is None and _bad(result):
+        from photogram.diagnosis.weights import weight_hints
+
+        said = [*weight_hints(result), *said]
+    if not (found or said):
+        return result
+    return replace(result, hints=tuple(map(str, found)), messages=[*found, *said, *result.messages])
+
+
+def diagnosis_of(result: Result) -> Diagnosis:
+    """Return what explains an adjustment that has failed or fits badly; its verdict is the judgement."""
+    from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
+    from photogram.diagnosis.weights import weight_hints
+
+    found = diagnosed(result)
+    section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
+    section.findings += [Finding("convention", "grave", hint) for hint in found.hints]
+    section.findings += [Finding("exchanged-points", "grave", names) for names in found.exchanged]
+    section.findings += [Finding("moving", "look", str(each)) for each in remarks(found)]
+    if found.converged and not found.hints:
+        section.findings += [Finding("weights", "look", str(hint)) for hint in weight_hints(found)]
+    verdict = found.verdict
+    if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
+        level: Level = "grave" if verdict.exit else "look"
+        section.findings.insert(0, Finding(verdict.code, level, verdict.headline))
+    return Diagnosis(result.block.title, [section], found, adjusted_before=True)

@@ -1,0 +1,100 @@
+"""The check of a block with photos on trajectories: by its adjustment, and what snooping takes out of it.
+
+What is tried otherwise takes photos for pictures with one pose each. A photo that moves is none: its images
+do not fit one pose, and every unit, axis or angle that is tried would be blamed for that.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.adjustment.snooping import snoop
+from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.after_adjustment import explained, remarks
+from photogram.diagnosis.clocks import counted_lines
+from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.shutters import shutter_hints
+from photogram.diagnosis.structure import structure_section
+from photogram.diagnosis.trajectory_hints import flown_hints
+from photogram.diagnosis.weights import weight_hints
+from photogram.errors import AdjustmentError, InputError
+from photogram.messages import counted
+from photogram.network.block import Block, flown_by
+from photogram.network.motion import timed_photos
+from photogram.results.result import Result
+from photogram.results.snooping_result import Snooped
+
+if TYPE_CHECKING:
+    from photogram.diagnosis.findings import Words
+    from photogram.statistics.snooping.log import Removal
+
+__all__ = ["flown_checked"]
+
+
+def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[Section], Result | None]:
+    """Check a block with photos or records on trajectories.
+
+    Parameters
+    ----------
+    block
+        The block.
+    words
+        What things are called.
+    adjusted
+        Adjusts.
+    """
+    structure = structure_section(block, None, words)
+    timed = timed_photos(block)
+    at_rest = {name for name, moves in zip(block.photo_ids, timed.tolist(), strict=True) if not moves}
+    # What ties a photo to a trajectory may be no point.
+    structure.findings = [each for each in structure.findings if at_rest.issuperset(each.photos)]
+    section = Section(
+        "Adjustment",
+        "Photos on trajectories are no pictures with one pose: units, axes and angles are not tried on them.",
+    )
+    section.parts.append(
+        f"{flown_by(block)}: of {counted(len(timed), 'photo')} {int(timed.sum())} are on one"
+    )
+    try:
+        result = adjusted(block)
+    except (AdjustmentError, InputError) as error:
+        section.findings.append(Finding("no-adjustment", "grave", f"it cannot be adjusted: {error}"))
+        mistakes = flown_hints(block) or shutter_hints(block, None, adjusted)
+        section.findings += [Finding("convention", "grave", str(each)) for each in mistakes]
+        return [structure, section], None
+    section.findings += [Finding("convention", "grave", str(each)) for each in explained(result)]
+    section.findings += [Finding("moving", "look", str(each)) for each in remarks(result)]
+    section.findings += counted_lines(block, adjusted)
+    found = _snooped(block, adjusted)
+    if found is not None and (result.converged or found.result.converged):
+        section.findings += [_finding(each) for each in found.removed]
+    if result.converged:
+        section.findings += [Finding("weights", "look", str(each)) for each in weight_hints(result)]
+    verdict = result.verdict
+    if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
+        level: Level = "grave" if verdict.exit else "look"
+        section.findings.insert(0, Finding(verdict.code, level, verdict.headline))
+    return [structure, section], result
+
+
+def _snooped(block: Block, adjusted: Adjuster) -> Snooped | None:
+    """Return the block without gross errors; None where it cannot be tested."""
+    try:
+        return snoop(block, threads=adjusted.options.get("threads"))
+    except (AdjustmentError, InputError):
+        return None
+
+
+def _finding(entry: Removal) -> Finding:
+    sizes = [
+        f"{component} {error:.4g} {unit}".rstrip()
+        for component, unit, error, sd in zip(
+            entry.components, entry.units, entry.error, entry.error_sd, strict=True
+        )
+        if np.isfinite(error) and abs(error) > sd
+    ]
+    about = f", error about {', '.join(sizes)}" if sizes else ""
+    text = f"{entry.sentence} does not fit the others (T {entry.statistic:.4g}{about})"
+    return Finding("blunder", "grave", text, values={"statistic": entry.statistic})

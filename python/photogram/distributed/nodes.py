@@ -1,0 +1,187 @@
+"""The nodes of a block in the core, from their parts on disk, and what becomes of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, cast
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.adjustment import named
+from photogram.arguments.types import Indices
+from photogram.distributed.datum import local_row
+from photogram.distributed.engine import Node
+from photogram.distributed.files import read_json, write_file, write_json
+from photogram.distributed.parts import Names, Part
+from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
+from photogram.io.structure import Decoder, Encoder
+from photogram.lazy_dataclasses import replace
+from photogram.network.core_arrays import block_network
+from photogram.results.block_files import block_files, read_block_result
+from photogram.results.datum import datum_of
+from photogram.results.result import Result
+from photogram.results.result_files import read_summary
+
+if TYPE_CHECKING:
+    from photogram._photocore import BlockSolution
+
+__all__ = ["CoreEngine", "read_outcome"]
+
+OUTCOME = "outcome.json"
+
+
+class CoreEngine:
+    """Nodes of the core."""
+
+    def node(self, run: Path, number: int) -> _photocore.Node:
+        """Return a node.
+
+        Raises
+        ------
+        InputError
+            Its part is missing or damaged.
+        RankError, AdjustmentError, OutOfMemoryError
+            It cannot be adjusted; names the photos and points concerned.
+        """
+        manifest = read_manifest(run)
+        part = read_node(run, manifest, number)
+        own = len(part.block.unknowns)
+        # What is held is told below.
+        options = replace(manifest.options, minimum=None)
+        network = block_network(part.block, options, part.common[own:])
+        rows = [
+            {row: place for place, row in enumerate(each)}
+            for each in (part.photos.tolist(), range(len(part.block.cameras)), part.unknowns.tolist())
+        ]
+
+        def local(names: Names) -> list[tuple[str, int]]:
+            kinds = zip(("photo", "camera", "unknown"), rows, names.rows, strict=True)
+            return [(kind, places[row]) for kind, places, each in kinds for row in each]
+
+        places = rows[0]
+        held = [(places[photo], number) for photo, number in manifest.held if photo in places]
+        children = [local(manifest.outer[child]) for child in manifest.tree.children[number]]
+        try:
+            return network.node(
+                local(manifest.outer[number]), children, middle=manifest.middle, threads=0, held=held
+            )
+        except _photocore.BlockError as error:
+            raise named(part.block, *error.args, unknowns=part.common) from None
+
+    def stations(self, run: Path, number: int) -> int:
+        """Return how many weighted unknowns of photos and cameras are at home in a node."""
+        return read_manifest(run).weighted[number]
+
+    def failure(self, run: Path, number: int, undetermined: Any) -> Exception:
+        """Return what a node leaves undetermined as an error, with names."""
+        part = read_node(run, read_manifest(run), number)
+        return named(part.block, *undetermined, unknowns=part.common)
+
+    def keep(self, run: Path, number: int, solution: BlockSolution, variance: float | None) -> None:
+        """Write the result of a node as a folder that :func:`photogram.read_result` reads."""
+        manifest = read_manifest(run)
+        part = read_node(run, manifest, number)
+        folder = result_folder(run, number)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / OUTCOME).unlink(missing_ok=True)
+        _write(folder, _result(part, manifest, solution, variance))
+        # The last of its files: with it the node is done.
+        write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
+
+    def unknowns(self, run: Path, number: int, node: Node) -> Indices:
+        """Return (N, 3) what the unknowns of a node belong to, rows being those of the whole block."""
+        part, names = read_node(run, read_manifest(run), number), node.unknown_names
+        cameras = np.arange(len(part.block.cameras))
+        for kind, rows in enumerate((part.photos, cameras, part.unknowns, part.points)):
+            own = names[:, 0] == kind
+            names[own, 1] = rows[names[own, 1]]
+        return names
+
+    def redundancies(self, run: Path, number: int) -> tuple[float, float, float, float]:
+        """Return sums of redundancy numbers, by kinds, of what was written of a node."""
+        camera, ground, plates, others = read_outcome(result_folder(run, number))["redundancies"]
+        return camera, ground, plates, others
+
+    def settle(self, run: Path, number: int, variance: float | None) -> None:
+        """Scale what was written of a node by a variance of unit weight that is known since."""
+        folder = result_folder(run, number)
+        found = read_block_result(folder, read_summary(folder))
+        scale = 1.0 if variance is None else variance
+        cameras = tuple(replace(each, covariance=scale * each.cofactors) for each in found.cameras)
+        unknowns = tuple(replace(each, covariance=scale * each.cofactors) for each in found.unknowns)
+        _write(folder, replace(found, variance_of_unit_weight=variance, cameras=cameras, unknowns=unknowns))
+
+
+def _write(folder: Path, result: Result) -> None:
+    """Write the result of a node."""
+    for name, content in block_files(result).items():
+        if isinstance(content, bytes):
+            plain = content
+            write_file(folder / name, lambda file, plain=plain: file.write(plain))  # type: ignore[misc]
+        else:
+            write_file(folder / name, content)
+
+
+def read_outcome(folder: Path) -> dict[str, Any]:
+    """Return what the tables of a node have no place for.
+
+    Raises
+    ------
+    InputError
+        It is missing or damaged.
+    """
+    path = folder / OUTCOME
+    found: dict[str, Any] = Decoder([], path).value(read_json(path))
+    return found
+
+
+def _result(part: Part, manifest: Manifest, solution: BlockSolution, variance: float | None) -> Result:
+    """Return the result of a node, scaled by the variance of unit weight of the whole."""
+    scaled = cast("BlockSolution", _Scaled(part, solution, variance))
+    row = None if manifest.datum is None else local_row(manifest.datum, part.photos, part.points)
+    datum = datum_of(part.block, solution, row, held=manifest.held)
+    return _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
+
+
+class _OfNode(Result):
+    """The result of a node: its own normal equations are not those of the block, and are not formed again."""
+
+    WHOLE: ClassVar[bool] = False
+
+
+class _Scaled:
+    """What the core found of a node, with the variance of unit weight of the whole.
+
+    The history of photos is not that of one node, and its block does not observe all unknowns that it has.
+    """
+
+    def __init__(self, part: Part, solution: BlockSolution, variance: float | None) -> None:
+        self._solution = solution
+        self.variance_of_unit_weight = variance
+        self.photo_corrections = np.zeros((0, len(part.photos), 6))
+        self.adjusted_unknowns = solution.adjusted_unknowns[: len(part.block.unknowns)]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._solution, name)
+
+
+def _outcome(part: Part, solution: BlockSolution) -> dict[str, Any]:
+    """Return what tables have no place for; rows are those of the whole block."""
+    places = [int(part.observations[row]) for rows, _ in part.block.observation_groups for row in rows]
+    observed = zip(places, solution.adjusted_observations, strict=True)
+    return {
+        "sums_of_squares": solution.sums_of_squares,
+        "redundancies": solution.redundancies,
+        "behind": part.images[solution.images_behind].tolist(),
+        "folded": part.images[solution.images_folded].tolist(),
+        "loose": part.photos[solution.loose_photos].tolist(),
+        "weak_points": [(int(part.points[row]), *rest) for row, *rest in solution.weak_points],
+        "dropped": [(int(part.points[row]), reason) for row, reason in solution.dropped],
+        "cameras": solution.cameras,
+        "unknowns": list(zip(part.unknowns.tolist(), solution.adjusted_unknowns, strict=True)),
+        "observed": list(observed),
+        "relative_error": solution.relative_error,
+        "operations": solution.operations,
+        "seconds": solution.seconds,
+    }

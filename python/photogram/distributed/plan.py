@@ -1,0 +1,215 @@
+"""The plan of an adjustment in parts: work, memory and traffic of the nodes, before anything is formed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.distributed.cut import Tree
+from photogram.distributed.engine import Node
+from photogram.distributed.schedule import Rates, Times, scheduled
+from photogram.errors import OutOfMemoryError
+from photogram.lazy_dataclasses import dataclass
+from photogram.memory import gibibytes
+
+__all__ = ["PartsPlan", "measured_rates"]
+
+IMAGE = 200.0
+"""Multiply-adds of the formation of an image point."""
+ITERATIONS = 4
+"""Formations of an adjustment from usual initial values."""
+SHARE = 0.8
+"""Of the memory of a worker, what it may hold: the rest is for messages under way and what lies between."""
+
+
+@dataclass(frozen=True)
+class PartsPlan:
+    """What an adjustment in parts takes.
+
+    Attributes
+    ----------
+    tree
+        The tree.
+    predictions
+        Of each node: `_photocore.Node.prediction`.
+    photos
+        At home in each node.
+    workers
+        How many.
+    memory
+        Bytes of each; None where nothing bounds them.
+    rates
+        What a worker does in a second; None where that was not measured.
+    held
+        Bytes that a worker holds before it begins: Python and libraries.
+    """
+
+    tree: Tree
+    predictions: Sequence[Mapping[str, float]]
+    photos: Sequence[int]
+    workers: int
+    memory: int | None = None
+    rates: Rates | None = None
+    held: int = 0
+
+    def of(self, name: str) -> Floats:
+        """Return (N,) one prediction of all nodes."""
+        return np.array([each[name] for each in self.predictions])
+
+    @property
+    def largest(self) -> float:
+        """Bytes of the node that takes most, at the most."""
+        return float(self.of("memory_bytes").max())
+
+    @property
+    def room(self) -> float:
+        """Bytes that a worker has for nodes."""
+        return math.inf if self.memory is None else SHARE * self.memory - self.held
+
+    @property
+    def bytes_up(self) -> float:
+        """Bytes that all nodes leave to their parents in an iteration."""
+        return float(self.of("contribution_bytes").sum())
+
+    @property
+    def bytes_down(self) -> float:
+        """Bytes of the steps that go down in an iteration."""
+        return float(self.of("step_bytes").sum())
+
+    @property
+    def bytes_inverted(self) -> float:
+        """Bytes of cofactors that go down in the inversion."""
+        return float(self.of("cofactor_bytes").sum())
+
+    @property
+    def times(self) -> Times | None:
+        """Seconds on the workers; None without rates."""
+        if self.rates is None:
+            return None
+        formation = IMAGE * self.of("images") + self.of("reduction")
+        up = formation / self.rates.formation + self.of("factor") / self.rates.factor
+        inversion = formation / self.rates.formation + self.of("inverse") / self.rates.inverse
+        # Substitution takes two multiply-adds for each number of the factor, and the points once more.
+        down = self.of("factor_bytes") / 4 / self.rates.factor + IMAGE * self.of("images") / (
+            self.rates.formation
+        )
+        traffic = self.of("contribution_bytes"), self.of("step_bytes"), self.of("cofactor_bytes")
+        return scheduled(self.tree, up, down, inversion, traffic, self.workers, self.rates.bandwidth)
+
+    def check(self) -> None:
+        """Refuse what does not fit.
+
+        Raises
+        ------
+        OutOfMemoryError
+            A node takes more than a worker has; says how many parts would do, where any number does.
+        """
+        if self.memory is None or self.largest <= self.room:
+            return
+        taken = f", of which {gibibytes(self.held)} GiB are taken before it begins," if self.held else ""
+        raise OutOfMemoryError(
+            f"the largest node takes {gibibytes(self.largest)} GiB, and a worker of"
+            f" {gibibytes(self.memory)} GiB may hold {gibibytes(SHARE * self.memory)}{taken} and no more:"
+            f" {self._advice()}"
+        )
+
+    def _advice(self) -> str:
+        """Say what would do: a part halves with their number, a separator stays as it is."""
+        memory = self.of("memory_bytes")
+        leaf = np.array([not below for below in self.tree.children])
+        top = float(memory[~leaf].max(initial=0.0))
+        if top > self.room:
+            return (
+                f"a separator alone takes {gibibytes(top)} GiB, which more parts do not change; give workers"
+                f" of {gibibytes((top + self.held) / SHARE)} GiB"
+            )
+        parts = int(leaf.sum())
+        # What a part takes falls with its photos, but for the contributions of its borders.
+        fit = parts * 2 ** int(np.ceil(np.log2(float(memory[leaf].max()) / self.room)))
+        return f"about {fit} parts would fit, in place of {parts}"
+
+    def lines(self) -> list[str]:
+        """Return the plan as lines of text."""
+        parts = sum(not below for below in self.tree.children)
+        unknowns = self.of("interior").sum() + self.of("points").sum()
+        lines = [
+            f"{parts} parts and {len(self.tree) - parts} separators for {self.workers} workers"
+            + ("" if self.memory is None else f" of {gibibytes(self.memory)} GiB"),
+            f"{sum(self.photos):,} photos, {self.of('images').sum():,.0f} image points,"
+            f" {self.of('observations').sum():,.0f} observations, {unknowns:,.0f} unknowns",
+            "",
+            f"{'level':>5} {'nodes':>6} {'photos':>9} {'image points':>13} {'outer':>7} {'factor':>9}"
+            f" {'memory':>9} {'up':>9}",
+            f"{'':5} {'':6} {'':9} {'':13} {'most':>7} {'10^9':>9} {'most MiB':>9} {'MiB':>9}",
+        ]
+        levels = self.tree.levels
+        leaf = np.array([not below for below in self.tree.children])
+        for name, rows in [
+            *((f"{level}", ~leaf & (levels == level)) for level in range(int(levels.max()) + 1)),
+            ("parts", leaf),
+        ]:
+            if not rows.any():
+                continue
+            photos = int(np.array(self.photos)[rows].sum())
+            lines.append(
+                f"{name:>5} {int(rows.sum()):>6} {photos:>9,} {self.of('images')[rows].sum():>13,.0f}"
+                f" {self.of('outer')[rows].max():>7,.0f} {self.of('factor')[rows].sum() / 1e9:>9,.3f}"
+                f" {self.of('memory_bytes')[rows].max() / 2**20:>9,.1f}"
+                f" {self.of('contribution_bytes')[rows].sum() / 2**20:>9,.1f}"
+            )
+        lines += [
+            "",
+            f"in an iteration {self.bytes_up / 2**20:,.1f} MiB go up and {self.bytes_down / 2**20:,.3f} MiB"
+            f" down, in the inversion {self.bytes_inverted / 2**20:,.1f} MiB down, where all nodes are on"
+            " different workers",
+            f"the largest node takes {self.largest / 2**20:,.0f} MiB"
+            + (f", a worker holds {self.held / 2**20:,.0f} MiB before it begins" if self.held else ""),
+        ]
+        times = self.times
+        if times is not None:
+            lines.append(
+                f"at the rate measured {times.up + times.down:,.1f} s for an iteration and"
+                f" {times.inversion:,.1f} s for the inversion: {times.whole(ITERATIONS):,.0f} s with"
+                f" {ITERATIONS} iterations"
+            )
+        return lines
+
+
+def measured_rates(part: Node, bandwidth: float = 1e9) -> Rates:
+    """Measure what this process does in a second, at one part.
+
+    Parameters
+    ----------
+    part
+        A part, formed and inverted here, at what it starts from, for nothing else.
+    bandwidth
+        Bytes a second between workers: 10 Gbit Ethernet.
+    """
+    prediction = part.prediction
+    size = len(part.outer)
+    start = time.perf_counter()
+    formed = part.form(part.initial, [], damping=0.0, curved=False, threads=0)
+    forming = time.perf_counter() - start
+    start = time.perf_counter()
+    formed.invert(np.zeros(size * (size + 1) // 2), part.initial, threads=0)
+    inverting = time.perf_counter() - start
+    # The product rate bounds the dense work; the rest of the time is formation.
+    dense = _product_rate()
+    formation = IMAGE * prediction["images"] + prediction["reduction"]
+    in_factor = min(prediction["factor"] / dense, 0.9 * forming)
+    in_inverse = min(prediction["inverse"] / dense, 0.9 * inverting)
+    rate = 2 * formation / (forming - in_factor + inverting - in_inverse)
+    return Rates(rate, dense, dense, bandwidth)
+
+
+def _product_rate() -> float:
+    """Return multiply-adds a second of a factorisation, 0.4 of those of a product of matrices."""
+    matrix = np.ones((1024, 1024))
+    matrix @ matrix
+    start = time.perf_counter()
+    matrix @ matrix
+    return 0.4 * 1024**3 / (time.perf_counter() - start)

@@ -1,0 +1,265 @@
+"""Results in a coordinate reference system: positions, covariances in metres east, north, up, attitudes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.formats.crs import axes_of, has_place, is_on, to_system
+from photogram.formats.project import frame_of
+from photogram.io.csv_text import csv_text
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.network.attitudes import Attitudes, Representation
+from photogram.network.block import Block
+from photogram.network.frame import Frame
+from photogram.network.geometry import Spheroid, lengths_of_units
+from photogram.results.ellipses import metric_covariances
+from photogram.results.result import Result
+
+__all__ = ["Placed", "check_place", "placed", "placed_files"]
+
+_ANGLES = ("omega", "phi", "kappa")
+_LOCAL = ("east", "north", "up")
+DEGREE = 180.0 / np.pi
+"""Of a radian."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A result in a system.
+
+    Attributes
+    ----------
+    result
+        The result.
+    crs
+        The system, as it was asked for.
+    names, units
+        Of the three coordinates.
+    rows
+        (k,) the points that took part.
+    photos, points
+        (P, 3) and (k, 3) positions: longitude or easting, latitude or northing, height; angles in degrees.
+    photo_covariances, point_covariances
+        (P, 3, 3) and (k, 3, 3), along east, north and up of the system (of a projected one along its grid),
+        square metres.
+    photo_turns, point_turns
+        (P, 3, 3) and (k, 3, 3) what turns vectors of the block's own axes into these.
+    attitudes
+        Of the photos, relative to these axes at each photo.
+    """
+
+    result: Result
+    crs: str
+    names: tuple[str, str, str]
+    units: tuple[str, str, str]
+    rows: Indices
+    photos: Floats
+    points: Floats
+    photo_covariances: Floats
+    point_covariances: Floats
+    photo_turns: Floats
+    point_turns: Floats
+    attitudes: Attitudes
+
+    def angles(self) -> tuple[Floats, Floats]:
+        """Return (P, 3) omega, phi, kappa relative to the system's axes, and their standard deviations: rad.
+
+        Their sense is that of the block.
+        """
+        kind = _representation(self.result.block)
+        if self.attitudes.step_covariances is None:
+            return self.attitudes.values(kind), np.full((len(self.photos), 3), np.nan)
+        return self.attitudes.values(kind), self.attitudes.standard_deviations(kind)
+
+    def carried(self, xyz: Floats) -> Floats:
+        """Return (n, 3) other positions of the block in the system."""
+        return _carried(self.result.block, self.crs, check_place(self.result.block, self.crs), xyz)[0]
+
+    def moved(self, places: Floats, steps: Floats) -> Floats:
+        """Return (n, 3) places of the system moved by (n, 3) steps to the east, north and up, metres."""
+        if self.names[0] != "longitude":
+            return places + steps
+        known = np.column_stack([np.radians(places[:, :2]), places[:, 2]])
+        lengths = lengths_of_units(known, self.result.block.spheroid or Spheroid.wgs84())
+        return places + steps / lengths * [DEGREE, DEGREE, 1.0]
+
+    def control_differences(self) -> tuple[Indices, Floats]:
+        """Return rows among all points, and (c, 3) differences of control, adjusted minus given: metres.
+
+        They are along east, north and up; components that are not held are 0 before they are turned.
+        """
+        control = self.result.control
+        places = {row: k for k, row in enumerate(self.rows.tolist())}
+        own = self.point_turns[[places[row] for row in control.rows.tolist()]]
+        return control.rows, _turned(own, _metric(self.result, control.rows, control.differences))
+
+    def differences(self) -> tuple[Indices, Floats]:
+        """Return rows among all points, and (c, 3) adjusted minus given of check points, likewise."""
+        result = self.result
+        own = result.point_kinds[self.rows] == "check"
+        rows = self.rows[own]
+        return rows, _turned(self.point_turns[own], _metric(result, rows, result.point_differences[rows]))
+
+
+def check_place(block: Block, crs: str) -> Frame:
+    """Return the frame of a block whose results are to be brought to a system; nothing asks for none.
+
+    Longitudes and latitudes of which only the ellipsoid is known are those of a system on this ellipsoid that
+    is asked for: the block has no other datum.
+
+    Raises
+    ------
+    InputError
+        A frame without a place, lengths that are not metres, a system that PROJ does not know.
+    """
+    frame = frame_of(block)
+    if not crs:
+        return frame
+    axes_of(crs)
+    if frame.kind == "geographic" and not has_place(frame):
+        if not is_on(crs, frame.ellipsoid):
+            raise InputError(
+                f"results cannot be brought to {crs}: the longitudes and latitudes are on the ellipsoid"
+                f" {frame.ellipsoid[0]:.12g}, {frame.ellipsoid[1]:.12g}, and nothing says of which datum;"
+                " --crs with a geographic system on it (of Clarke 1866, EPSG:4267) takes them as its own"
+            )
+        return replace(frame, crs=crs)
+    if not has_place(frame):
+        raise InputError(
+            f"results cannot be brought to {crs}: nothing says where on the earth the frame ({frame}) is;"
+            " [frame] or [control] crs, or --control-crs, do"
+        )
+    if block.linear_unit != "m":
+        raise InputError(f"results cannot be brought to {crs} from {block.linear_unit}: metres are needed")
+    return frame
+
+
+def placed(result: Result, crs: str = "") -> Placed:
+    """Return a result in a system.
+
+    Parameters
+    ----------
+    result
+        The result of a block in a frame whose place on the earth is known.
+    crs
+        The system: `EPSG:25832`, `EPSG:4979`, `ENU:lat,lon[,h]` ... Heights of one without heights are
+        ellipsoidal. None (empty): the block's own axes.
+
+    Raises
+    ------
+    InputError
+        A frame without a place, lengths that are not metres, or a system that does not go: one that PROJ does
+        not know, heights for which a grid is missing, positions beyond it.
+    """
+    block = result.block
+    rows = np.flatnonzero(result.used_points)
+    covariances = metric_covariances(result, photos=True), metric_covariances(result)[rows]
+    places = result.photo_positions, result.point_positions[rows]
+    frame = check_place(block, crs)
+    (photos, photo_turns), (points, point_turns) = (_carried(block, crs, frame, xyz) for xyz in places)
+    names, units = axes_of(crs) if crs else _own_axes(block)
+    turned = [
+        turns @ own @ turns.transpose(0, 2, 1)
+        for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
+    ]
+    own = _own_attitudes(result)
+    return Placed(
+        result=result,
+        crs=crs,
+        names=names,
+        units=units,
+        rows=rows,
+        photos=photos,
+        points=points,
+        photo_covariances=turned[0],
+        point_covariances=turned[1],
+        photo_turns=photo_turns,
+        point_turns=point_turns,
+        attitudes=replace(own, matrices=photo_turns @ own.matrices),
+    )
+
+
+def placed_files(found: Placed) -> dict[str, bytes]:
+    """Return the tables of a result in a system as text of commas: photos, points, control, check points."""
+    block = found.result.block
+    ids = np.array(block.point_ids, dtype=object)
+    angles, deviations = (np.degrees(each) for each in found.angles())
+    tables: dict[str, dict[str, Any]] = {
+        "photos.csv": {
+            "photo": block.photo_ids,
+            **_positions(found.names, found.photos, found.photo_covariances),
+            **{f"{name}_deg": column for name, column in zip(_ANGLES, angles.T, strict=True)},
+            **{f"sd_{name}_deg": column for name, column in zip(_ANGLES, deviations.T, strict=True)},
+        },
+        "points.csv": {
+            "point": ids[found.rows],
+            "kind": found.result.point_kinds[found.rows],
+            "rays": found.result.point_rays[found.rows],
+            **_positions(found.names, found.points, found.point_covariances),
+        },
+    }
+    for name, (rows, vectors) in (
+        ("control.csv", found.control_differences()),
+        ("check_points.csv", found.differences()),
+    ):
+        if len(rows):
+            columns = {f"d_{axis}": part for axis, part in zip(_LOCAL, vectors.T, strict=True)}
+            tables[name] = {"point": ids[rows], **columns}
+    comments = [
+        f"coordinates in {found.crs}: "
+        + ", ".join(f"{name} {unit}" for name, unit in zip(found.names, found.units, strict=True)),
+        "sd_ and c_ (covariances, scaled by the variance of unit weight) and all differences are in metres"
+        " along east, north and up of this system",
+        f"datum: {found.result.datum}",
+    ]
+    return {name: csv_text(columns, comments) for name, columns in tables.items()}
+
+
+def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats, Floats]:
+    """Return positions of a block in a system, and what turns vectors; without one they stay as they are."""
+    if crs:
+        return to_system(crs, xyz, frame)
+    degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if block.geographic else xyz
+    return degrees, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
+
+
+def _own_axes(block: Block) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
+    if block.geographic:
+        return ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
+    return ("x", "y", "z"), (block.linear_unit,) * 3
+
+
+def _positions(names: Sequence[str], xyz: Floats, covariances: Floats) -> dict[str, Any]:
+    sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    pairs = [(i, j) for i in range(3) for j in range(i + 1)]
+    return {
+        **dict(zip(names, xyz.T, strict=True)),
+        **{f"sd_{axis}": column for axis, column in zip(_LOCAL, sd.T, strict=True)},
+        **{f"c_{_LOCAL[i]}_{_LOCAL[j]}": covariances[:, i, j] for i, j in pairs},
+    }
+
+
+def _representation(block: Block) -> Representation:
+    return "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+
+
+def _own_attitudes(result: Result) -> Attitudes:
+    """Return the attitudes of the photos relative to the axes of the block."""
+    covariances = result.photo_covariances[:, 3:, 3:]
+    known = bool(np.isfinite(covariances).all())
+    return Attitudes.of(_representation(result.block), result.photo_attitudes, covariances if known else None)
+
+
+def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
+    """Return differences of positions of points in the linear unit; 0 where there are none."""
+    lengths = lengths_of_units(result.point_positions[rows], result.block.spheroid)
+    return np.where(np.isnan(differences), 0.0, differences * lengths)
+
+
+def _turned(turns: Floats, vectors: Floats) -> Floats:
+    return np.asarray(np.einsum("nij,nj->ni", turns, vectors))

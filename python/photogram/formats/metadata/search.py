@@ -1,0 +1,218 @@
+"""The files of a folder of photographs that say where photos were taken, and which photo each line means."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+
+from photogram.errors import InputError
+from photogram.formats.metadata.geo_txt import NAME as GEO_TXT
+from photogram.formats.metadata.geo_txt import read_geo_txt
+from photogram.formats.metadata.mrk import Exposure, number_of, prefix_of, read_exposures
+from photogram.formats.metadata.pictures import ENDINGS, said_by_picture
+from photogram.formats.metadata.record import Said
+from photogram.formats.metadata.reference import is_reference, read_reference
+from photogram.formats.plain.schema import TABLES
+from photogram.io.files import reading
+from photogram.lazy_dataclasses import dataclass, field
+from photogram.messages import Message, counted, listed, quoted
+
+__all__ = ["Found", "Photos", "found_in"]
+
+_TEXTS = (".csv", ".txt")
+_EXPOSURES = ".mrk"
+
+
+@dataclass
+class Found:
+    """What the files of a folder say of each photo.
+
+    Attributes
+    ----------
+    said
+        By the path of a photo below the folder: what its sources say, the first that counts first.
+    flights
+        The flight of each photo: its folder, and the .MRK file where the folder has several.
+    tables
+        Files that are no pictures and were read.
+    pictures
+        Files whose heads were read.
+    messages
+        Remarks.
+    """
+
+    said: dict[str, list[Said]] = field(default_factory=dict)
+    flights: dict[str, str] = field(default_factory=dict)
+    tables: list[Path] = field(default_factory=list)
+    pictures: list[Path] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
+
+
+def found_in(directory: Path, *, antenna: bool) -> Found:
+    """Read all files of a folder, and of folders in it, that say where photos were taken.
+
+    Parameters
+    ----------
+    directory
+        The folder.
+    antenna
+        Whether positions of .MRK files are those of the antenna.
+
+    Raises
+    ------
+    InputError
+        No folder, nothing in it that says anything, a file at fault.
+    """
+    with reading(directory):
+        if not directory.is_dir():
+            raise InputError("is no folder of photographs", file=directory)
+        files = list(_files(directory))
+    found = Found()
+    pictures = {_key(directory, path): path for path in files if path.suffix.lower() in ENDINGS}
+    found.pictures = list(pictures.values())
+    given = _tables(directory, files, found)
+    exposures = {path: read_exposures(path) for path in files if path.suffix.lower() == _EXPOSURES}
+    found.tables += exposures
+    if not (pictures or given or exposures):
+        endings = ", ".join((*ENDINGS, "*_Timestamp.MRK"))
+        raise InputError(
+            f"holds nothing that says where photos were taken: {endings}, {GEO_TXT}", file=directory
+        )
+    for key in dict.fromkeys([*pictures, *given]):
+        found.said[key] = [given[key]] if key in given else []
+        folder = PurePosixPath(key).parent.as_posix()
+        found.flights[key] = directory.resolve().name if folder == "." else folder
+    _add_exposures(directory, exposures, found, antenna=antenna)
+    for key, path in pictures.items():
+        found.said[key] += said_by_picture(path)
+    return found
+
+
+def _files(directory: Path) -> Iterator[Path]:
+    """Yield the files of a folder in their order, but for hidden ones."""
+    for folder, folders, names in os.walk(directory):
+        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        yield from (Path(folder) / name for name in sorted(names) if not name.startswith("."))
+
+
+def _key(directory: Path, path: Path) -> str:
+    return path.relative_to(directory).as_posix()
+
+
+class Photos:
+    """Photos of a folder by what people call them.
+
+    Parameters
+    ----------
+    keys
+        Their paths below the folder.
+    """
+
+    def __init__(self, keys: Iterable[str]) -> None:
+        self._known: tuple[dict[str, list[str]], ...] = ({}, {}, {})
+        for key in keys:
+            path = PurePosixPath(key)
+            for names, name in zip(self._known, (key, path.name, path.stem.casefold()), strict=True):
+                names.setdefault(name, []).append(key)
+
+    def meant(self, name: str, folder: str = ".") -> list[str]:
+        """Return those that a name means: its path, else its name, else that without its ending.
+
+        Parameters
+        ----------
+        name
+            A name, or a path.
+        folder
+            The folder in which, or below which, they are.
+        """
+        path = PurePosixPath(name.replace("\\", "/"))
+        paths, names, stems = self._known
+        tried = (
+            paths.get((PurePosixPath(folder) / path).as_posix()),
+            names.get(path.name),
+            stems.get(path.stem.casefold()),
+            stems.get(path.name.casefold()),  # a name without an ending, but with a dot
+        )
+        for keys in tried:
+            inside = [each for each in keys or () if PurePosixPath(each).is_relative_to(folder)]
+            if inside:
+                return inside
+        return []
+
+
+def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, Said]:
+    """Return what geo.txt and tables of references say of each photo; geo.txt counts before the others."""
+    photos = Photos(_key(directory, path) for path in found.pictures)
+    texts = [path for path in files if path.suffix.lower() in _TEXTS and path.stem not in TABLES]
+    given: dict[str, Said] = {}
+    again: dict[Path, int] = {}
+    for path in sorted(texts, key=lambda each: (each.name.lower() != GEO_TXT, each)):
+        if path.name.lower() == GEO_TXT:
+            rows = read_geo_txt(path)
+        elif is_reference(path):
+            rows = read_reference(path, found.messages)
+        else:
+            continue
+        found.tables.append(path)
+        folder = _key(directory, path.parent)
+        for name, said in rows.items():
+            keys = photos.meant(name, folder)
+            if len(keys) > 1:
+                raise said.place.error(f"the photo {quoted(name)} may be {listed(keys, 3)}: write its folder")
+            key = keys[0] if keys else (PurePosixPath(folder) / name).as_posix()
+            if given.setdefault(key, said) is not said:
+                again[path] = again.get(path, 0) + 1
+    for path, count in again.items():
+        text = f"positions of {counted(count, 'photo')} are those of another table, not of this one"
+        found.messages.append(Message(text, path))
+    return given
+
+
+def _add_exposures(
+    directory: Path, exposures: Mapping[Path, Mapping[int, Exposure]], found: Found, *, antenna: bool
+) -> None:
+    """Add what .MRK files say to the photos of their folders, by the numbers in their names."""
+    of_folder: dict[str, list[Path]] = {}
+    for path in exposures:
+        of_folder.setdefault(_key(directory, path.parent), []).append(path)
+    used: dict[Path, set[int]] = {path: set() for path in exposures}
+    for key, sources in found.said.items():
+        number, folder = number_of(PurePosixPath(key).stem), _nearest(key, of_folder)
+        if number is None or folder is None:
+            continue
+        own = _of_flight(key, of_folder[folder], number, exposures)
+        if own is None:
+            continue
+        if len(of_folder[folder]) > 1:
+            found.flights[key] = f"{folder}/{prefix_of(own)}".removeprefix("./")
+        if number in exposures[own]:
+            sources.append(exposures[own][number].said(antenna))
+            used[own].add(number)
+    for path, numbers in used.items():
+        if left := len(exposures[path]) - len(numbers):
+            text = f"{left} of {counted(len(exposures[path]), 'exposure')} have no photo here"
+            found.messages.append(Message(text, path))
+
+
+def _nearest(key: str, folders: Mapping[str, object]) -> str | None:
+    """Return the folder of a photo, or the next one above it, that is among some."""
+    above = (each.as_posix() for each in PurePosixPath(key).parents)
+    return next((each for each in above if each in folders), None)
+
+
+def _of_flight(
+    key: str, paths: Sequence[Path], number: int, exposures: Mapping[Path, Mapping[int, Exposure]]
+) -> Path | None:
+    """Return the .MRK file of a photo: the one of its folder, or the one whose name its own begins with."""
+    if len(paths) == 1:
+        return paths[0]
+    named = [each for each in paths if PurePosixPath(key).name.startswith(f"{prefix_of(each)}_")]
+    likely = named or [each for each in paths if number in exposures[each]]
+    if len(likely) > 1:
+        names = listed([each.name for each in likely], 3)
+        raise InputError(
+            f"the photo {key} may be of {names}: put the photos of each flight into a folder of their own",
+            file=paths[0].parent,
+        )
+    return likely[0] if likely else None

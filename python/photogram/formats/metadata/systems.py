@@ -1,0 +1,182 @@
+"""Positions of photos with their standard deviations, in systems of coordinates, heights all of one kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
+from photogram.formats.metadata.merged import PhotoRecord
+from photogram.formats.metadata.record import ELLIPSOIDAL, SEA_LEVEL, Said
+from photogram.formats.project import Frame
+from photogram.lazy_dataclasses import dataclass
+from photogram.messages import listed
+from photogram.network.geometry import Spheroid
+
+__all__ = ["LEVER_SD", "SHIFT_SD", "Located", "covariances_of", "located"]
+
+SHIFT_SD = 0.05
+"""Metres: a priori standard deviation of the shift that positions of a flight have in common."""
+LEVER_SD = 0.01
+"""Metres: that of a lever arm which is already applied."""
+ABOVE = {False: "above the ellipsoid", True: "above the geoid"}
+_OPTION = "--photos-crs EPSG:4326+geoid=46.5 (heights above sea level, and the geoid above the ellipsoid)"
+_UNKNOWN = "above the geoid (as mostly) or above the ellipsoid"
+_SAY = f"{_OPTION} or --photos-crs {ELLIPSOIDAL} (heights above the ellipsoid) says it"
+
+_WGS84 = (Spheroid.wgs84().a, Spheroid.wgs84().b)
+
+
+@dataclass(frozen=True)
+class Located:
+    """Positions of photos.
+
+    Attributes
+    ----------
+    records
+        Of the n photos.
+    systems
+        The system of each position.
+    xyz
+        (n, 3) longitude (degrees) or easting, latitude or northing, height.
+    sd
+        (n, 3) standard deviations of east, north and height, metres; NaN without.
+    """
+
+    records: tuple[PhotoRecord, ...]
+    systems: tuple[str, ...]
+    xyz: Floats
+    sd: Floats
+
+    @property
+    def flights(self) -> list[str]:
+        """The flight of each position that has a shift and a lever arm in common with others; else empty."""
+        return [each.flight if each.rtk else "" for each in self.records]
+
+    def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[str]]:
+        """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it.
+
+        Raises
+        ------
+        InputError
+            As :func:`photogram.formats.crs.to_frame`.
+        """
+        from photogram.formats.crs import to_frame
+
+        xyz, turned, remarks = np.empty_like(self.xyz), covariances_of(self.sd), list[str]()
+        for crs in dict.fromkeys(self.systems):
+            own = np.array([each == crs for each in self.systems])
+            xyz[own], turned[own], said = to_frame(crs, self.xyz[own], turned[own], frame)
+            remarks += [each for each in said if each not in remarks]
+        return xyz, turned, remarks
+
+    def geographic(self) -> tuple[Floats, Floats]:
+        """Return (n, 3) longitudes, latitudes (degrees), heights above the ellipsoid (WGS 84), and (n, 3) sd.
+
+        What already is so stays as it stands.
+
+        Raises
+        ------
+        InputError
+            As :func:`photogram.formats.crs.to_frame`.
+        """
+        if set(self.systems) <= {ELLIPSOIDAL}:
+            return self.xyz, self.sd
+        frame = Frame("geographic", ELLIPSOIDAL, ellipsoid=_WGS84)
+        known = np.nan_to_num(self.sd)
+        xyz, turned, _ = Located(self.records, self.systems, self.xyz, known).in_frame(frame)
+        xyz[:, :2] = np.degrees(xyz[:, :2])
+        sd = np.sqrt(np.maximum(np.diagonal(turned, axis1=1, axis2=2), 0.0))
+        return xyz, np.where(np.isnan(self.sd), np.nan, sd)
+
+
+def covariances_of(sd: Floats) -> Floats:
+    """Return (n, 3, 3) covariances of uncorrelated components."""
+    found = np.zeros((len(sd), 3, 3))
+    found[:, range(3), range(3)] = sd**2
+    return found
+
+
+def located(
+    records: Sequence[PhotoRecord], crs: str | None = None, sd: Sequence[float] | None = None
+) -> Located:
+    """Return the positions of photos that have one.
+
+    Parameters
+    ----------
+    records
+        What is known of the photos.
+    crs
+        The system of positions whose source does not say it, or not what heights are above.
+    sd
+        Standard deviations where no source has any: one number or three, metres.
+
+    Raises
+    ------
+    InputError
+        Heights of two kinds, or of a kind that nobody says; positions in no system.
+    """
+    known = [each for each in records if each.position is not None]
+    said = [each.position for each in known if each.position is not None]
+    systems = _systems(said, crs)
+    _check_heights(known, said, systems)
+    default = np.broadcast_to(np.nan if sd is None else np.asarray(sd, dtype=float), 3)
+    deviations = [each.deviations.sd if each.deviations is not None else default for each in known]
+    return Located(
+        tuple(known),
+        tuple(systems),
+        np.array([each.position for each in said], dtype=float).reshape(-1, 3),
+        np.array(deviations, dtype=float).reshape(-1, 3),
+    )
+
+
+def _systems(said: Sequence[Said], crs: str | None) -> list[str]:
+    """Return the system of each position: its own, else the one that a user names; empty without both."""
+    from photogram.formats.crs import is_on
+
+    if crs is not None and any(each.crs and each.heights for each in said) and not is_on(crs, _WGS84):
+        first = next(each for each in said if each.crs and each.heights)
+        raise first.place.error(
+            f"its position is longitude and latitude of WGS 84, which {crs} is not: {_SAY}"
+        )
+    for each in said:
+        if not each.crs and crs is None:
+            raise each.place.error(
+                "its file names no system of coordinates: --photos-crs CRS (EPSG:25832 ...)"
+            )
+    return [each.crs if each.crs and not each.heights else crs or "" for each in said]
+
+
+def _check_heights(records: Sequence[PhotoRecord], said: Sequence[Said], systems: Sequence[str]) -> None:
+    kinds: dict[str, list[str]] = {}
+    for record, own, system in zip(records, said, systems, strict=True):
+        kinds.setdefault(_kind(own, system), []).append(f"{record.photo} ({own.source})")
+    if len(kinds) > 1:
+        (one, first), (other, second), *_ = kinds.items()
+        raise InputError(
+            f"heights of two kinds: those of {listed(first, 3)} are {one}, those of {listed(second, 3)} are"
+            f" {other}; give one kind (a table geo.txt, or a folder for each)"
+        )
+    for own, system in zip(said, systems, strict=True):
+        if own.heights == SEA_LEVEL and not _is_above_geoid(system):
+            but = f"heights of {system} are above the ellipsoid" if system else "nothing says where that is"
+            raise own.place.error(
+                f"its height is above sea level (altitude reference 2 or 3), but {but}: {_OPTION}"
+            )
+    if "" in systems:
+        raise said[0].place.error(f"its height is {_UNKNOWN}, and nothing says which: {_SAY}")
+
+
+def _kind(said: Said, system: str) -> str:
+    """Return what heights are above."""
+    if said.heights == SEA_LEVEL:
+        return ABOVE[True]
+    return ABOVE[_is_above_geoid(system)] if system else _UNKNOWN
+
+
+def _is_above_geoid(system: str) -> bool:
+    from photogram.formats.crs import has_geoid_heights
+
+    return system not in ("", ELLIPSOIDAL) and has_geoid_heights(system)

@@ -1,0 +1,85 @@
+"""Common unknowns that rows of tables name: all rows of one name have the same object."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from photogram.errors import InputError
+from photogram.io.delimited import FALSE, TRUE, ColumnTable
+from photogram.lazy_dataclasses import dataclass, field
+from photogram.network.unknowns import Unknown
+
+__all__ = ["Shared", "called", "made", "word_of"]
+
+_Made = TypeVar("_Made")
+_Kind = TypeVar("_Kind", bound=Unknown)
+
+
+def made(table: ColumnTable, row: int, make: Callable[[], _Made]) -> _Made:
+    """Make something of a row; what it refuses is an error of the row."""
+    try:
+        return make()
+    except InputError as error:
+        raise (error if error.file else table.error(row, error.message)) from None
+
+
+def called(cell: str, title: str) -> str:
+    """Return the name that a cell asks for: the title for `true`, none for `false`, else its own."""
+    word = cell.lower()
+    return title if word in TRUE else "" if word in FALSE else cell
+
+
+def word_of(unknown: Unknown | None) -> str:
+    """Return what the cell of an unknown says: its name, where that is no word for true or false."""
+    if unknown is None:
+        return "false"
+    return unknown.title if unknown.name.lower() in TRUE | FALSE else unknown.name
+
+
+@dataclass(frozen=True)
+class Shared:
+    """The unknowns of a project that have been named so far, by their types and names."""
+
+    _known: dict[tuple[type[Unknown], str], Unknown] = field(default_factory=dict)
+
+    def one(
+        self,
+        table: ColumnTable,
+        row: int,
+        column: str,
+        kind: type[_Kind],
+        name: str,
+        *given: Any,
+        **more: Any,
+    ) -> _Kind:
+        """Return what a row names, the same object for all rows that do.
+
+        Parameters
+        ----------
+        table, row, column
+            Where it is named.
+        kind, name
+            Its type and name.
+        given, more
+            Its further arguments.
+
+        Raises
+        ------
+        InputError
+            What is refused, or is not what another row says of the same name.
+        """
+        new = made(table, row, partial(kind, name, *given, **more))
+        own = self._known.setdefault((kind, name), new)
+        same = own is new or (
+            own.row()[1:] == new.row()[1:]
+            and own.is_open == new.is_open
+            and all(np.array_equal(getattr(own, each), value) for each, value in more.items())
+        )
+        if not same:
+            raise table.error(row, f"column {column}: {name} has other values in a row before")
+        assert isinstance(own, kind)
+        return own

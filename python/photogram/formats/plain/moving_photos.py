@@ -1,0 +1,290 @@
+"""Photos that move: on trajectories, by themselves, line by line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from photogram.adjustment.a_priori import Cartesian
+from photogram.arguments.types import Floats
+from photogram.formats.plain.cameras import Cameras
+from photogram.formats.plain.clocks import clock_columns, clocks
+from photogram.formats.plain.common_unknowns import made
+from photogram.formats.plain.photos import Photos
+from photogram.formats.plain.rigs import Rigs
+from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
+from photogram.formats.plain.tables import Tables, indices_of
+from photogram.formats.rigging import Rig
+from photogram.io.delimited import ColumnTable
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import quoted
+from photogram.network.block import Block
+from photogram.network.geometry import Spheroid
+from photogram.network.moving_photos import Lines, Timed
+from photogram.network.trajectories import Clock, Readout, Trajectory
+from photogram.network.unknowns import Sensor
+from photogram.network.whereabouts import about
+
+__all__ = ["line_times_table", "moving_columns", "placed", "read_timed"]
+
+_MOTION = (*VELOCITY, *RATE)
+_SD = deviation_columns(_MOTION)
+
+
+def read_timed(
+    tables: Tables,
+    photos: Photos,
+    cameras: Cameras,
+    trajectories: Mapping[str, Trajectory],
+    rigs: Mapping[str, Rig],
+) -> list[Timed]:
+    """Read which photos are on trajectories, or move by themselves.
+
+    Parameters
+    ----------
+    tables, photos
+        The tables, and that of photos.
+    cameras
+        As they stand in their table: whose shutters and lines of sensors photos have.
+    trajectories, rigs
+        By their names.
+
+    Raises
+    ------
+    InputError
+        Names that are not there, line scanners without lines or times, what contradicts itself.
+    """
+    own = _Columns.read(tables, photos, trajectories, rigs)
+    found: list[Timed] = []
+    for place, row in enumerate(photos.rows.tolist()):
+        camera = photos.cameras[place]
+        given = own.of(row, photos.names[place], photos.taken[place])
+        given |= {"shutter": cameras.shutters[camera], "line_sensor": cameras.lines[camera]}
+        given |= {"lines": own.lines.get(photos.names[place])}
+        given = {name: value for name, value in given.items() if value is not None}
+        if not given:
+            continue
+        time = float(photos.times[place])
+        if not math.isnan(time):
+            given["time"] = time
+        _check(own.table, row, given)
+        sd = photos.attitude_sd[place]
+        if "trajectory" not in given and np.isfinite(sd).any() and sd.any():
+            raise own.table.error(
+                row,
+                "the photo moves by itself: weigh its attitude by sd_rotation_x .., or in a table attitudes",
+            )
+        found.append(made(own.table, row, partial(Timed, photos.names[place], **given)))
+    return found
+
+
+def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
+    """Refuse what does not belong together."""
+    flown = "trajectory" in given
+    if flown and "velocity" in given:
+        raise table.error(row, "vx .., rate_x .. are of photos without a trajectory")
+    if "lines" in given and "line_sensor" not in given:
+        raise table.error(row, "the table line_times has the photo, but its camera is no line of sensors")
+    if "line_sensor" in given and "lines" not in given:
+        raise table.error(
+            row, "its camera is a line of sensors, but the table line_times has no row of the photo"
+        )
+    if "lines" in given and not flown and "time" not in given:
+        raise table.error(row, "a line scanner needs a trajectory, or a time that its own motion counts from")
+    if "rate" in given and "lines" not in given:
+        raise table.error(row, "line_rate is of line scanners, which the table line_times has")
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """What the table of photos says of motion, by its rows; None where it says nothing.
+
+    Attributes
+    ----------
+    table
+        The table.
+    trajectories
+        What each photo is on.
+    motion, motion_sd
+        (rows, 6) velocities and rates, and their standard deviations; NaN where they are empty.
+    clocks, rates
+        Of each photo.
+    lines
+        Times of lines by the names of photos.
+    rigs
+        By their names.
+    """
+
+    table: ColumnTable
+    trajectories: Sequence[Trajectory | None]
+    motion: Floats
+    motion_sd: Floats
+    clocks: Sequence[Any]
+    rates: Sequence[Readout | None]
+    lines: Mapping[str, Lines]
+    rigs: Mapping[str, Rig]
+
+    @classmethod
+    def read(
+        cls, tables: Tables, photos: Photos, trajectories: Mapping[str, Trajectory], rigs: Mapping[str, Rig]
+    ) -> _Columns:
+        """Read the columns; errors as of :func:`read_timed`."""
+        table = photos.table
+        on: list[Trajectory | None] = []
+        for row, name in enumerate(table.texts("trajectory")):
+            if name and name not in trajectories:
+                raise table.error(row, f"column trajectory: there is no trajectory {quoted(name)}")
+            on.append(trajectories[name] if name else None)
+        return cls(
+            table,
+            on,
+            table.vectors(_MOTION) * np.concatenate([np.ones(3), np.diag(tables.flip)]),
+            table.vectors(_SD, infinite=True),
+            clocks(tables, table, table.texts("photo")),
+            _rates(tables, table),
+            _line_times(tables, photos),
+            rigs,
+        )
+
+    def of(self, row: int, photo: str, camera: str) -> dict[str, Any]:
+        """Return what a row says, as arguments of :class:`Timed`."""
+        sensor, clock = self._place(row, camera)
+        found: dict[str, Any] = {
+            "trajectory": self.trajectories[row],
+            "offset": self.clocks[row] or clock,
+            "rate": self.rates[row],
+            "sensor": sensor,
+        }
+        values, sd = self.motion[row], self.motion_sd[row]
+        if not (np.isnan(values).all() and np.isnan(sd).all()):
+            values, sd = np.nan_to_num(values), np.where(np.isnan(sd), np.inf, sd)
+            found |= {"velocity": values[:3], "rotation_rate": values[3:]}
+            found |= {"sd_velocity": sd[:3], "sd_rate": sd[3:]}
+        return found
+
+    def _place(self, row: int, camera: str) -> tuple[Sensor | None, Clock | None]:
+        """Return pose and clock of a photo's camera on what moves; None: those of the trajectory."""
+        name, own = self.table.texts("rig")[row], self.table.texts("sensor")[row]
+        if not name and not own:
+            return None, None
+        if not name and len(self.rigs) != 1:
+            raise self.table.error(row, f"column rig: is empty, and there are {len(self.rigs)} rigs")
+        if name and name not in self.rigs:
+            raise self.table.error(row, f"column rig: there is no rig {quoted(name)}")
+        rig = self.rigs[name] if name else next(iter(self.rigs.values()))
+        sensor = own or camera
+        if sensor != rig.reference and sensor not in rig.sensors:
+            what = "sensor" if own else "camera"
+            raise self.table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+        return rig.sensors.get(sensor), rig.clocks.get(sensor)
+
+
+def _rates(tables: Tables, table: ColumnTable) -> list[Readout | None]:
+    """Return the factors of the line rates of photos."""
+    values, sd = table.numbers("line_rate", 1.0), table.numbers("sd_line_rate", 0.0, infinite=True)
+    found: list[Readout | None] = []
+    for row, (name, photo) in enumerate(zip(table.texts("scan"), table.texts("photo"), strict=True)):
+        if not (name or sd[row]) and values[row] == 1.0:
+            found.append(None)
+            continue
+        given = name or photo, float(values[row]), float(sd[row])
+        found.append(tables.shared.one(table, row, "scan", Readout, *given))
+    return found
+
+
+def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
+    """Return the times of lines by the names of photos."""
+    table = tables.read("line_times")
+    if table is None:
+        return {}
+    places = {name: row for row, name in enumerate([*photos.names, *sorted(photos.unused)])}
+    of_photos = indices_of(table, "photo", places, "photo")
+    columns = ("line", "time", "seconds_per_line")
+    values = table.vectors(columns)
+    table.check_given(values, columns)
+    found: dict[str, Lines] = {}
+    for name, place in places.items():
+        rows = np.flatnonzero(of_photos == place)
+        if not len(rows):
+            continue
+        back = np.diff(values[rows, 0]) <= 0
+        if back.any():
+            raise table.error(int(rows[1 + int(np.argmax(back))]), "column line: does not increase")
+        found[name] = made(table, int(rows[0]), partial(Lines, values[rows]))
+    return found
+
+
+def placed(photos: Photos, timed: Sequence[Timed], spheroid: Spheroid | None) -> Photos:
+    """Return photos of which those on trajectories have the poses that these are about, where they have none.
+
+    Parameters
+    ----------
+    photos, timed
+        The photos, and which of them are on trajectories.
+    spheroid
+        Of geographic space; None for rectangular space.
+    """
+    centres, matrices = photos.centres.copy(), photos.matrices.copy()
+    axes = Cartesian(spheroid)
+    places = {name: row for row, name in enumerate(photos.names)}
+    for each in timed:
+        row = places[each.photo]
+        if each.trajectory is None or np.isfinite([*centres[row], *matrices[row].ravel()]).all():
+            continue
+        begin = 0.0 if each.lines is None else float(np.asarray(each.lines.table)[0, 1])
+        centre, matrix = about(each.trajectory, begin if each.time is None else each.time)
+        at = axes.from_cartesian(centre[np.newaxis])
+        centres[row], matrices[row] = at[0], axes.to_local(matrix[np.newaxis], at)[0]
+    return replace(photos, centres=centres, matrices=matrices)
+
+
+def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
+    """Return the columns of photos that say how they move; none where no photo does."""
+    if not block.timed:
+        return {}
+    timed = {each.photo: each for each in block.timed}
+    own = [timed.get(photo) for photo in block.photo_ids]
+    trajectories = [None if each is None else each.trajectory for each in own]
+    found: dict[str, Any] = {"trajectory": ["" if each is None else each.name for each in trajectories]}
+    sensors = [None if each is None else each.sensor for each in own]
+    if any(sensors):
+        places = [None if each is None else rigs.place(each) for each in sensors]
+        for k, column in enumerate(("rig", "sensor")):
+            found[column] = ["" if each is None else each[k] for each in places]
+    found["time"] = [None if each is None else each.time for each in own]
+    found |= _motion_columns(own)
+    found |= clock_columns([None if each is None or rigs.clock(each.sensor) else each.offset for each in own])
+    rates = [None if each is None else each.rate for each in own]
+    if any(rates):
+        found["scan"] = ["" if each is None else each.name for each in rates]
+        found["line_rate"] = [None if each is None else each.value for each in rates]
+        found["sd_line_rate"] = [None if each is None else float(each.deviations[0]) for each in rates]
+    return {name: column for name, column in found.items() if any(each not in (None, "") for each in column)}
+
+
+def _motion_columns(own: Sequence[Timed | None]) -> dict[str, Any]:
+    """Return velocities and rates of photos that move by themselves."""
+    values, sd = np.full((len(own), 6), np.nan), np.full((len(own), 6), np.nan)
+    for row, each in enumerate(own):
+        if each is not None and each.trajectory is None:
+            pairs = ((each.velocity, each.sd_velocity), (each.rotation_rate, each.sd_rate))
+            for k, (value, deviation) in enumerate(pairs):
+                values[row, 3 * k : 3 * k + 3], sd[row, 3 * k : 3 * k + 3] = value, deviation
+    if np.isnan(values).all():
+        return {}
+    return dict(zip((*_MOTION, *_SD), [*values.T.tolist(), *sd.T.tolist()], strict=True))
+
+
+def line_times_table(block: Block) -> dict[str, Any]:
+    """Return the table of times of lines; none where there are no line scanners."""
+    own = [each for each in block.timed if each.lines is not None]
+    if not own:
+        return {}
+    tables = [np.asarray(each.lines.table) for each in own if each.lines is not None]
+    rows = np.vstack(tables)
+    names = [each.photo for each, table in zip(own, tables, strict=True) for _ in table]
+    return {"photo": names, **dict(zip(("line", "time", "seconds_per_line"), rows.T, strict=True))}

@@ -1,0 +1,464 @@
+"""What a user adds to a project: control, measurements, names, standard deviations, unknown cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import InputError
+from photogram.formats.carrying import carried, is_free
+from photogram.formats.columns import PLAIN, Columns
+from photogram.formats.images import from_corner, to_corner
+from photogram.formats.intersection import intersected
+from photogram.formats.pixels import corner_of, pixel_table
+from photogram.formats.plain.reading import read_control
+from photogram.formats.plain.settings import WITH_SD, Settings
+from photogram.formats.plain.tables import Tables, indices_of
+from photogram.formats.plain.transform import Transform
+from photogram.formats.planes import plane_remarks
+from photogram.formats.project import Frame, Project, Repeated
+from photogram.formats.statement_request import with_cover
+from photogram.io.delimited import ColumnTable, Names
+from photogram.messages import Message, listed
+from photogram.network.motion import timed_photos
+from photogram.network.similarity import similarity
+from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram.formats.control_lists import ControlList
+
+__all__ = [
+    "deviations",
+    "held_points",
+    "repeated_remarks",
+    "self_calibrated",
+    "with_control",
+    "with_images",
+    "with_repeated",
+    "with_sd",
+]
+
+SAME = 1e-3
+"""Pixels that two measurements of a point on a photo may be apart to be one."""
+SIMILAR = 10.0
+"""How much better control must fit a model after a similarity for the model to be carried over."""
+
+
+def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Return standard deviations by table from words such as `images=0.5` or `control=0.02,0.02,0.03`.
+
+    Raises
+    ------
+    InputError
+        Other words, a table that has none in plain projects, numbers that are no standard deviations.
+    """
+    found = {}
+    for each in given:
+        name, equals, numbers = each.partition("=")
+        name = name.strip()
+        if name not in WITH_SD:
+            raise InputError(f"--sd {each}: one of {', '.join(WITH_SD)}, as images=0.5")
+        try:
+            values = tuple(float(number) for number in numbers.split(","))
+        except ValueError:
+            raise InputError(f"--sd {each}: what follows the = is no number, or three with commas") from None
+        counts = WITH_SD[name]
+        if not equals or len(values) not in counts or not all(0 <= value < np.inf for value in values):
+            raise InputError(f"--sd {each}: {' or '.join(map(str, counts))} standard deviations")
+        if name == "images" and not all(values):
+            raise InputError(f"--sd {each}: image coordinates cannot be without error")
+        found[name] = values
+    return found
+
+
+def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
+    """Return a project with the standard deviations of image coordinates that a user gives.
+
+    A plain project has them where its tables say nothing; some readers take them in the unit of their files.
+    """
+    if "images" not in sd or project.sd_taken:
+        return project
+    own = np.broadcast_to(sd["images"], (len(project.block.image_xy), 2))
+    lacks = tuple(each for each in project.lacks if "--sd images" not in each)
+    return project.replace(block=project.block.replace(image_sd=own), lacks=lacks)
+
+
+def with_repeated(project: Project) -> Project:
+    """Return a project whose second images of a point on a photo take part: their mean with the first.
+
+    With the weights of all together it gives the same adjustment as all of them by themselves, for the sum of
+    squares of their differences from the mean does not depend on any unknown; the message says what it is.
+    """
+    block = project.block
+    first, second = _repeated_rows(project)
+    if not len(first):
+        return project
+    rows, place, again = np.unique(first, return_inverse=True, return_counts=True)
+    count = 1.0 + again[:, np.newaxis]
+    own, others = block.image_xy[rows], project.repeated.xy[second]
+    mean = own.copy()
+    np.add.at(mean, place, others)
+    mean /= count
+    sd = block.image_sd[rows]
+    spread = (((own - mean) / sd) ** 2).sum() + (((others - mean[place]) / sd[place]) ** 2).sum()
+    xy, deviations = block.image_xy.copy(), np.array(block.image_sd)
+    xy[rows], deviations[rows] = mean, sd / np.sqrt(count)
+    said = [each for each in project.messages if "--keep-repeated" not in each.text]
+    text = f"{len(second)} second images of a point on a photo are averaged with the first: the adjustment is"
+    said.append(
+        Message(
+            f"{text} that of all of them, whose weighted sum of squares is larger by {spread:.6f}"
+            f" (half of it: {spread / 2:.6f})"
+        )
+    )
+    block = block.replace(image_xy=xy, image_sd=deviations)
+    return project.replace(block=block, messages=tuple(said), repeated=Repeated())
+
+
+def repeated_remarks(project: Project, result: Result) -> list[Message]:
+    """Say what the sum of squares would be with second images of a point on a photo, where there are any."""
+    first, second = _repeated_rows(project)
+    used = result.used_images[first] if result.converged and len(result.used_images) else first[:0] > 0
+    # Where images of photos that move would be is not computed here.
+    used &= ~timed_photos(project.block)[project.block.image_photos[first]]
+    if not used.any():
+        return []
+    from photogram.adjustment.prediction import at_adjusted, computed_images
+
+    block, sd = project.block, project.block.image_sd[first][used]
+    there = at_adjusted(result).replace(
+        image_photos=block.image_photos[first][used],
+        image_points=block.image_points[first][used],
+        image_xy=project.repeated.xy[second][used],
+        image_sd=sd,
+    )
+    more = float((((there.image_xy - computed_images(there)) / sd) ** 2).sum())
+    total = result.sums_of_squares.total
+    return [
+        Message(
+            f"with {int(used.sum())} second images of a point on a photo, which are left out, the weighted"
+            f" sum of squares would be {total + more:.6g} here and not {total:.6g}"
+            " (--keep-repeated takes them in)"
+        )
+    ]
+
+
+def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
+    """Return rows of first images in the block, and those of their second ones among the repeated."""
+    block, again = project.block, project.repeated
+    if not again.points:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+    place = {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
+    pairs = [place.get(pair, -1) for pair in zip(again.photos, again.points, strict=True)]
+    rows = np.array(pairs, dtype=np.int64)
+    there = np.flatnonzero(rows >= 0)
+    return rows[there], there
+
+
+def self_calibrated(project: Project, names: Sequence[str]) -> Project:
+    """Return a project whose cameras have unknown parameters: those named, or all for `all`.
+
+    Raises
+    ------
+    InputError
+        A name that no camera has as a parameter.
+    """
+    if not names:
+        return project
+    if not project.block.cameras:
+        raise InputError("the block has principal distances and no cameras that could be calibrated")
+    wanted = {name.lower() for name in names}
+    cameras, used = [], set()
+    for camera in project.block.cameras:
+        free = {
+            name: np.inf
+            for name in camera.names
+            if name not in camera.constants and ("all" in wanted or _named(name, wanted))
+        }
+        used |= {_named(name, wanted) for name in free}
+        held = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+        cameras.append(
+            camera.replace(sd={k: v for k, v in {**held, **free}.items() if k not in camera.constants})
+        )
+    if missing := sorted(wanted - used - {"all"}):
+        known = listed(sorted({name for each in project.block.cameras for name in each.names}), 40)
+        raise InputError(f"no camera has the parameter {missing[0]}; there are {known}")
+    return project.replace(block=project.block.replace(cameras=cameras))
+
+
+def held_points(project: Project, wanted: Sequence[str]) -> Project:
+    """Return a project whose datum is coordinates of chosen points, held: 3-2-1 over three of them.
+
+    What was held of points before checks the adjustment.
+
+    Parameters
+    ----------
+    wanted
+        `A=XYZ`, `B=YZ`, `C=Z` ...: a point and the coordinates of it; all three where none is named.
+
+    Raises
+    ------
+    InputError
+        A point that is not there or has no coordinates, what is no axis, a block in geographic space.
+    """
+    if not wanted:
+        return project
+    block = project.block
+    if block.geographic:
+        raise InputError("--hold: a datum of chosen coordinates needs rectangular space; this is geographic")
+    known, places = project.positions(), block.point_positions.copy()
+    sd = np.full(places.shape, np.inf)
+    for each in wanted:
+        name, _, axes = each.partition("=")
+        columns = ["XYZ".find(axis) for axis in (axes or "XYZ").upper()]
+        if name not in block.point_ids or -1 in columns:
+            raise InputError(
+                f"--hold: {each!r} is no point of the block with axes of X, Y and Z: A=XYZ,B=YZ,C=Z"
+            )
+        row = block.point_ids.index(name)
+        if not np.isfinite(known[row, columns]).all():
+            raise InputError(
+                f"--hold: the point {name} has no coordinates to be held at; --control FILE gives it some"
+            )
+        places[row, columns], sd[row, columns] = known[row, columns], 0.0
+    return project.replace(block=block.replace(point_positions=places, point_sd=sd))
+
+
+def _named(name: str, wanted: set[str]) -> str:
+    """Return by which of the words a parameter is wanted: f is that of both axes; nothing for none."""
+    own = name.lower()
+    if own in wanted:
+        return own
+    return "f" if own in ("fx", "fy") and "f" in wanted else ""
+
+
+def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:
+    """Return a project with further image measurements: columns and rows of points in photos, pixels.
+
+    Raises
+    ------
+    InputError
+        Photos that are not there, images that are there already, cameras in millimetres.
+    """
+    return _with_table(project, path, pixel_table(path), pixel_origin)
+
+
+def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: str | None) -> Project:
+    block = project.block
+    if not table.count:
+        return project
+    if block.image_unit != "px" or block.photo_cameras is None:
+        raise InputError("further images are in pixels, and the cameras of the project in mm", file=path)
+    photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
+    names = table.names("point")
+    known = {name: row for row, name in enumerate(block.point_ids)}
+    new = [name for name in names.names if name not in known]
+    known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
+    points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
+    corner = corner_of(table, pixel_origin)
+    xy = corner.copy()
+    for row, camera in enumerate(block.cameras):
+        own = block.photo_cameras[photos] == row
+        xy[own] = from_corner(camera, project.sizes[row], corner[own])
+    fill = np.full((len(new), 3), np.nan)
+    default = float(np.median(block.image_sd)) if len(block.image_sd) else 1.0
+    sd = np.column_stack([table.numbers("sd", default)] * 2)
+    try:
+        larger = block.replace(
+            point_ids=[*block.point_ids, *new],
+            point_positions=np.vstack([block.point_positions, fill]),
+            point_sd=np.vstack([block.point_sd, np.full_like(fill, np.inf)]),
+            point_check_sd=None if block.point_check_sd is None else np.vstack([block.point_check_sd, fill]),
+            image_photos=np.concatenate([block.image_photos, photos]),
+            image_points=np.concatenate([block.image_points, points]),
+            image_xy=np.vstack([block.image_xy, xy]),
+            image_sd=np.vstack([block.image_sd, sd]),
+        )
+    except InputError as error:
+        raise InputError(error.message, file=path) from None
+    return project.replace(block=larger, starts=np.vstack([project.starts, fill]))
+
+
+def _known_photos(project: Project, given: ControlList) -> ColumnTable:
+    """Return the measurements on photos of the project; underscores stand for blanks there."""
+    exact = set(project.block.photo_ids)
+    plain: dict[str, list[str]] = {}
+    for name in project.block.photo_ids:
+        plain.setdefault("_".join(name.split()), []).append(name)
+    table = given.images
+    names = [
+        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else ""
+        for name in table.texts("photo")
+    ]
+    rows = [row for row, name in enumerate(names) if name]
+    if len(rows) < len(names):
+        lost = sorted({own for own, name in zip(table.texts("photo"), names, strict=True) if not name})
+        given.messages.append(
+            Message(f"measurements on other photos are left out: {listed(lost, 3)}", table.path)
+        )
+    known = _some_rows(table, rows)
+    ready = {column: each for column, each in known.ready.items() if column != "photo"}
+    return replace(known, cells={**known.cells, "photo": [names[row] for row in rows]}, ready=ready)
+
+
+def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
+    """Return the measurements that the project does not have already, at the same place in the photo."""
+    block = project.block
+    known = {
+        (block.photo_ids[photo], block.point_ids[point]): row
+        for row, (photo, point) in enumerate(
+            zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+        )
+    }
+    pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
+    if not any(pair in known for pair in pairs):
+        return table
+    there, given = to_corner(project), corner_of(table, None)
+    rows = [
+        row
+        for row, pair in enumerate(pairs)
+        if pair not in known or np.abs(there[known[pair]] - given[row]).max() > SAME
+    ]
+    return _some_rows(table, rows)
+
+
+def _some_rows(table: ColumnTable, rows: Sequence[int]) -> ColumnTable:
+    cells = {column: [each[row] for row in rows] for column, each in table.cells.items()}
+    ready = {
+        column: Names(each.names, each.rows[rows]) if isinstance(each, Names) else each[rows]
+        for column, each in table.ready.items()
+    }
+    records = [table.records[row] for row in rows]
+    return replace(table, cells=cells, ready=ready, count=len(rows), records=records)
+
+
+def with_control(
+    project: Project,
+    path: Path,
+    sd: Mapping[str, tuple[float, ...]],
+    crs: str | None,
+    columns: Columns = PLAIN,
+) -> Project:
+    """Return a project with control and check points of a table, carried onto it where its frame is another.
+
+    Parameters
+    ----------
+    project
+        The project; its points bear the names of the table.
+    path
+        A table `control` of the plain project.
+    sd
+        Standard deviations for tables without columns for them.
+    crs
+        Of the table, where it is not the frame of the project.
+    columns
+        What is said of its columns and roles.
+
+    Raises
+    ------
+    InputError
+        A table at fault; none of its points has an image.
+    """
+    from photogram.formats.control_lists import read_control_list
+    from photogram.formats.control_system import check_systems
+
+    settings = Settings(
+        path,
+        frame=project.frame,
+        length=project.block.linear_unit,
+        sd=sd,
+        tables={"control": path},
+        crs={"control": crs} if crs else {},
+        columns={"control": columns},
+    )
+    tables = Tables(settings, [], frozenset(project.block.point_ids))
+    listed_control = read_control_list(path, project)
+    if listed_control is None:
+        table = tables.read("control")
+        assert table is not None
+    else:
+        table = listed_control.control
+        settings = replace(settings, crs={"control": crs or listed_control.crs})
+        tables = Tables(settings, listed_control.messages)
+        images = _new_images(project, _known_photos(project, listed_control))
+        project = _with_table(project, path, images, None)
+    transform = Transform(settings, tables.messages)
+    given = read_control(tables, table, transform)
+    block = project.block
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    rows = [row for row, name in enumerate(given.names) if name in places]
+    if not rows:
+        raise table.head.error(
+            f"none of the points {listed(given.names, 4)} has an image; --images FILE adds measurements of"
+            " control, --names FILE gives points other names"
+        )
+    missing = [name for name in given.names if name not in places]
+    messages = [*project.messages, *tables.messages]
+    if missing:
+        messages.append(Message(f"control without images is left out: {listed(missing)}", path))
+    targets = np.array([places[given.names[row]] for row in rows])
+    raw = table.vectors("xyz")
+    messages += check_systems(project, settings, table, targets, raw[rows], free=is_free(project))
+    held = [row for row in rows if np.isfinite(given.positions[row]).all()]
+    moved = _carried(
+        project,
+        np.array([places[given.names[row]] for row in held], dtype=np.int64),
+        given.positions[held],
+        transform.frame,
+    )
+    block = moved.block
+    positions, deviation = block.point_positions.copy(), block.point_sd.copy()
+    positions[targets], deviation[targets] = given.positions[rows], given.sd[rows]
+    before = block.point_check_sd
+    check_sd = np.full_like(positions, np.nan) if before is None else before.copy()
+    check_sd[targets] = given.check_sd[rows]
+    full = [each for each in given.observed if each.points[0] in places]
+    for each in full:
+        positions[places[each.points[0]]] = np.nan
+    found = moved.replace(
+        block=block.replace(
+            point_positions=positions,
+            point_sd=deviation,
+            point_check_sd=check_sd,
+            observations=[*block.observations, *full],
+        ),
+        statement=with_cover(project.statement, given.names, given.vegetated.intersection(places)),
+        messages=(*messages, *moved.messages[len(project.messages) :]),
+        # What is given now is no longer lacking.
+        lacks=tuple(
+            each for each in moved.lacks if not ("--control FILE" in each and np.isfinite(deviation).any())
+        ),
+    )
+    planes = [
+        each for each in plane_remarks(found.block, found.path, found.starts) if each not in found.messages
+    ]
+    return found.replace(messages=(*found.messages, *planes))
+
+
+def _carried(
+    project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]], targets: Floats, frame: Frame
+) -> Project:
+    """Carry a model onto control by a similarity, where it fits so much better than as it stands."""
+    block = project.block
+    model = project.starts[points].copy()
+    unknown = np.flatnonzero(~np.isfinite(model).all(axis=1))
+    model[unknown] = intersected(project, points[unknown])
+    known = np.isfinite(model).all(axis=1)
+    same = replace(project, frame=frame) if frame != project.frame else project
+    if np.count_nonzero(known) < 3 or not is_free(project):
+        return same
+    scale, turn, shift, misfit = similarity(model[known], targets[known])
+    before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
+    if not (np.isfinite(misfit) and SIMILAR * misfit < before):
+        return same
+    message = Message(
+        f"the model is carried onto {np.count_nonzero(known)} control points by a similarity: scale"
+        f" {scale:.6g}, {misfit:.3g} {block.linear_unit} rms left, {before:.3g} before"
+    )
+    return carried(project, (scale, turn, shift), frame, message)

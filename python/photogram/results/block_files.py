@@ -1,0 +1,249 @@
+"""The result of a block as files of a folder, and back (`docs/results.md`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from photogram.io.parquet import Column, Repeated, Sheet
+from photogram.io.writing import Content
+from photogram.messages import Message, Undetermined
+from photogram.network.block import Block
+from photogram.network.cameras import Camera
+from photogram.network.core_arrays import CoreOptions
+from photogram.network.films import Film, Pattern, Readings, Reseau
+from photogram.network.frame import Frame
+from photogram.network.geometry import Spheroid
+from photogram.network.motion import scanners
+from photogram.network.observations import Observation
+from photogram.network.passages import Passage
+from photogram.network.refraction import Refraction
+from photogram.network.rigs import Mount
+from photogram.network.unknowns import Unknown
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.datum import ResultDatum
+from photogram.results.features import Feature, Features, Quantity
+from photogram.results.iteration import Iteration
+from photogram.results.observation_kinds import ObservedKind
+from photogram.results.result import Redundancies, Result, SumsOfSquares
+from photogram.results.result_files import (
+    GIVEN_SD,
+    REDUNDANCY,
+    TRIANGLE,
+    Part,
+    image_parts,
+    point_parts,
+    read_saved,
+    rows_of,
+    sheet,
+    written,
+)
+from photogram.results.tables import TABLES
+from photogram.results.trajectory_files import CLASSES, STANDS
+from photogram.results.unknowns import AdjustedUnknown
+from photogram.show.methods import files_of
+
+__all__ = ["KIND", "block_files", "read_block_result"]
+
+KIND = "block"
+_ANGLES = ("omega", "phi", "kappa")
+CHECK_SD = "standard deviation of the given {} of a check point; NaN where not known"
+_CLASSES = (
+    AdjustedCamera,
+    AdjustedUnknown,
+    Film,
+    Pattern,
+    Readings,
+    Reseau,
+    Camera,
+    CoreOptions,
+    Feature,
+    Features,
+    Frame,
+    Iteration,
+    Message,
+    Mount,
+    ObservedKind,
+    Quantity,
+    Redundancies,
+    Refraction,
+    ResultDatum,
+    Spheroid,
+    SumsOfSquares,
+    Undetermined,
+)
+_TABLES = {
+    "control": "control",
+    "check_points": "check",
+    "stations": "station",
+    "observations": "observation",
+    "cameras": "camera",
+    "unknowns": "unknown",
+    "features": "feature",
+    "feature_deviations": "deviation",
+}
+"""Tables for people, and the kind that each is in `results.tables`."""
+
+
+@files_of.register(Result)
+def block_files(result: Result) -> dict[str, Content]:
+    """Return the files of the result of a block."""
+    block = result.block
+    photos, points = (np.arange(len(names)) for names in (block.photo_ids, block.point_ids))
+    kinds = ("control", "check", "pass")
+    of_points = np.argmax(result.point_kinds[np.newaxis] == np.array(kinds)[:, np.newaxis], axis=0)
+    leading = {
+        "photos": [_named("photo", block.photo_ids, photos), *_camera_column(block)],
+        "points": [
+            _named("point", block.point_ids, points),
+            Column("kind", Repeated(kinds, of_points), "", "control (held), check (known) or pass"),
+        ],
+        "images": [
+            _named("photo", block.photo_ids, block.image_photos),
+            _named("point", block.point_ids, block.image_points),
+        ],
+    }
+    tables = {name: sheet(TABLES[kind](result)) for name, kind in _TABLES.items()}
+    summary = {
+        "title": block.title,
+        "linear_unit": block.linear_unit,
+        "image_unit": block.image_unit,
+        "object_space": "geographic" if block.geographic else "rectangular",
+        "rotation": "photo-to-ground" if block.photo_to_ground else "ground-to-photo",
+        "status": result.status,
+        "datum": str(result.datum),
+        "degrees_of_freedom": result.degrees_of_freedom,
+    }
+    parts = _parts(block, result)
+    return written(result, KIND, "block", parts, leading, tables, block.frame, summary, STANDS)
+
+
+def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
+    """Return the result of a block that a folder keeps.
+
+    Raises
+    ------
+    InputError
+        Files that are missing, damaged or contradict each other.
+    """
+    saved = read_saved(
+        folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
+    )
+    given = saved.members("block", Block)
+    images, names = saved.sheets["images"], {}
+    for kind in ("photo", "point"):
+        sheet = saved.sheets[f"{kind}s"]
+        own = sheet.names(kind)
+        names[kind] = own.names if (own.rows == np.arange(len(own))).all() else _spelt(own)
+        given[f"{kind}_ids"] = names[kind]
+        given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
+    parts = _parts_of(
+        geographic=given["spheroid"] is not None,
+        unit=given["linear_unit"],
+        image_unit=str(document["image_unit"]),
+        distances="principal_distance" in saved.sheets["photos"].columns,
+        observed=_observed(saved.sheets["photos"]),
+    )
+    own_arrays, block_arrays = saved.arrays(parts, "block")
+    block = Block(**given, **block_arrays)
+    members = saved.members("result", Result)
+    if block.timed or any(each.knot_unknowns for each in block.cameras):
+        # Coefficients of photos with trajectories of their own, and knots, are made with their block.
+        pairs = zip(members["unknowns"], block.unknowns, strict=True)
+        members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
+    return Result(**members, **own_arrays, block=block, state=saved.state())
+
+
+def _parts(block: Block, result: Result) -> dict[str, list[Part]]:
+    observed = [
+        name for name in ("positions", "attitudes") if getattr(block, f"photo_{name}_observed") is not None
+    ]
+    parts = _parts_of(
+        geographic=block.geographic,
+        unit=block.linear_unit,
+        image_unit=block.image_unit,
+        distances=block.principal_distances is not None,
+        observed=observed,
+    )
+    scanned = scanners(block)[block.image_photos]
+    if scanned.any():
+        # What is measured there has no length; residuals and deviations are in the focal plane.
+        units = ("1", "1") if scanned.all() else (f"{block.image_unit}; 1 of scanners",) * 2
+        xy, *others = parts["images"]
+        parts["images"] = [
+            replace(xy, units=units, description="measured {}; of scanners sample (x) and line (y)"),
+            *others,
+        ]
+    return parts
+
+
+def _parts_of(
+    *, geographic: bool, unit: str, image_unit: str, distances: bool, observed: list[str]
+) -> dict[str, list[Part]]:
+    """Return what the tables of a block have."""
+    places = ("longitude", "latitude", "height") if geographic else ("x", "y", "z")
+    lengths = ("rad", "rad", unit) if geographic else (unit,) * 3
+    turns = ("rad",) * 3
+    both, units = (*places, *_ANGLES), (*lengths, *turns)
+    photos = [
+        Part("photo_positions", places, lengths, "adjusted {}"),
+        Part("photo_attitudes", _ANGLES, turns, "adjusted {}, M = M_kappa M_phi M_omega"),
+        Part("photo_sd", both, units, "standard deviation of {}", "derived", "sd_"),
+        Part("photo_cofactors", both, units, TRIANGLE, "matrix", "covariance"),
+        Part("photo_redundancy", both, ("1",) * 6, REDUNDANCY, prefix="redundancy_"),
+        Part("block.photo_positions", places, lengths, "initial {}", prefix="initial_"),
+        Part("block.photo_attitudes", _ANGLES, turns, "initial {}", prefix="initial_"),
+        Part("block.photo_position_sd", places, lengths, GIVEN_SD, prefix="given_sd_"),
+        Part("block.photo_attitude_sd", _ANGLES, turns, GIVEN_SD, prefix="given_sd_"),
+    ]
+    for name, own, of_own in (("positions", places, lengths), ("attitudes", _ANGLES, turns)):
+        if name in observed:
+            field = f"block.photo_{name}_observed"
+            photos.append(Part(field, own, of_own, "observed {}", prefix="observed_"))
+    if distances:
+        field = "block.principal_distances"
+        photos.append(Part(field, ("principal_distance",), (image_unit,), "signed as it was given"))
+    photos += [
+        Part("photo_order", ("elimination",), ("1",), "row of the photo that is eliminated in this place"),
+        Part("photo_corrections", both, units, "corrections, iteration by iteration", "list", "corrections"),
+    ]
+    return {
+        "photos": photos,
+        "points": [
+            *point_parts("block", places, lengths, last=True),
+            Part("block.point_check_sd", places, lengths, CHECK_SD, prefix="check_sd_"),
+        ],
+        "images": image_parts("block", image_unit),
+    }
+
+
+def _observed(photos: Sheet) -> list[str]:
+    """Return which observed values a table of photos has."""
+    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
+    return [name for name, columns in first.items() if any(each in photos.columns for each in columns)]
+
+
+def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
+    return Column(kind, Repeated(names, rows), "", f"name of the {kind}")
+
+
+def _camera_column(block: Block) -> list[Column]:
+    if block.photo_cameras is None:
+        return []
+    names = block.camera_names
+    return [Column("camera", Repeated(names, block.photo_cameras), "", "name of the camera")]
+
+
+def _spelt(column: Repeated) -> list[str]:
+    return [column.names[row] for row in column.rows.tolist()]
+
+
+def _below(base: type) -> Iterator[type]:
+    subclasses: list[type] = base.__subclasses__()
+    for each in subclasses:
+        yield each
+        yield from _below(each)

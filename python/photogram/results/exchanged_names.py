@@ -1,0 +1,251 @@
+"""Names of two points that are exchanged on a photo: the image of each fits the place of the other.
+
+For a point with its rays, one of them under suspicion, T is the sum of the squares of their residuals where
+they fit best, in standard deviations, given coordinates among them; photos stand where the other observations
+have put them. Images i and j of a photo are exchanged when T of both points as they are named is beyond
+
+    T(exchanged) + 2 ln(k / 0.0001),    T(exchanged) < 3 max(1, s^2) chi2(0.999; m)
+
+for k pairs that are looked at and m degrees of freedom: the factor 3 stands for what photos are uncertain by.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.block import Block
+from photogram.network.directions import seen_without_lenses
+from photogram.network.rays import Rays, meet
+from photogram.statistics.distributions import critical_chi_square
+
+__all__ = ["Exchange", "exchanged_names"]
+
+MOST = 40
+"""Images of a photo that are out; with more of them it is the photo."""
+LEVEL, CHANCE = 0.001, 1e-4
+UNCERTAIN = 3.0
+"""By how much photos, which are taken for known, may raise T."""
+STEPS = 4
+"""Of Gauss and Newton from where the rays meet."""
+HELD = 1e-6
+"""Standard deviation of fixed coordinates, in that of an image at the distance of the object."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Two names that are exchanged.
+
+    Attributes
+    ----------
+    photos
+        On this photo; several where the images do not tell on which of them.
+    points
+        The names.
+    as_named, exchanged
+        T of both points as they are named, and with the names exchanged on the first of the photos.
+    dimension
+        Degrees of freedom of both.
+    """
+
+    photos: tuple[str, ...]
+    points: tuple[str, str]
+    as_named: float
+    exchanged: float
+    dimension: int
+
+    @property
+    def sentence(self) -> str:
+        """What was found."""
+        one, other = self.points
+        where = " or ".join(f"photo {photo.removeprefix('photo ')}" for photo in self.photos)
+        return f"the names of {one} and {other} on {where} are exchanged"
+
+    @property
+    def probable(self) -> str:
+        """The same of a network that has not been adjusted without it."""
+        one, other = self.points
+        where = " or ".join(self.photos)
+        return f"images of points {one} and {other} on photo {where} have probably each other's names"
+
+    @property
+    def reason(self) -> str:
+        """Why."""
+        named = f"T {self.as_named:.4g} as named" if math.isfinite(self.as_named) else "rays part as named"
+        return (
+            f"each image fits the other's place ({named}, T {self.exchanged:.4g} exchanged, dimension"
+            f" {self.dimension})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Problems:
+    """Points to be fitted to some images each: `problem` says which image is of which."""
+
+    problem: Indices
+    rows: Indices
+    count: int
+
+
+def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
+    """Find exchanged names among the images that a snooped network does without.
+
+    Parameters
+    ----------
+    block
+        The network with all its images, photos where the adjustment without gross errors has put them.
+    used
+        (m,) the images that take part in it.
+    variance
+        Its variance of unit weight.
+    """
+    plain, seen = seen_without_lenses(block)
+    mounted = {each.photo for each in block.mounts}
+    on_frames = np.array([name in mounted for name in block.photo_ids])
+    pairs = _pairs(plain, used[seen], on_frames)
+    if not pairs:
+        return []
+    fit = _Fit(plain, used[seen])
+    wanted = sorted({(i, k) for pair in pairs for i in pair for k in pair})
+    found = dict(zip(wanted, fit.of(wanted), strict=True))
+    passing: dict[tuple[int, int], list[tuple[float, float, int, int]]] = {}
+    for i, j in pairs:
+        as_named = found[i, i][0] + found[j, j][0]
+        left = found[i, j][0] + found[j, i][0]
+        dimension = found[i, j][1] + found[j, i][1]
+        if not (math.isfinite(left) and dimension > 0):
+            continue
+        limit = UNCERTAIN * max(variance, 1.0) * critical_chi_square(LEVEL, dimension)
+        better = all(found[a, b][0] < found[a, a][0] for a, b in ((i, j), (j, i)))
+        gain = 2 * math.log(len(pairs) / CHANCE) * max(variance, 1.0)
+        if better and left < limit and as_named - left > gain:
+            one, other = sorted((int(plain.image_points[i]), int(plain.image_points[j])))
+            photo = int(plain.image_photos[i])
+            passing.setdefault((one, other), []).append((left, as_named, dimension, photo))
+    return _told(plain, passing)
+
+
+def _told(
+    block: Block, passing: dict[tuple[int, int], list[tuple[float, float, int, int]]]
+) -> list[Exchange]:
+    """Return the pairs, the surest first; a point is in one of them."""
+    order = sorted(passing.items(), key=lambda each: min(each[1])[0] - min(each[1])[1])
+    taken: set[int] = set()
+    found = []
+    for points, ways in order:
+        if taken & set(points):
+            continue
+        taken |= set(points)
+        left, as_named, dimension, _ = min(ways)
+        photos = [block.photo_ids[photo] for *_, photo in sorted(ways)]
+        one, other = (block.point_ids[point] for point in points)
+        found.append(Exchange(tuple(photos), (one, other), as_named, left, dimension))
+    return found
+
+
+def _pairs(block: Block, used: Bools, on_frames: Bools) -> list[tuple[int, int]]:
+    """Return images that are out and on one photo, two by two."""
+    out = np.flatnonzero(~used & ~on_frames[block.image_photos])
+    out = out[np.argsort(block.image_photos[out], kind="stable")]
+    bounds = np.flatnonzero(np.diff(block.image_photos[out], prepend=-1, append=-1))
+    return [
+        pair
+        for first, last in pairwise(bounds.tolist())
+        if last - first <= MOST
+        for pair in combinations(out[first:last].tolist(), 2)
+        if block.image_points[pair[0]] != block.image_points[pair[1]]
+    ]
+
+
+class _Fit:
+    """Fits points to rays of photos that are known."""
+
+    def __init__(self, block: Block, used: Bools) -> None:
+        self.block, self.used = block, used
+        self.rays = Rays.of(block)
+        self.order = np.argsort(block.image_points, kind="stable")
+        counts = np.bincount(block.image_points, minlength=len(block.point_ids))
+        self.start = np.concatenate([[0], np.cumsum(counts)])
+
+    def of(self, wanted: list[tuple[int, int]]) -> list[tuple[float, int]]:
+        """Return T and its dimension of points with a ray through another image of the same photo.
+
+        Each of `wanted` is an image of the point, whose place the second image takes.
+        """
+        of_images = [np.append(self._others(image), place) for image, place in wanted]
+        sizes = [len(each) for each in of_images]
+        problem, rows = np.repeat(np.arange(len(wanted)), sizes), np.concatenate(of_images)
+        problems = _Problems(problem, rows, len(wanted))
+        points = self.block.image_points[[image for image, _ in wanted]]
+        squares = self._squares(problems, points)
+        held = np.isfinite(self._prior_sd(points)).sum(axis=1)
+        dimensions = 2 * np.array(sizes) + held - 3
+        return list(zip(squares.tolist(), dimensions.tolist(), strict=True))
+
+    def _others(self, image: int) -> Indices:
+        """Return the images of an image's point on other photos: those that take part, where there are."""
+        block, point = self.block, self.block.image_points[image]
+        own = self.order[self.start[point] : self.start[point + 1]]
+        own = own[block.image_photos[own] != block.image_photos[image]]
+        good = own[self.used[own]]
+        found: Indices = good if len(good) else own
+        return found
+
+    def _prior_sd(self, points: Indices) -> Floats:
+        """(n, 3) standard deviations of given coordinates; in geographic space images decide alone."""
+        sd = self.block.point_sd[points]
+        if self.block.geographic:
+            return np.full(sd.shape, np.inf)
+        return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
+
+    def _squares(self, problems: _Problems, points: Indices) -> Floats:
+        """(n,) least sums of squares; infinite where rays do not meet before the cameras."""
+        block, rays, count = self.block, self.rays, problems.count
+        rows, own = problems.rows, problems.problem
+        sd = block.image_sd[rows]
+
+        def total(values: Floats) -> Floats:
+            flat = values.reshape(len(values), -1)
+            columns = [np.bincount(own, flat[:, k], count).astype(np.float64) for k in range(flat.shape[1])]
+            summed: Floats = np.stack(columns, axis=1).reshape(count, *values.shape[1:])
+            return summed
+
+        across, right = rays.equations()
+        position = meet(
+            total(across[rows]), total(right[rows]), np.bincount(own, minlength=count).astype(float)
+        )
+        # Axes are those of the block where priors count, and a component may be unknown.
+        given = block.point_positions[points] - self.rays.axes.origin
+        prior_sd = self._prior_sd(points)
+        held = np.isfinite(prior_sd)
+        known = held.all(axis=1)
+        position[known] = given[known]
+        there = np.isfinite(position[own, 0])
+        if not there.any():
+            return np.full(count, np.inf)
+        photos = block.image_photos[rows]
+        reach = np.median(np.linalg.norm(position[own] - rays.centres[photos], axis=1)[there])
+        distances = np.abs(block.known_distances("exchanged names")[photos])
+        least = HELD * float(np.median(sd)) * reach / float(np.median(distances))
+        weight = np.where(held, 1 / np.maximum(np.where(held, prior_sd, 1.0), least) ** 2, 0.0)
+        squares = np.full(count, np.nan)
+        with np.errstate(all="ignore"):
+            for _ in range(STEPS):
+                residuals, in_front = rays.residuals(position[own], rows)
+                residuals = residuals / sd
+                partials = rays.partials(position[own], rows) / sd[:, :, np.newaxis]
+                apart = np.where(held, given - position, 0.0)
+                squares = total((residuals**2).sum(axis=1, keepdims=True))[:, 0]
+                squares = squares + (weight * apart**2).sum(axis=1)
+                normal = total(np.einsum("mki,mkj->mij", partials, partials))
+                normal[:, range(3), range(3)] += weight
+                vector = total(np.einsum("mki,mk->mi", partials, residuals)) + weight * apart
+                sound = np.isfinite(normal).all(axis=(1, 2)) & np.isfinite(vector).all(axis=1)
+                sound[sound] &= np.linalg.cond(normal[sound]) < 1e14
+                position[sound] += np.linalg.solve(normal[sound], vector[sound, :, np.newaxis])[..., 0]
+        behind = np.bincount(own, ~in_front, count) > 0
+        return np.where(behind | ~np.isfinite(squares), np.inf, squares)

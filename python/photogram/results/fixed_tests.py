@@ -1,0 +1,226 @@
+"""What is held and may be wrong: fixed stations and fixed points, tested by scores.
+
+They are no observations: an error of theirs lies in no residual of its own, and good observations around are
+named for it. B the partials of the images by the held coordinates, in standard deviations, and ~v the
+residuals, c = B' ~v and C = B' R B: the weighted sum of squares would fall by T = c' C^-1 c if they were free
+(Rao's score, :func:`photogram.score_test`), chi-square with as many degrees of freedom as coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.network.block import Block
+from photogram.network.directions import seen_without_lenses
+from photogram.network.rays import Rays
+from photogram.results.group_sums import factored
+from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
+from photogram.results.scores import score
+from photogram.statistics.findings import Tested
+
+__all__ = [
+    "HELD",
+    "SUSPECTED",
+    "Held",
+    "as_adjusted",
+    "held_remark",
+    "held_tested",
+    "held_tests",
+    "is_suspected",
+    "station_partials",
+]
+
+HELD = "held values"
+"""The kind of these tests."""
+SUSPECTED = 5
+"""Fixed stations and points that are tested at the most, those with the worst images."""
+STEP = 1e-6
+"""Of the coordinates, in distances between points and stations, and of attitudes, radians."""
+LEAST_IMAGES = 3
+"""Of a station."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Something that is held: its name, its images, and which of the partials concern it."""
+
+    name: str
+    images: Indices
+    partials: Indices
+
+
+def held_tested(result: Result) -> list[Tested]:
+    """Return tests of the fixed stations and points with the worst images, where residuals are too large.
+
+    None where the adjustment is accepted, has not converged, has no covariances, or was done in parts.
+    """
+    if not result.WHOLE:
+        return []
+    return held_tests(
+        result, lambda of_images: _suspected(result, of_images), lambda: station_partials(result)
+    )
+
+
+def held_tests(
+    result: AdjustedNetwork,
+    suspected_by: Callable[[Floats], Sequence[Held]],
+    partials_of: Callable[[], Floats],
+) -> list[Tested]:
+    """Return the tests of what is held, T each, where residuals are too large and covariances there.
+
+    Parameters
+    ----------
+    result
+        The adjusted network.
+    suspected_by
+        What is to be tested, by (m,) the weighted squares of the images.
+    partials_of
+        (p, m, 2) of the images by the unknowns of their photos, to which each has its places.
+    """
+    if result.loss or not is_suspected(result):
+        return []
+    image_sd = result.image_given_sd
+    residuals = np.where(result.used_images[:, np.newaxis], result.residuals / image_sd, 0.0)
+    suspected = suspected_by((residuals**2).sum(axis=1))
+    if not suspected:
+        return []
+    partials = partials_of()
+    factor = factored(result)
+    found: list[tuple[str, float, float]] = []
+    for each in suspected:
+        columns = np.zeros((len(each.partials), *residuals.shape))
+        columns[:, each.images] = partials[np.ix_(each.partials, each.images)] / image_sd[each.images]
+        # What is free may take it up.
+        value = score(factor, columns, residuals) if np.isfinite(columns).all() else None
+        if value is not None:
+            found.append((each.name, value, float(len(each.partials))))
+    if not found:
+        return []
+    names, values, dimensions = zip(*found, strict=True)
+    tested = Tested(
+        HELD, np.array(values), lambda place: names[place[0]], "T", np.array(dimensions), held=True
+    )
+    return [tested]
+
+
+def is_suspected(result: AdjustedNetwork) -> bool:
+    """Return whether residuals are too large, and covariances there to ask for the reason."""
+    test = result.global_test
+    if test is None or not test.rejected_high or not result.converged:
+        return False
+    return bool(np.isfinite(result.redundancy[result.used_images]).all())
+
+
+def held_remark(found: Sequence[Tested], largest: float) -> list[str]:
+    """Say of what is held that it explains more than anything that was taken out.
+
+    Parameters
+    ----------
+    found
+        Its tests, in the adjustment of everything.
+    largest
+        The largest T of what was taken out.
+    """
+    place = found[0].largest() if found else None
+    if place is None or not found[0].values[place] > largest:
+        return []
+    return [
+        f"{found[0].name(place)}, explains more than anything that was taken out (T ="
+        f" {found[0].values[place]:.4g}, {largest:.4g}): what is held is no observation and stays; give it a"
+        " standard deviation, and snoop again"
+    ]
+
+
+def _suspected(result: Result, of_images: Floats) -> list[Held]:
+    """Return what is held and has the worst images, the worst first."""
+    block, used = result.block, result.used_images
+    given = result.photo_given_sd
+    photos, points = len(block.photo_ids), len(block.point_ids)
+    counts = np.bincount(block.image_photos[used], minlength=photos)
+    of_photos = np.bincount(block.image_photos, of_images, photos) / np.maximum(counts, 1)
+    of_points = np.bincount(block.image_points, of_images, points)
+    mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
+    rows: list[tuple[float, Held]] = []
+    for what, sd, shift in (
+        ("position", given[:, :3], 0),
+        ("attitude", given[:, 3:], 3),
+    ):
+        held = np.asarray(sd == 0)
+        if shift or block.geographic:  # Partials are by other axes than those of the components.
+            held = held & held.all(axis=1, keepdims=True)
+        own = np.flatnonzero(held.any(axis=1) & (counts >= LEAST_IMAGES))
+        for photo in own[np.argsort(-of_photos[own], kind="stable")][:SUSPECTED].tolist():
+            name = block.photo_ids[photo]
+            if name not in mounted:
+                images = np.flatnonzero(used & (block.image_photos == photo))
+                own_partials = shift + np.flatnonzero(held[photo])
+                each = Held(f"{what} of photo {name}, which is held", images, own_partials)
+                rows.append((float(of_photos[photo]), each))
+    fixed = (block.point_sd == 0).all(axis=1) & (np.bincount(block.image_points[used], minlength=points) > 0)
+    own = np.flatnonzero(fixed)
+    for point in own[np.argsort(-of_points[own], kind="stable")][:SUSPECTED].tolist():
+        images = np.flatnonzero(used & (block.image_points == point))
+        each = Held(f"control point {block.point_ids[point]}, which is held", images, np.arange(3))
+        rows.append((float(of_points[point] / len(images)), each))
+    rows.sort(key=lambda row: -row[0])
+    return [each for _, each in rows[:SUSPECTED]]
+
+
+def station_partials(result: Result) -> Floats:
+    """(6, m, 2) partials of the images by three coordinates and three small turns of their stations.
+
+    Those by the coordinates of a point are the same with the other sign. NaN of scanners, which have no one
+    station; photos with a rolling shutter are taken where they began.
+    """
+    plain, seen = seen_without_lenses(as_adjusted(result))
+    block = result.block
+    if not seen.any():
+        return np.full((6, len(block.image_xy), 2), np.nan)
+    rays = Rays.of(plain)
+    places = rays.axes.positions(result.point_positions)[plain.image_points]
+    apart = np.linalg.norm(places - rays.centres[plain.image_photos], axis=1)
+    step = STEP * float(np.nanmedian(apart))
+    found = np.full((6, len(block.image_xy), 2), np.nan)
+    for k in range(3):
+        shift = np.zeros(3)
+        shift[k] = step
+        ends = [replace(rays, centres=rays.centres + sign * shift).residuals(places)[0] for sign in (1, -1)]
+        found[k, seen] = (ends[0] - ends[1]) / (2 * step)
+        turned = [
+            replace(rays, cameras=rays.cameras @ _turn(k, sign * STEP)).residuals(places)[0]
+            for sign in (1, -1)
+        ]
+        found[3 + k, seen] = (turned[0] - turned[1]) / (2 * STEP)
+    # Without lenses y counts upwards.
+    down = np.array([each.image_y == "down" for each in block.cameras], dtype=bool)
+    if down.any():
+        found[:, down[np.asarray(block.photo_cameras)[block.image_photos]], 1] *= -1.0
+    return found
+
+
+def as_adjusted(result: Result) -> Block:
+    """Return a block whose photos are where its adjustment has put them."""
+    changes: dict[str, Any] = {
+        "photo_positions": result.photo_positions,
+        "photo_attitudes": result.photo_attitudes,
+    }
+    if result.block.timed:
+        # What is held of their poses is held of coefficients.
+        free = np.full((len(result.block.photo_ids), 3), np.inf)
+        changes |= {"photo_positions_observed": None, "photo_attitudes_observed": None}
+        changes |= {"photo_position_sd": free, "photo_attitude_sd": free}
+    return result.block.replace(**changes)
+
+
+def _turn(axis: int, angle: float) -> Floats:
+    """Rotation about an axis of the photo by a small angle."""
+    generator = np.zeros((3, 3))
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    generator[j, k], generator[k, j] = -angle, angle
+    return np.eye(3) + generator

@@ -1,0 +1,149 @@
+"""Observations beside images after the adjustment, kind by kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.arguments.arrays import freeze_fields
+from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.block import Block
+from photogram.statistics.reliability import TESTABLE
+
+if TYPE_CHECKING:
+    from photogram import _photocore
+    from photogram.statistics.outliers import Observations
+
+__all__ = ["ObservedKind", "observed_kinds", "tested_kind"]
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedKind:
+    """The k observations of one kind, of r components each.
+
+    Components that were not observed are NaN, and so are observations of points that were left out. Arrays
+    cannot be written.
+
+    Attributes
+    ----------
+    kind
+        Its name.
+    rows
+        (k,) which observations of the block they are.
+    names
+        What each is of.
+    components, units
+        Names and units of the r components: the linear unit of the object space, or radians.
+    sd
+        (k, r) standard deviations a priori.
+    residuals
+        (k, r) observed minus computed.
+    redundancy
+        (k, r) redundancy numbers; single ones may leave 0 to 1 where components are correlated.
+    standardized
+        (k, r) standardized residuals, a priori unit weight: with W the inverse of the covariance matrix S of
+        an observation, `(W v)_i / sqrt((W Qvv W)_ii)`, which without correlations is Baarda's w; NaN without
+        redundancy.
+    squares
+        (k,) v' W v, weights as the loss has changed them.
+    weights
+        (k,) factor by which the loss has changed the weight; 1 without a loss.
+    """
+
+    kind: str
+    rows: Indices
+    names: list[str]
+    components: tuple[str, ...]
+    units: tuple[str, ...]
+    sd: Floats
+    residuals: Floats
+    redundancy: Floats
+    standardized: Floats
+    squares: Floats
+    weights: Floats
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+    @property
+    def used(self) -> int:
+        """How many took part."""
+        return int(np.isfinite(self.squares).sum())
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Of those that took part, weighted."""
+        return float(np.nansum(self.squares))
+
+
+def observed_kinds(block: Block, solution: _photocore.BlockSolution) -> dict[str, ObservedKind]:
+    """Return what has become of the observations of a block, by the names of their kinds."""
+    found = iter(solution.adjusted_observations)
+    kinds: dict[str, ObservedKind] = {}
+    for rows, (*_, covariances) in block.observation_groups:
+        first = block.observations[rows[0]]
+        kind = first.label
+        components = first.components(geographic=block.geographic)
+        observed = np.ones((len(rows), len(components)), dtype=bool)
+        if first.MISSING:
+            observed = ~np.isnan([block.observations[row].observed for row in rows])
+        tables = np.full((3, *observed.shape), np.nan)
+        single = np.full((2, len(rows)), np.nan)
+        adjusted = [next(found) for _ in rows]
+        taken = np.array([each is not None for each in adjusted])
+        some = [each for each in adjusted if each is not None]
+        if some:
+            parts = zip(*some, strict=True)
+            tables[:, observed & taken[:, np.newaxis]] = [np.concatenate(next(parts)) for _ in range(3)]
+            single[:, taken] = list(parts)
+        variances = np.diagonal(covariances, axis1=1, axis2=2)
+        own = ObservedKind(
+            kind=kind,
+            rows=np.array(rows, dtype=np.int64),
+            names=[" - ".join(block.observations[row].of) for row in rows],
+            components=components,
+            units=first.units(block.linear_unit),
+            sd=np.sqrt(np.where(observed, variances, np.nan)),
+            residuals=tables[0].copy(),
+            redundancy=tables[1].copy(),
+            standardized=tables[2].copy(),
+            squares=single[0].copy(),
+            weights=single[1].copy(),
+        )
+        kinds[kind] = _together(kinds[kind], own) if kind in kinds else own
+    return kinds
+
+
+def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
+    """Return observations of one kind, of different numbers of unknowns, in the order of the block."""
+    rows = np.concatenate([first.rows, second.rows])
+    order = np.argsort(rows)
+    names = [*first.names, *second.names]
+
+    def joined(name: str) -> Floats:
+        found: Floats = np.concatenate([getattr(first, name), getattr(second, name)])[order]
+        return found
+
+    numbers = ("sd", "residuals", "redundancy", "standardized", "squares", "weights")
+    return ObservedKind(
+        kind=first.kind,
+        rows=rows[order],
+        names=[names[row] for row in order.tolist()],
+        components=first.components,
+        units=first.units,
+        **{name: joined(name) for name in numbers},
+    )
+
+
+def tested_kind(kind: ObservedKind) -> Observations:
+    """Return the components of a kind with their standardized residuals, where these say something."""
+
+    def named(index: tuple[int, ...]) -> str:
+        return f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}"
+
+    from photogram.statistics.outliers import Observations
+
+    standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
+    return Observations(f"components of observations of the kind {kind.kind}", standardized, named)

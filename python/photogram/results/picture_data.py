@@ -1,0 +1,229 @@
+"""What pictures draw of an adjusted block."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.network import geometry
+from photogram.network.motion import scanners
+from photogram.network.rays import LocalAxes, local_axes
+from photogram.plots.picture_data import (
+    Correlated,
+    Curve,
+    Curves,
+    Deviations,
+    Images,
+    Pictured,
+    Plan,
+    VectorField,
+    pictured,
+)
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.distortion import DistortionCurve, distortion_curve
+from photogram.results.ellipses import metric_covariances
+from photogram.results.features import Features, directions
+from photogram.results.film_pictures import film_patterns, mean_mark_residuals
+from photogram.results.footprints import footprints
+from photogram.results.network import AdjustedNetwork
+from photogram.results.observation_rows import tested_observations
+from photogram.results.result import Result
+from photogram.statistics.outliers import Observations
+
+__all__ = ["PicturedBlock", "PicturedNetwork", "curves_of"]
+
+
+class PicturedNetwork(Pictured):
+    """What is drawn alike of all adjusted networks."""
+
+    result: AdjustedNetwork
+
+    @property
+    @abstractmethod
+    def cameras(self) -> tuple[Indices, Sequence[str], bool]:
+        """(P,) cameras of the photos, their names, and whether y counts downwards in their images."""
+
+    @cached_property
+    def images(self) -> Images:
+        """The image observations that took part."""
+        result, given, used = self.result, self.result.given, self.result.used_images
+        cameras, names, down = self.cameras
+        return Images(
+            unit=given.image_unit,
+            photos=given.image_photos[used],
+            points=given.image_points[used],
+            xy=given.image_xy[used],
+            residuals=result.residuals[used],
+            redundancy=result.redundancy[used],
+            cameras=cameras[given.image_photos[used]],
+            names=names,
+            down=down,
+            scanned=self.scanned[given.image_photos[used]],
+        )
+
+    @property
+    def scanned(self) -> Bools:
+        """(P,) which photos are strips of a scanner, whose images are samples and lines."""
+        return np.zeros(len(self.result.given.photo_ids), dtype=bool)
+
+    @property
+    def tested(self) -> list[Observations]:
+        """All observations with their standardized residuals."""
+        return tested_observations(self.result)
+
+    @property
+    def unit_weight(self) -> float:
+        """The root of the variance of unit weight."""
+        return float(np.sqrt(self.result.covariance_scale))
+
+
+class PicturedBlock(PicturedNetwork):
+    """What is drawn of an adjusted block: geographic space in axes to east, north and up amid its stations.
+
+    Parameters
+    ----------
+    result
+        The adjusted block.
+    """
+
+    result: Result
+
+    def __init__(self, result: Result) -> None:
+        self.result = result
+
+    @property
+    def title(self) -> str:
+        """The title of the block."""
+        return self.result.block.title
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The network."""
+        result, block = self.result, self.result.block
+        # Differences as lengths: those of angles are too small to be taken of positions.
+        lengths = geometry.lengths_of_units(result.point_positions, block.spheroid)
+        return Plan(
+            axes=("E", "N", "h") if block.geographic else ("X", "Y", "Z"),
+            unit=block.linear_unit,
+            photo_ids=block.photo_ids,
+            photos=self._metric(result.photo_positions),
+            point_ids=block.point_ids,
+            points=np.where(result.used_points[:, np.newaxis], self._metric(result.point_positions), np.nan),
+            rays=result.point_rays,
+            kinds=result.point_kinds,
+            differences=result.point_differences * lengths,
+        )
+
+    def _metric(self, positions: Floats) -> Floats:
+        """Return (n, 3) positions in metric axes: as they are in rectangular space."""
+        return self._axes.positions(positions) if self.result.block.geographic else positions
+
+    @cached_property
+    def _axes(self) -> LocalAxes:
+        return local_axes(self.result.block)
+
+    def covariances(self, points: Indices) -> Floats:
+        """Return (k, 3, 3) covariances of points along the axes of the plan."""
+        return np.asarray(metric_covariances(self.result)[points])
+
+    @cached_property
+    def footprints(self) -> Floats:
+        """(P, v, 3) outlines of photos on level ground."""
+        found = footprints(self.result).positions()
+        return self._metric(found.reshape(-1, 3)).reshape(found.shape)
+
+    @property
+    def cameras(self) -> tuple[Indices, Sequence[str], bool]:
+        """(P,) cameras of the photos, their names, and whether y counts downwards in their images."""
+        block = self.result.block
+        _, cameras = block.core_cameras()
+        names = block.camera_names
+        if not names:
+            distances = dict.fromkeys(block.known_distances("pictures").tolist())
+            names = [f"c = {distance:g} {block.image_unit}" for distance in distances]
+        down = bool(block.cameras) and block.cameras[0].image_y == "down"
+        if not self.scanned.any():
+            return cameras, names, down
+        # Samples and lines are no places of a frame: they have a picture of their own.
+        cameras = np.where(self.scanned, cameras + len(names), cameras)
+        return cameras, [*names, *(f"{name}, scanned" for name in names)], down
+
+    @cached_property
+    def scanned(self) -> Bools:
+        """(P,) which photos are strips of a scanner."""
+        return scanners(self.result.block)
+
+    @property
+    def correlations(self) -> list[Correlated]:
+        """Cameras with two or more estimated parameters."""
+        found = []
+        for each in self.result.cameras:
+            rows = each.estimated
+            table = each.correlations[np.ix_(rows, rows)]
+            if len(rows) > 1 and np.isfinite(table).all():
+                found.append(Correlated(each.name, [each.names[k] for k in rows], table))
+        return found
+
+    @property
+    def distortion(self) -> list[Curves]:
+        """Cameras with radial distortion."""
+        curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
+        return [curves_of(each, curve) for each, curve in curves if curve is not None]
+
+    @property
+    def deviations(self) -> list[Deviations]:
+        """Features with deviations of points."""
+        found = self.result.features or Features(())
+        return [
+            Deviations(
+                f"{each.name}: {each.kind} through {len(each.points)} points",
+                self.result.block.linear_unit,
+                each.points,
+                directions(each.kind),
+                each.deviations,
+                found.k * each.deviation_sd,
+            )
+            for each in found
+            if each.deviations.size
+        ]
+
+    @property
+    def films(self) -> list[VectorField]:
+        """Mean residuals of the marks of cameras, and patterns of films."""
+        if not self.result.films:
+            return []
+        return [*mean_mark_residuals(self.result), *film_patterns(self.result)]
+
+
+def _bands(**sds: Floats) -> dict[str, Floats]:
+    """Return standard deviations by what they are of, where there are any: a camera that is held has none."""
+    return {
+        name.replace("_", " "): sd for name, sd in sds.items() if np.isfinite(sd).all() and np.any(sd != 0)
+    }
+
+
+def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
+    """Return what is drawn of the distortion of a camera: the curve, and its balanced form."""
+    unit = str(camera.camera.unit)
+    balanced = (
+        f"balanced at {curve.balanced_at:.4g} {unit}: principal distance {curve.balanced_distance:.6g} {unit}"
+    )
+    return Curves(
+        camera=f"{camera.name} ({camera.camera.model}, {curve.direction})",
+        unit=unit,
+        radii=curve.radii,
+        observed=curve.observed,
+        curves=[
+            Curve("", curve.values, _bands(mapping=curve.sd_mapping, curve=curve.sd)),
+            Curve(balanced, curve.balanced, _bands(balanced_curve=curve.sd_balanced)),
+        ],
+    )
+
+
+@pictured.register(Result)
+def _pictured(result: Result) -> Pictured:
+    return PicturedBlock(result)

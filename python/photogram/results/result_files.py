@@ -1,0 +1,416 @@
+"""Results as files of a folder, and back: what is kept of every network, table by table.
+
+`docs/results.md` describes the files. What has a row for every photo, point or image is a column of a table;
+everything else stands in `summary.json`. Classes of results declare their columns as :class:`Part`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import orjson
+
+from photogram import _photocore
+from photogram.errors import InputError
+from photogram.io.files import read_bytes
+from photogram.io.parquet import Column, Repeated, Sheet, packed, parquet_content, read_sheet, unpacked
+from photogram.io.seals import SEAL, Seals, check_seal, check_sealed, seal
+from photogram.io.structure import Decoder, Encoder, Stand
+from photogram.io.writing import Content
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.frame import Frame
+from photogram.results.network import AdjustedNetwork
+from photogram.show.quantity import Table
+
+__all__ = [
+    "GIVEN_SD",
+    "REDUNDANCY",
+    "SUMMARY",
+    "TRIANGLE",
+    "Part",
+    "Saved",
+    "image_parts",
+    "point_parts",
+    "read_saved",
+    "read_summary",
+    "rows_of",
+    "sheet",
+    "written",
+]
+
+FORMAT = 2
+SUMMARY = "summary.json"
+_STATE = "state"
+_READ = ("photos", "points", "images", _STATE)
+"""Tables that are read again; the others are for people."""
+TRIANGLE = "covariances, lower triangle row by row, scaled by the variance of unit weight"
+REDUNDANCY = "redundancy number of {} as an observation; 0 unless weighted"
+GIVEN_SD = "standard deviation of {} that was given: infinite free, 0 fixed"
+_ROWS = ("photo_ids", "point_ids", "image_photos", "image_points")
+"""Fields of what was adjusted that the names in the tables give."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """An array of a result, or of what was adjusted, as columns of a table.
+
+    Attributes
+    ----------
+    field
+        Its name; of what was adjusted behind the name of that: `block.image_xy`.
+    names, units
+        Of its columns, or of the components of a matrix or a list.
+    description
+        Of all of them; `{}` stands for the name of the component.
+    form
+        `columns`; `matrix`: lower triangles of symmetric matrices, which are cofactors in the result and
+        scaled in the table; `list`: all of a row in one cell; `derived`: columns that are not read again.
+    prefix
+        Before the names of columns; the name of the one column of a matrix or list.
+    """
+
+    field: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    description: str
+    form: str = "columns"
+    prefix: str = ""
+
+    def columns(self, result: AdjustedNetwork) -> list[Column]:
+        """Return its columns; none where the array is None."""
+        values = result
+        for name in self.field.split("."):
+            values = getattr(values, name)
+        array: Any = values
+        if array is None:
+            return []
+        if self.form == "matrix":
+            triangles = packed(array) * result.covariance_scale
+            return [Column(self.prefix, triangles, _products(self.units), self.description, self.names)]
+        if self.form == "list" and not len(array):
+            return []
+        if self.form == "list":
+            cells, units = _rows_first(array), " ".join(self.units)
+            return [Column(self.prefix, cells, units, self.description, self.names)]
+        parts = array.T if array.ndim == 2 else [array]
+        return [
+            Column(self.prefix + name, part, unit, self.description.format(name))
+            for name, unit, part in zip(self.names, self.units, parts, strict=True)
+        ]
+
+    def array(self, sheet: Sheet, scale: float) -> np.ndarray | None:
+        """Return the array that a table has; None where it was None."""
+        if self.form == "matrix":
+            k = len(self.names)
+            return unpacked(_divided(sheet.numbers(self.prefix, k * (k + 1) // 2), scale))
+        if self.form == "list" and self.prefix not in sheet.columns:
+            return np.zeros((0, sheet.rows, len(self.names)))
+        if self.form == "list":
+            cells = sheet.numbers(self.prefix, -len(self.names))
+            return np.ascontiguousarray(cells.reshape(len(cells), -1, len(self.names)).transpose(1, 0, 2))
+        own = [self.prefix + name for name in self.names]
+        if not any(name in sheet.columns for name in own):
+            return None
+        parts = [sheet.numbers(name) for name in own]
+        return np.array(parts[0]) if len(own) == 1 else np.column_stack(parts)
+
+
+def _divided(products: np.ndarray, scale: float) -> np.ndarray:
+    """Return what times the scale gives the products again to the last bit, as their factors did."""
+    near: np.ndarray = products / scale
+    found = near
+    for direction in (-np.inf, np.inf):
+        beside = np.nextafter(near, direction)
+        found = np.where((found * scale != products) & (beside * scale == products), beside, found)
+    return found
+
+
+def _rows_first(array: np.ndarray) -> np.ndarray:
+    """Return (P, i k) of (i, P, k)."""
+    return array.transpose(1, 0, 2).reshape(array.shape[1], -1)
+
+
+def _products(units: Sequence[str]) -> str:
+    """Return the unit of covariances: that of all, or of the components in their order."""
+    different = list(dict.fromkeys(units))
+    return f"{different[0]}2" if len(different) == 1 else "products of " + " ".join(units)
+
+
+def point_parts(given: str, names: tuple[str, ...], units: tuple[str, ...], *, last: bool) -> list[Part]:
+    """Return what is kept of the points of every network; `given` names what was adjusted."""
+    sd = "standard deviation of {}"
+    more = [Part("point_last_corrections", names, units, "last correction of {}", prefix="last_change_")]
+    return [
+        Part("point_rays", ("rays",), ("1",), "number of images; 0 for points left out"),
+        Part("point_positions", names, units, "adjusted {}"),
+        Part("point_sd", names, units, sd, "derived", "sd_"),
+        Part("point_cofactors", names, units, TRIANGLE, "matrix", "covariance"),
+        Part("point_redundancy", names, ("1",) * 3, REDUNDANCY, prefix="redundancy_"),
+        Part(f"{given}.point_positions", names, units, "{} as it was given", prefix="given_"),
+        Part(f"{given}.point_sd", names, units, GIVEN_SD, prefix="given_sd_"),
+        *(more if last else []),
+    ]
+
+
+def image_parts(given: str, unit: str) -> list[Part]:
+    """Return what is kept of the images of every network; `given` names what was adjusted."""
+    both, units, plain = ("x", "y"), (unit, unit), ("1", "1")
+    return [
+        Part(f"{given}.image_xy", both, units, "measured {}"),
+        Part(f"{given}.image_sd", both, units, "standard deviation of {} a priori", prefix="sd_"),
+        Part("residuals", both, units, "residual of {}, observed minus computed", prefix="residual_"),
+        Part("redundancy", both, plain, "redundancy number of {}", prefix="redundancy_"),
+        Part(
+            "standardized",
+            both,
+            plain,
+            "residual of {} over its standard deviation, a priori unit weight; NaN without redundancy",
+            prefix="test_",
+        ),
+        Part("image_weights", ("weight",), ("1",), "factor by which a robust loss has changed the weight"),
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Saved:
+    """A folder that was read.
+
+    Attributes
+    ----------
+    folder
+        Where it is.
+    summary
+        The document.
+    decoder
+        For what it keeps.
+    sheets
+        The tables of photos, points and images.
+    """
+
+    folder: Path
+    summary: Mapping[str, Any]
+    decoder: Decoder
+    sheets: Mapping[str, Sheet]
+
+    @property
+    def scale(self) -> float:
+        """What covariances are divided by to give cofactors."""
+        variance = self.summary["variance_of_unit_weight"]
+        return 1.0 if variance is None else float(variance)
+
+    def arrays(
+        self, parts: Mapping[str, Sequence[Part]], given: str
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the arrays of a result, and those of what was adjusted, by the names of fields."""
+        own: dict[str, Any] = {}
+        others: dict[str, Any] = {}
+        for table, each in ((table, each) for table, own_parts in parts.items() for each in own_parts):
+            if each.form != "derived":
+                found = each.array(self.sheets[table], self.scale)
+                name = each.field.removeprefix(f"{given}.")
+                (own if name == each.field else others)[name] = found
+        return own, others
+
+    def members(self, name: str, kind: type) -> dict[str, Any]:
+        """Return the fields of a class that stand in the document: of `result`, or of what was adjusted."""
+        return self.decoder.fields(self.summary["kept"][name], kind)
+
+    def state(self) -> _photocore.BlockState:
+        """Return where the core has ended."""
+        unknowns = read_sheet(self.folder / f"{_STATE}.parquet").numbers("unknown")
+        rest = self.decoder.value(self.summary["kept"][_STATE])
+        try:
+            return _photocore.BlockState(unknowns.tolist(), *rest)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"keeps no state ({error})", file=self.folder / SUMMARY) from None
+
+
+_RENAMED = {"standardized": "test", "d": "difference"}
+"""What is called otherwise in Parquet."""
+
+
+def sheet(table: Table) -> list[Column]:
+    """Return the columns of Parquet: angles in radians, names in small letters, units beside them."""
+    found = []
+    for each in table:
+        if each.name is None:
+            continue
+        name = _RENAMED.get(each.name, each.name)
+        if each.kind == "name":
+            found.append(Column(name, _repeated(each.values), "", each.about))
+        elif each.single:
+            unit = "1" if each.kind == "number" else "as the column unit says"
+            found.append(Column(name, np.asarray(each.values), unit, each.about.removesuffix(": {}")))
+        else:
+            for axis, column in zip(each.axes, each.values.T, strict=True):
+                own = f"{name}_{axis.name.lower()}".removeprefix("_")
+                unit = "1" if each.kind == "number" else axis.unit
+                found.append(Column(own, column, unit, each.about.format(axis.name)))
+    return found
+
+
+def _repeated(names: Any) -> Any:
+    """Return names as a column of few different ones; numbers of photos and points as they are."""
+    values = np.asarray(names)
+    if values.dtype.kind in "iu":
+        return values
+    few, rows = np.unique(values.astype(str), return_inverse=True)
+    return Repeated(few.tolist(), rows)
+
+
+def written(
+    result: AdjustedNetwork,
+    kind: str,
+    given: str,
+    parts: Mapping[str, Sequence[Part]],
+    leading: Mapping[str, Sequence[Column]],
+    tables: Mapping[str, Sequence[Column]],
+    frame: Frame,
+    summary: Mapping[str, Any],
+    stands: Mapping[type, Callable[[Any], Stand]] | None = None,
+) -> dict[str, Content]:
+    """Return the files of a result.
+
+    Parameters
+    ----------
+    result
+        The result.
+    kind
+        What reads it again.
+    given
+        The field that holds what was adjusted.
+    parts
+        Of the tables `photos`, `points` and `images`.
+    leading
+        Columns that stand before these: names.
+    tables
+        Further tables, which are for people alone.
+    frame
+        Where on the earth its coordinates are.
+    summary
+        What a reader wants first.
+    stands
+        What is written for objects of some classes.
+    """
+    unknowns, *state = result.state.__getnewargs__()
+    about = _about(result, frame)
+    sheets: dict[str, Sequence[Column]] = {
+        table: [*leading[table], *(column for each in own for column in each.columns(result))]
+        for table, own in parts.items()
+    }
+    core = Column("unknown", np.array(unknowns), "", "adjusted unknowns in the order of the core")
+    sheets |= {**tables, _STATE: [core]}
+    names = {part.field for own in parts.values() for part in own if part.form != "derived"}
+    encoder = Encoder(stands)
+    inner = [name.removeprefix(f"{given}.") for name in names if name.startswith(f"{given}.")]
+    kept = {
+        given: encoder.fields(getattr(result, given), [*inner, *_ROWS]),
+        "result": encoder.fields(result, [*names, given, _STATE]),
+        _STATE: encoder.value(state),
+    }
+    document = {
+        "program": f"photogram {_photocore.__version__}",
+        "format": FORMAT,
+        "kind": kind,
+        "variance_of_unit_weight": result.variance_of_unit_weight,
+        **summary,
+        "input": _digest(result, given, parts, kept[given]),
+        "kept": kept,
+    }
+    seals = Seals()
+    files: dict[str, Content] = {
+        f"{table}.parquet": seals.through(table, parquet_content(columns, about))
+        for table, columns in sheets.items()
+    }
+
+    def last(file: BinaryIO) -> None:
+        document["tables"] = seals.known
+        document[SEAL] = seal(document)
+        file.write(orjson.dumps(document, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE))
+
+    # The last one that is written: it knows the checksums of all others.
+    files[SUMMARY] = last
+    return files
+
+
+def _digest(result: AdjustedNetwork, given: str, parts: Mapping[str, Sequence[Part]], rest: Any) -> str:
+    """Return what tells what was adjusted from anything else."""
+    digest = hashlib.sha256(orjson.dumps(rest))
+    adjusted = getattr(result, given)
+    own = [each.field for one in parts.values() for each in one if each.field.startswith(f"{given}.")]
+    for name in (*_ROWS, *(each.removeprefix(f"{given}.") for each in own)):
+        values = getattr(adjusted, name, None)
+        texts = isinstance(values, list)
+        digest.update(orjson.dumps(values) if texts else np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def _about(result: AdjustedNetwork, frame: Frame) -> dict[str, str]:
+    place = {"kind": frame.kind, "crs": frame.crs, "origin": frame.origin}
+    return {
+        "photogram.version": _photocore.__version__,
+        "photogram.format": str(FORMAT),
+        "photogram.frame": json.dumps(place),
+        "photogram.variance_of_unit_weight": repr(result.variance_of_unit_weight),
+        "photogram.scaled": "covariance",
+    }
+
+
+def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any]) -> Saved:
+    """Read the tables of a folder.
+
+    Raises
+    ------
+    InputError
+        One of them is missing, damaged, or of another result.
+    """
+    tables = document["tables"]
+    for name in dict.fromkeys((*_READ, *tables)):
+        check_seal(folder / f"{name}.parquet", tables.get(name), SUMMARY)
+    sheets = {name: read_sheet(folder / f"{name}.parquet") for name in _READ[:-1]}
+    return Saved(folder, document, Decoder(classes, folder / SUMMARY), sheets)
+
+
+def read_summary(folder: Path) -> Mapping[str, Any]:
+    """Read the document of a folder.
+
+    Raises
+    ------
+    InputError
+        It is not there, or is that of another program or version.
+    """
+    path = folder / SUMMARY
+    try:
+        document = orjson.loads(read_bytes(path))
+    except orjson.JSONDecodeError as error:
+        raise InputError(f"is no JSON document: {error}", file=path) from None
+    if not isinstance(document, dict) or not {"kind", "format", "kept", "tables"} <= document.keys():
+        raise InputError("is not the summary of a result that was written by to_parquet", file=path)
+    if document["format"] != FORMAT:
+        raise InputError(
+            f"is of the format {document['format']}, which this version does not read", file=path
+        )
+    check_sealed(document, path)
+    return document
+
+
+def rows_of(names: Repeated, known: Sequence[str], path: Path) -> np.ndarray:
+    """Return which of the known names each row of a column has.
+
+    Raises
+    ------
+    InputError
+        A name that is not known.
+    """
+    places = {name: row for row, name in enumerate(known)}
+    try:
+        codes = np.array([places[name] for name in names.names], dtype=np.int64)
+    except KeyError as error:
+        raise InputError(f"names {error.args[0]!r}, which is not in its own table", file=path) from None
+    found: np.ndarray = codes[names.rows] if len(codes) else np.zeros(0, dtype=np.int64)
+    return found

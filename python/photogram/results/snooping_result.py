@@ -1,0 +1,311 @@
+"""What data snooping gives: the adjusted network without gross errors, and the log of what was taken out."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import orjson
+
+from photogram.io import json
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.results.exchanged_names import Exchange
+from photogram.results.network import AdjustedNetwork
+from photogram.show.methods import Judged, Paged
+from photogram.show.sections import Section, composed, headline, verdict_sections
+from photogram.show.summary import Brief, Rows, few
+from photogram.statistics.limits import global_test
+from photogram.statistics.snooping.log import Removal, Rival
+from photogram.statistics.snooping.snooping import Outcome, Settings
+from photogram.statistics.snooping.suspects import Standing, Suspects
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Snooped"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Snooped(Brief, Judged, Paged):
+    """A network after data snooping.
+
+    Attributes
+    ----------
+    result
+        The adjusted network without what was taken out. Its standard deviations and its variance of unit
+        weight hold after selection: the largest residuals are gone.
+    outcome
+        The log with all that belongs to it.
+    suspects
+        The groups of observations that were tested.
+    settings
+        How.
+    exchanged
+        Names of points that are exchanged, among the images that are out.
+    """
+
+    result: AdjustedNetwork
+    outcome: Outcome
+    suspects: Suspects
+    settings: Settings
+    exchanged: tuple[Exchange, ...] = ()
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return what was taken out of what, in a few lines."""
+        title, rows = self.result.brief()
+        own = [
+            ("verdict", self.verdict.headline),
+            ("tests", f"{self.outcome.tests:,}"),
+            ("removed", few([entry.name for entry in self.removed])),
+        ]
+        return f"{title}, without gross errors", [*own, *(row for row in rows if row[0] != "verdict")]
+
+    @cached_property
+    def judged(self) -> AdjustedNetwork:
+        """The result as its reports show it: with the verdict that knows what was taken out."""
+        own = replace(self.result)
+        vars(own)["verdict"] = self.verdict
+        return own
+
+    @property
+    def log(self) -> list[Removal]:
+        """Everything that was taken out, in order, also what came back or had to stay."""
+        return self.outcome.log
+
+    @property
+    def removed(self) -> list[Removal]:
+        """What is out at the end, in order."""
+        return [entry for entry in self.outcome.log if entry.is_out]
+
+    @property
+    def rivals(self) -> list[str]:
+        """Sentences on what cannot be told apart from what was removed."""
+        return [entry.sentence for entry in self.removed if entry.in_dispute]
+
+    def share_removed(self, kind: str) -> float:
+        """Return the share of the groups of a kind that are out, with what went with them."""
+        own = [group for group in range(len(self.suspects)) if self.suspects.kind(group) == kind]
+        if not own:
+            return 0.0
+        gone = sum(bool(self.outcome.out.rows[self.suspects.rows(group)].any()) for group in own)
+        return gone / len(own)
+
+    def table(self) -> pd.DataFrame:
+        """Return the log as a data frame, a row for each component that was taken out, with its unit."""
+        import pandas as pd
+
+        return pd.DataFrame([row for entry in self.log for row in _rows(entry)], columns=list(_COLUMNS))
+
+    def document(self) -> dict[str, Any]:
+        """Return the log as it stands in the JSON document."""
+        outcome, settings = self.outcome, self.settings
+        return {
+            "family_level" if not settings.fdr else "false_discovery_rate": settings.level,
+            "unit_weight": "known" if settings.known else "unknown",
+            "distribution": "chi2" if settings.known else "F",
+            "tests": outcome.tests,
+            "robust_factors": outcome.factors,
+            "before": _standing(outcome.before),
+            "after": _standing(outcome.standing),
+            "rounds": [
+                {
+                    "number": each.number,
+                    "status": each.status,
+                    "weighted_sum_of_squares": each.weighted_sum_of_squares,
+                    "degrees_of_freedom": each.degrees_of_freedom,
+                    "limit_p": each.limit,
+                    "removed": list(each.removed),
+                    "returned": list(each.returned),
+                    "remarks": list(each.remarks),
+                }
+                for each in outcome.rounds
+            ],
+            "log": [_member(entry) for entry in self.log],
+            "exchanged_names": [
+                {
+                    "photos": list(each.photos),
+                    "points": list(each.points),
+                    "T_as_named": each.as_named,
+                    "T_exchanged": each.exchanged,
+                    "dimension": each.dimension,
+                }
+                for each in self.exchanged
+            ],
+            "remarks": outcome.remarks,
+        }
+
+    def to_json(self) -> bytes:
+        """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
+        own = {"snooping": self.document()}
+        return json.to_json({**orjson.loads(self.judged.to_json()), **own})
+
+    def sections(self) -> list[Section]:
+        """Return the log as titled sections of a report."""
+        return [*verdict_sections(self.verdict), *self._own()]
+
+    def _own(self) -> list[Section]:
+        return [("Data snooping", self._head()), ("Taken out, in order", self._log())]
+
+    def report(self) -> str:
+        """Return the report: that of the network without what was taken out, then the log of that."""
+        return self.judged.report() + "\n" + composed(headline("data snooping"), self._own())
+
+    def _head(self) -> list[str]:
+        outcome, settings = self.outcome, self.settings
+        weight = "known: chi-square tests" if settings.known else "unknown: F tests"
+        rate = "false discovery rate" if settings.fdr else "family level"
+        out = len(self.removed)
+        lines = [
+            f"{'unit weight':<36}{weight}",
+            f"{rate:<36}{settings.level:g} over {outcome.tests} tests, kept in all rounds",
+            f"{'unit variance before':<36}{_said(outcome.before)}",
+            f"{'unit variance after':<36}{_said(outcome.standing)}",
+            f"{'rounds':<36}{len(outcome.rounds)}",
+            f"{'taken out':<36}{out}, returned {sum(e.returned is not None for e in self.log)},"
+            f" suspect but kept {sum(bool(e.kept) for e in self.log)}",
+            *outcome.remarks,
+            *(f"{each.sentence}: {each.reason}" for each in self.exchanged),
+        ]
+        if out:
+            lines.append(f"the unit variance holds after removal of {out} groups: it is biased low by little")
+        return lines
+
+    def _log(self) -> list[str]:
+        return [line for entry in self.log for line in _lines(entry)] or ["nothing"]
+
+
+_COLUMNS = (
+    *("round", "kind", "name", "component", "unit", "error", "error_sd"),
+    *("dimension", "first_T", "T", "F", "log10_p", "limit_p", "redundancy"),
+    *("rivals", "consequences", "predicted_error", "prediction_T", "prediction_log10_p", "returned", "kept"),
+)
+
+
+def _rows(entry: Removal) -> list[tuple[Any, ...]]:
+    rivals = "; ".join(f"{rival.name} ({rival.odds:.3g} : 1)" for rival in entry.rivals)
+    log_p = entry.prediction_log_probability
+    after = math.nan if log_p is None else log_p / _LN10
+    predicted = entry.prediction_error or (math.nan,) * len(entry.rows)
+    return [
+        (
+            entry.round,
+            entry.kind,
+            entry.name,
+            component,
+            unit,
+            error,
+            sd,
+            entry.dimension,
+            entry.first_statistic,
+            entry.statistic,
+            entry.fisher,
+            entry.log_probability / _LN10,
+            entry.limit,
+            entry.redundancy,
+            rivals,
+            "; ".join(entry.consequences),
+            other,
+            math.nan if entry.prediction is None else entry.prediction,
+            after,
+            entry.returned,
+            entry.kept,
+        )
+        for component, unit, error, sd, other in zip(
+            entry.components, entry.units, entry.error, entry.error_sd, predicted, strict=True
+        )
+    ]
+
+
+_LN10 = math.log(10)
+
+
+def _probability(logarithm: float) -> float:
+    return math.exp(logarithm) if not math.isnan(logarithm) else math.nan
+
+
+def _member(entry: Removal) -> dict[str, Any]:
+    after = entry.prediction_log_probability
+    return {
+        "round": entry.round,
+        "kind": entry.kind,
+        "name": entry.name,
+        "components": list(entry.components),
+        "units": list(entry.units),
+        "dimension": entry.dimension,
+        "first_T": entry.first_statistic,
+        "T": entry.statistic,
+        "F": entry.fisher,
+        "p": _probability(entry.log_probability),
+        "log10_p": entry.log_probability / _LN10,
+        "limit_p": entry.limit,
+        "estimated_error": list(entry.error),
+        "estimated_error_sd": list(entry.error_sd),
+        "redundancy": entry.redundancy,
+        "rivals": [_rival(rival) for rival in entry.rivals],
+        "consequences": list(entry.consequences),
+        "prediction_T": entry.prediction,
+        "prediction_log10_p": None if after is None else after / _LN10,
+        "predicted_error": list(entry.prediction_error),
+        "returned": entry.returned,
+        "kept": entry.kept or None,
+    }
+
+
+def _rival(rival: Rival) -> dict[str, Any]:
+    return {"name": rival.name, "T": rival.statistic, "dimension": rival.dimension, "odds": rival.odds}
+
+
+def _standing(standing: Standing) -> dict[str, Any]:
+    f = standing.degrees_of_freedom
+    return {
+        "status": standing.status,
+        "weighted_sum_of_squares": standing.weighted_sum_of_squares,
+        "degrees_of_freedom": f,
+        "variance_of_unit_weight": standing.weighted_sum_of_squares / f if f > 0 else None,
+    }
+
+
+def _said(standing: Standing) -> str:
+    test = global_test(standing.weighted_sum_of_squares, standing.degrees_of_freedom)
+    if test is None:
+        return "undefined: no degrees of freedom"
+    said = "too high" if test.rejected_high else "too low" if test.rejected_low else "as expected"
+    expected = f"{test.limits[0]:.3f} to {test.limits[1]:.3f}"
+    freedom = standing.degrees_of_freedom
+    return f"{test.variance:.4f} with {freedom} degrees of freedom, expected {expected}: {said}"
+
+
+def _lines(entry: Removal) -> list[str]:
+    """Write an entry of the log: what, why, how large, what else it may be, what went with it."""
+    if entry.kept:
+        state = f"suspect, kept: {entry.kept}"
+    elif entry.returned is not None:
+        state = f"round {entry.round}, returned in round {entry.returned}"
+    else:
+        state = f"round {entry.round}"
+    errors = ", ".join(
+        f"{component} {error:.4g} {unit} (sd {sd:.2g})".replace("  ", " ")
+        for component, error, unit, sd in zip(
+            entry.components, entry.error, entry.units, entry.error_sd, strict=True
+        )
+    )
+    lines = [f"{entry.name}: {state}"]
+    if not math.isnan(entry.log_probability):
+        lines.append(
+            f"    T {entry.statistic:.2f} ({entry.first_statistic:.2f} at first sight), dimension"
+            f" {entry.dimension}, F {entry.fisher:.2f}, log10 p {entry.log_probability / _LN10:.1f}"
+            f" (limit {math.log10(entry.limit):.1f})"
+        )
+    if errors:
+        lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
+    lines += [
+        f"    or {rival.name}: T {rival.statistic:.2f}, odds {rival.odds:.2g} : 1" for rival in entry.rivals
+    ]
+    lines += [f"    {consequence}" for consequence in entry.consequences]
+    if entry.prediction is not None and entry.prediction_log_probability is not None:
+        lines.append(
+            f"    against the rest: T {entry.prediction:.2f}, log10 p"
+            f" {entry.prediction_log_probability / _LN10:.1f}"
+        )
+    return lines

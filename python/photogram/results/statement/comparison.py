@@ -1,0 +1,346 @@
+"""Check points against an adjusted block: differences and their joint covariance, in east, north, up.
+
+For n check points d_i = adjusted - given, and for all together C = s2 Q + S: Q the joint cofactors of the
+adjusted points, cross blocks included, and S the covariance of the survey, which the variance of unit weight
+does not scale. In geographic and geocentric space both are turned to east, north, up at the given positions:
+d_i -> J_i d_i, C_ij -> J_i C_ij J_j'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from photogram.arguments.naming import natural_order
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import listed
+from photogram.network.block import Block
+from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
+from photogram.network.observations import Control
+from photogram.network.rays import local_axes
+from photogram.results.covariance import Covariances
+from photogram.results.result import Result
+from photogram.results.statement.request import METRES, Asked
+
+__all__ = [
+    "PARTS",
+    "Compared",
+    "compared",
+    "control_places",
+    "in_order",
+    "plan_positions",
+    "turned_jointly",
+    "turned_to_east",
+]
+
+PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
+"""Components that are tested together."""
+MOST = 5000
+"""Check points with a joint covariance: of more every second, third ..."""
+SAME_PLACE = 0.01
+"""Metres between a check point and the control point that it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The n check points of a block, in the linear unit, along east, north, up.
+
+    Attributes
+    ----------
+    names
+        What they are called.
+    vegetated
+        (n,) whether they lie in vegetation.
+    given
+        (n, 3) coordinates as given, in the axes of the block.
+    given_places, places
+        (n, 3) of them, and of the adjusted points, as east, north and height.
+    differences
+        (n, 3) adjusted minus given; NaN where nothing is given.
+    product, survey
+        (3 n, 3 n) s2 Q of the adjusted points, and S of their survey; rows of what is not given are zero in
+        S.
+    survey_sd, common_sd
+        (n, 3) standard deviations of the survey without what all points share, and (3,) of that.
+    scale, second
+        s2, and the degrees of freedom with which it was estimated: infinite where the unit weight is known.
+    known, step
+        Of how many check points every `step`th is taken: their joint covariance is dense.
+    not_usable
+        Names of known points that say nothing, with the reason.
+    """
+
+    names: tuple[str, ...]
+    vegetated: Bools
+    given: Floats
+    given_places: Floats
+    places: Floats
+    differences: Floats
+    product: Floats
+    survey: Floats
+    survey_sd: Floats
+    common_sd: Floats
+    scale: float
+    second: float
+    not_usable: tuple[tuple[str, str], ...] = ()
+    known: int = 0
+    step: int = 1
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(3 n, 3 n) C, of the differences."""
+        return np.asarray(self.product + self.survey)
+
+    @property
+    def survey_variances(self) -> Floats:
+        """(n, 3) of the survey against the datum, which counts what cancels in the differences, too."""
+        return np.asarray(self.survey_sd**2 + self.common_sd**2)
+
+    @property
+    def counted(self) -> Bools:
+        """(n, 3) which differences count: heights in vegetation are stated apart."""
+        rows = np.isfinite(self.differences)
+        rows[self.vegetated, 2] = False
+        return rows
+
+    def rows(self, part: str) -> Indices:
+        """Return which rows of all 3 n a part has: those of points with all its components."""
+        components = list(PARTS[part])
+        whole = self.counted[:, components].all(axis=1)
+        points = np.flatnonzero(whole)
+        return np.asarray((3 * points[:, np.newaxis] + components).ravel())
+
+    def of(self, part: str) -> tuple[Floats, Floats]:
+        """Return the differences of a part, and their covariance C_c."""
+        rows = self.rows(part)
+        return self.differences.ravel()[rows], self.covariance[np.ix_(rows, rows)]
+
+    def blocks(self, matrix: Floats) -> Floats:
+        """Return the (n, 3, 3) blocks of points of a (3 n, 3 n) matrix."""
+        n = len(self)
+        return np.asarray(matrix.reshape(n, 3, n, 3)[range(n), :, range(n), :])
+
+    def some(self, keep: Bools) -> Compared:
+        """Return some of the points."""
+        rows = np.repeat(keep, 3)
+        grid = np.ix_(rows, rows)
+        return replace(
+            self,
+            names=tuple(name for name, own in zip(self.names, keep.tolist(), strict=True) if own),
+            product=self.product[grid],
+            survey=self.survey[grid],
+            **{
+                each: getattr(self, each)[keep]
+                for each in ("vegetated", "given", "given_places", "places", "differences", "survey_sd")
+            },
+        )
+
+    def without(self, names: Sequence[str]) -> Compared:
+        """Return all but some points.
+
+        Raises
+        ------
+        InputError
+            One of them is no check point.
+        """
+        for name in names:
+            if name not in self.names:
+                raise InputError(f"{name} is no check point")
+        return self.some(~np.isin(np.array(self.names, dtype=object), list(names)))
+
+    def in_vegetation(self) -> Compared:
+        """Return the points in vegetation, whose heights count here."""
+        found = self.some(self.vegetated)
+        return replace(found, vegetated=np.zeros(len(found), dtype=bool))
+
+
+def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared:
+    """Return the check points of a result, by its covariances.
+
+    Raises
+    ------
+    InputError
+        A datum that was chosen, in which nothing can be compared; a point without standard deviations of its
+        survey, with that of one axis in plan only, or that is control.
+    AdjustmentError, OutOfMemoryError, KeyboardInterrupt
+        As :meth:`Result.covariances`.
+    """
+    block, checks = result.block, result.check_points
+    rows = in_order(block, checks.rows)
+    step = max(-(-len(rows) // MOST), 1)
+    rows = rows[::step]
+    names = tuple(block.point_ids[row] for row in rows.tolist())
+    if len(rows) and result.datum.is_chosen:
+        raise InputError(
+            f"check points cannot be compared: the datum of the network is chosen ({result.datum}),"
+            " and theirs is another"
+        )
+    _check_apart(block, rows)
+    given = block.point_positions[rows]
+    turn = turned_to_east(block, given)
+    differences = _turned(turn, result.point_differences[rows])
+    sd = _survey(block, rows, differences, names, asked.sd)
+    joint = covariances.covariance(("point", names)) if names else np.zeros((0, 0))
+    if block.geographic or block.frame.kind == "geocentric":
+        joint = turned_jointly(turn, joint)
+    for name in asked.vegetated:
+        if name not in block.point_ids:
+            raise InputError(f"there is no point {name!r} in vegetation")
+    return Compared(
+        names=names,
+        vegetated=np.array([name in asked.vegetated for name in names], dtype=bool),
+        given=given,
+        given_places=plan_positions(block, given),
+        places=plan_positions(block, result.point_positions[rows]),
+        differences=differences,
+        product=joint,
+        survey=_survey_covariance(sd, asked),
+        survey_sd=sd,
+        common_sd=np.array(asked.survey_common_sd),
+        scale=result.covariance_scale,
+        second=result.freedom_of_scale,
+        not_usable=tuple(_not_usable(result)),
+        known=len(checks.rows),
+        step=step,
+    )
+
+
+def in_order(block: Block, rows: Indices) -> Indices:
+    """Return points in the order in which clients look for their names."""
+    return np.array(
+        sorted(rows.tolist(), key=lambda row: natural_order(block.point_ids[row])), dtype=np.int64
+    )
+
+
+def turned_to_east(block: Block, positions: Floats) -> Floats:
+    """Return (n, 3, 3) J: what takes differences at (n, 3) positions to east, north, up."""
+    if block.spheroid is not None:
+        return np.asarray(np.eye(3) * lengths_of_units(_finite(positions), block.spheroid)[:, :, np.newaxis])
+    if block.frame.kind == "geocentric":
+        a, b = block.frame.ellipsoid
+        return local_frames(geocentric_to_geographic(_finite(positions), Spheroid(a, b)))
+    return np.broadcast_to(np.eye(3), (len(positions), 3, 3))
+
+
+def turned_jointly(turn: Floats, joint: Floats) -> Floats:
+    """Return J C J' of the (3 n, 3 n) joint covariance of points, J as of :func:`turned_to_east`."""
+    n = len(turn)
+    blocks = np.einsum("iab,ibjc,jdc->iajd", turn, joint.reshape(n, 3, n, 3), turn, optimize=True)
+    return np.asarray(blocks.reshape(3 * n, 3 * n))
+
+
+def _finite(positions: Floats) -> Floats:
+    """Return positions; what is not given is where the others are in the middle."""
+    middle = np.array(
+        [np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0 for own in positions.T]
+    )
+    return np.where(np.isfinite(positions), positions, middle)
+
+
+def _turned(turn: Floats, differences: Floats) -> Floats:
+    """Return J d; components that J leaves alone may be missing."""
+    whole = np.einsum("iab,ib->ia", turn, np.nan_to_num(differences))
+    mixed = np.einsum("iab,ib->ia", (turn != 0).astype(float), np.isnan(differences).astype(float)) > 0
+    return np.where(mixed, np.nan, whole)
+
+
+def plan_positions(block: Block, positions: Floats) -> Floats:
+    """Return (n, 3) positions as east, north, height: amid the stations of blocks on the earth."""
+    if block.spheroid is not None:
+        return local_axes(block).positions(positions)
+    if block.frame.kind != "geocentric":
+        return positions
+    a, b = block.frame.ellipsoid
+    middle = np.median(block.photo_positions, axis=0)
+    frame = local_frames(geocentric_to_geographic(middle[np.newaxis], Spheroid(a, b)))[0]
+    return np.asarray((positions - middle) @ frame.T)
+
+
+def _survey(
+    block: Block, rows: Indices, differences: Floats, names: Sequence[str], asked: tuple[float, ...] | None
+) -> Floats:
+    """Return (n, 3) standard deviations of the survey; those of geographic blocks are angles in it."""
+    own = np.full((len(rows), 3), np.nan)
+    if block.point_check_sd is not None:
+        units = lengths_of_units(_finite(block.point_positions[rows]), block.spheroid)
+        own = block.point_check_sd[rows] * units
+    known = np.isfinite(differences)
+    halved = known[:, :2].all(axis=1) & (np.isfinite(own[:, 0]) != np.isfinite(own[:, 1]))
+    if halved.any():
+        name = names[int(np.argmax(halved))]
+        raise InputError(f"check point {name} has a standard deviation along one axis in plan only")
+    if asked is not None:
+        own = np.where(np.isnan(own), asked, own)
+    lacking = (known & np.isnan(own)).any(axis=1)
+    if lacking.any():
+        without = [name for name, lacks in zip(names, lacking.tolist(), strict=True) if lacks]
+        raise InputError(
+            f"the survey of check points has no standard deviations: {listed(without)}; give them in control"
+            " (sd_x ..), or --sd check=0.01,0.01,0.015; --sd check=0 says that it has no error"
+        )
+    return np.where(known, own, np.nan)
+
+
+def _survey_covariance(sd: Floats, asked: Asked) -> Floats:
+    """Return S: variances by point, and what all points share unless it cancels in the differences."""
+    known = np.nan_to_num(sd).ravel()
+    survey = np.diag(known**2)
+    if not asked.survey_common_in_control:
+        inside = np.isfinite(sd).astype(float) * asked.survey_common_sd
+        for k in range(3):
+            one = np.zeros(sd.shape)
+            one[:, k] = inside[:, k]
+            survey += np.outer(one.ravel(), one.ravel())
+    return survey
+
+
+def _control_positions(block: Block) -> dict[str, Floats]:
+    """Return (3,) given coordinates of control points by name: held, or observed in common."""
+    held = np.flatnonzero(np.isfinite(block.point_sd).any(axis=1))
+    found = {block.point_ids[row]: block.point_positions[row] for row in held.tolist()}
+    observed = [each for each in block.observations if isinstance(each, Control)]
+    return found | {each.point: np.asarray(each.position, dtype=float) for each in observed}
+
+
+def control_places(block: Block) -> Floats:
+    """Return (k, 3) places of control points with both coordinates in plan, as they were given."""
+    found = list(_control_positions(block).values())
+    places = plan_positions(block, np.array(found).reshape(-1, 3))
+    return places[np.isfinite(places[:, :2]).all(axis=1)]
+
+
+def _check_apart(block: Block, rows: Indices) -> None:
+    """Refuse check points that are control points of other names."""
+    apart = SAME_PLACE / METRES.get(block.linear_unit, 1.0)
+    control = _control_positions(block)
+    if not control or not len(rows):
+        return
+    others = list(control)
+    held = plan_positions(block, np.array([control[name] for name in others]))
+    checks = plan_positions(block, block.point_positions[rows])
+    for place, row in zip(checks, rows.tolist(), strict=True):
+        near = np.linalg.norm(held - place, axis=1) < apart  # what is not given is near nothing
+        if near.any():
+            raise InputError(
+                f"check point {block.point_ids[row]} is control: it lies where {others[near.argmax()]} does"
+            )
+
+
+def _not_usable(result: Result) -> list[tuple[str, str]]:
+    """Return known points that took no part, with the reason."""
+    known = (result.point_kinds == "check") & ~result.used_points
+    imaged = np.zeros(len(known), dtype=bool)
+    imaged[result.block.image_points] = True
+    found = []
+    for row in np.flatnonzero(known).tolist():
+        name = result.block.point_ids[row]
+        reason = result.dropped.get(name, "left out") if imaged[row] else "no images"
+        found.append((name, reason))
+    return found

@@ -1,0 +1,459 @@
+"""The one judgement of a statement: headline, exit code, sentences, assumptions and remarks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram.lazy_dataclasses import dataclass
+from photogram.results.result import Result
+from photogram.results.statement import translation
+from photogram.results.statement.asprs import wording
+from photogram.results.statement.assumptions import assumptions
+from photogram.results.statement.budget import Budget, budget_line
+from photogram.results.statement.comparison import Compared
+from photogram.results.statement.figures import Figures, Sized
+from photogram.results.statement.honest import LEVEL, Bias, Prediction, Surface
+from photogram.results.statement.layout import Layout
+from photogram.results.statement.leave_one_out import LeftOut, limit_of
+from photogram.results.statement.request import Asked
+from photogram.results.statement.standards import Asprs, Lengths, Standards
+from photogram.results.statement.texts import Texts
+from photogram.show.page import Tone
+from photogram.statistics.distributions import critical_normal
+
+__all__ = ["Judged", "Said", "judged"]
+
+NOT_USABLE = 4
+"""Exit code of a statement that must not be handed over as it is."""
+Said = list[tuple[str, str]]
+"""Keys of the table of words, and texts."""
+HEIGHT_KINDS = 10.0
+"""Standard deviations of a mean difference beyond which heights of two kinds may have been compared."""
+NAMED = 10
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a statement says.
+
+    Attributes
+    ----------
+    exit, tone
+        Exit code, and how the headline is to be taken.
+    headline
+        A sentence.
+    sentences, assumptions
+        Keys and texts.
+    remarks
+        What is to be looked at, without an exit code of its own.
+    """
+
+    exit: int
+    tone: Tone
+    headline: str
+    sentences: Said
+    assumptions: Said
+    remarks: list[str]
+
+
+@dataclass(frozen=True)
+class _Against:
+    """What speaks against handing a statement over.
+
+    Attributes
+    ----------
+    spoilt, missed, high
+        The adjustment cannot be used, an accuracy asked for is missed, differences are larger than predicted.
+    warning, low, control, lengths
+        The verdict of the adjustment is a warning, differences are smaller than predicted, control points
+        disagree with the others, calibrated lengths with their standard deviations.
+    """
+
+    spoilt: bool
+    missed: bool
+    high: bool
+    warning: bool
+    low: bool
+    control: Sequence[LeftOut]
+    lengths: bool
+
+    @property
+    def always(self) -> bool:
+        """Whether it must not be handed over as it is."""
+        return self.spoilt or self.missed or self.high
+
+    @property
+    def strictly(self) -> bool:
+        """Whether `strict` says so, too."""
+        return self.warning or self.low or bool(self.control) or self.lengths
+
+
+def judged(
+    result: Result,
+    asked: Asked,
+    texts: Texts,
+    found: Compared,
+    of_all: Figures | None,
+    of_vegetated: Figures | None,
+    left_out: Sequence[LeftOut],
+    taken_apart: Sequence[Budget],
+    standards: Standards,
+    layout: Layout | None,
+    *,
+    assumed: Sequence[str] = (),
+    removed: Sequence[str] = (),
+    strict: bool = False,
+) -> Judged:
+    """Return what the statement says of all that was found."""
+    against = _against(result, of_all, left_out, standards)
+    bad = against.always or (strict and against.strictly)
+    doubtful = against.strictly or _doubtful(of_all)
+    held = not result.photo_given_sd.any()
+    remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout, held)
+    remarks += [
+        texts("control.wrong", point=each.point, p=texts.significant(each.p, 2))
+        for each in against.control[:NAMED]
+    ]
+    fields: dict[str, str | int] = {
+        "verdict": translation.verdict(texts, result.verdict),
+        "points": texts.listed([each.point for each in against.control], NAMED),
+        "n": 0 if of_all is None else of_all.n,
+    }
+    return Judged(
+        exit=NOT_USABLE if bad else 0,
+        tone="bad" if bad else "look" if remarks or doubtful else "good",
+        headline=texts(_headline(against, of_all, standards, strict=strict), **fields),
+        sentences=[
+            *_asprs(asked, texts, standards.asprs),
+            *(_nssda(texts, standards) if "nssda" in asked.standards else []),
+            *_lengths(texts, standards.lengths),
+            *_honest(asked, texts, found, of_all),
+            *(("budget.line", budget_line(texts, each)) for each in taken_apart),
+        ],
+        assumptions=assumptions(
+            result, asked, texts, found, layout, assumed, removed, lengths=standards.lengths
+        ),
+        remarks=remarks,
+    )
+
+
+def _against(
+    result: Result, of_all: Figures | None, left_out: Sequence[LeftOut], standards: Standards
+) -> _Against:
+    high, low = _rejected(of_all)
+    lengths = None if standards.lengths is None else standards.lengths.test.together
+    return _Against(
+        spoilt=not result.verdict.usable,
+        missed=_missed(standards),
+        high=high,
+        warning=result.verdict.warning,
+        low=low,
+        control=[each for each in left_out if each.p < limit_of(left_out)],
+        lengths=lengths is not None and (lengths.rejected_high or lengths.rejected_low),
+    )
+
+
+def _whole(of_all: Figures) -> Prediction | None:
+    """Return the test of as many components together as there are points with all of them."""
+    return of_all.prediction["all"] or of_all.prediction["h"] or of_all.prediction["plan"]
+
+
+def _rejected(of_all: Figures | None) -> tuple[bool, bool]:
+    """Return whether the whole test finds differences larger, or smaller, than predicted."""
+    whole = None if of_all is None else _whole(of_all)
+    return (False, False) if whole is None else (whole.rejected_high, whole.rejected_low)
+
+
+def _doubtful(of_all: Figures | None) -> bool:
+    """Return whether there are no check points, or some component, mean, surface or point does not agree."""
+    if of_all is None:
+        return True
+    parts = [each for each in of_all.prediction.values() if each is not None]
+    shifts = [each for each in of_all.bias.values() if each is not None]
+    return (
+        any(each.rejected_high or each.rejected_low for each in parts)
+        or any(each.rejected for each in shifts)
+        or (of_all.surface is not None and of_all.surface.rejected)
+        or bool(of_all.points.wrong.any())
+    )
+
+
+def _missed(standards: Standards) -> bool:
+    classes = () if standards.asprs is None else standards.asprs.verdicts.values()
+    return "missed" in classes or (standards.lengths is not None and standards.lengths.test.met is False)
+
+
+def _headline(against: _Against, of_all: Figures | None, standards: Standards, *, strict: bool) -> str:
+    verdicts = [] if standards.asprs is None else list(standards.asprs.verdicts.values())
+    met = standards.lengths is not None and standards.lengths.test.met
+    for holds, name in (
+        (against.spoilt, "verdict"),
+        (against.missed, "missed"),
+        (against.high, "high"),
+        (strict and against.warning, "warning"),
+        (strict and against.control, "control"),
+        (strict and against.lengths, "lengths"),
+        (against.low, "low"),
+        (of_all is None and not met, "none"),
+        ("not decided" in verdicts, "found"),
+        ("produced to meet" in verdicts, "produced"),
+        (bool(verdicts) or bool(met), "met"),
+    ):
+        if holds:
+            return f"headline.{name}"
+    return "headline.found"
+
+
+def _asprs(asked: Asked, texts: Texts, found: Asprs | None) -> Said:
+    if found is None:
+        return []
+    said: Said = []
+    for name in ("h", "v", "3d"):
+        figure, size = found.figures[name], asked.classes.get(name)
+        own = {f"rmse_{name}": texts.length(figure.rmse)} if figure is not None else {}
+        if size is None:
+            if figure is not None and name != "3d":
+                said.append(_said(texts, f"asprs.found.{name}", n=figure.count, **own))
+        elif figure is not None:
+            case = "missed" if found.verdicts[name] == "missed" else found.words
+            said.append(
+                _said(texts, f"asprs.{case}.{name}", n=figure.count, **{"class": texts.size(size)}, **own)
+            )
+        elif name != "3d":
+            left = {f"loo_{name}": texts.length(found.left_out[name])}
+            said.append(_said(texts, f"asprs.none.{name}", **{"class": texts.size(size)}, **left))
+    vegetated = found.figures["vva"]
+    if vegetated is not None:
+        key = f"asprs.{wording(vegetated.count)}.vva"
+        said.append(_said(texts, key, n=vegetated.count, rmse_v=texts.length(vegetated.rmse)))
+    return said
+
+
+def _said(texts: Texts, key: str, **fields: str | int | float) -> tuple[str, str]:
+    return key, texts(key, **fields)
+
+
+def _nssda(texts: Texts, standards: Standards) -> Said:
+    found = standards.nssda
+    if found is None:
+        return []
+    said: Said = []
+    if found.accuracy_r is not None:
+        accuracy = texts.length(found.accuracy_r)
+        said.append(_said(texts, f"nssda.{found.wording}.h", accuracy_r=accuracy, n=found.count))
+    elif found.ce95 is not None and found.ratio is not None:
+        ratio = texts.number(found.ratio, 2)
+        said.append(_said(texts, "nssda.ce95", ratio=ratio, ce95=texts.length(found.ce95)))
+    if found.accuracy_z is not None:
+        accuracy = texts.length(found.accuracy_z)
+        said.append(_said(texts, f"nssda.{found.wording}.v", accuracy_z=accuracy, n=found.count))
+    return said if found.enough else [*said, _said(texts, "nssda.few", n=found.count)]
+
+
+def _lengths(texts: Texts, found: Lengths | None) -> Said:
+    if found is None:
+        return []
+    test = found.test
+    own: dict[str, str | int] = {
+        "n": len(test.errors),
+        "lines": test.lines,
+        "largest": texts.length(test.largest),
+        "rms": texts.length(test.rms),
+    }
+    if found.limit is None or test.within is None:
+        said = [_said(texts, "lengths.found", **own)]
+    else:
+        limit = f"{texts.length(found.limit.constant)} + {texts.significant(found.limit.slope, 2)} L"
+        if math.isfinite(found.limit.most):
+            limit += f" ≤ {texts.length(found.limit.most)}"
+        beyond = int((~test.within).sum())
+        key, more = ("lengths.missed", {"beyond": beyond}) if beyond else ("lengths.met", {})
+        said = [_said(texts, key, limit=limit, **own, **more)]
+    if test.together is not None:
+        whole = test.together
+        key = f"lengths.{'high' if whole.rejected_high else 'low' if whole.rejected_low else 'agree'}"
+        said.append(_said(texts, key, **_factor(texts, whole.factor, whole.interval)))
+    return said
+
+
+def _honest(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None) -> Said:
+    if of_all is None:
+        return [_said(texts, "honest.none")]
+    said: Said = []
+    whole = _whole(of_all)
+    high, low = _rejected(of_all)
+    if whole is not None:
+        key = f"honest.{'high' if high else 'low' if low else 'yes'}"
+        said.append(_said(texts, key, n=whole.points, **_factor(texts, whole.factor, whole.factor_interval)))
+    for part in ("e", "n", "h", "plan"):
+        own = of_all.prediction[part]
+        if own is not None and (own.rejected_high or own.rejected_low):
+            fields = _factor(texts, own.factor, own.factor_interval)
+            said.append(_said(texts, "honest.part", component=texts(f"component.{part}"), **fields))
+    shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
+    for part, shift in shifts:
+        if shift.rejected:
+            fields = {
+                "component": texts(f"component.{part}"),
+                "mean": texts.length(shift.mean),
+                "expanded": texts.length(shift.expanded),
+                "k": texts.number(shift.expanded / shift.sd_of_mean, 2),
+                "p": texts.percent(asked.coverage),
+            }
+            said.append(_said(texts, "bias.found", **fields))
+    if shifts and not any(shift.rejected for _, shift in shifts):
+        said.append(_said(texts, "bias.none"))
+    return [*said, *_surface(texts, of_all.surface), *_points(asked, texts, found, of_all)]
+
+
+def _surface(texts: Texts, found: Surface | None) -> Said:
+    if found is None:
+        return [_said(texts, "surface.few")]
+    p = texts.significant(found.p, 2)
+    if not found.rejected:
+        return [_said(texts, "surface.none", p=p)]
+    said = [_said(texts, "surface.found", p=p)]
+    value, sd = found.estimate, found.sd
+    if abs(found.t[0]) > critical_normal(LEVEL):
+        shift, own = texts.length(float(value[0])), texts.length(float(sd[0]))
+        said.append(_said(texts, "surface.shift", shift=shift, sd=own))
+    k = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
+    limit = critical_normal(LEVEL)
+    if abs(found.t[k]) > limit:
+        rise, own = texts.length(float(value[k])), texts.length(float(sd[k]))
+        said.append(_said(texts, "surface.tilt", rise=rise, sd=own))
+    if abs(found.t[3]) > limit:
+        bend, own = texts.length(float(value[3])), texts.length(float(sd[3]))
+        said.append(_said(texts, "surface.dome", bend=bend, sd=own))
+    return said
+
+
+def _factor(texts: Texts, factor: float, interval: tuple[float, float]) -> dict[str, str]:
+    return {
+        "factor": texts.number(factor, 2),
+        "low": texts.number(interval[0], 2),
+        "high": texts.number(interval[1], 2),
+    }
+
+
+def _points(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None) -> Said:
+    """Return which single points disagree, and which were set beside."""
+    said: Said = []
+    if of_all is not None:
+        tests = of_all.points
+        for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]:
+            p = texts.significant(float(tests.least[row]), 2)
+            text = texts("point.wrong", point=found.names[row], p=p)
+            said.append(("point.wrong", text))
+    if asked.without:
+        reasons = "; ".join(f"{point}: {reason}" for point, reason in asked.without.items())
+        points = texts.listed(list(asked.without))
+        said.append(_said(texts, "point.left", points=points, reasons=reasons))
+    return said
+
+
+def _remarks(
+    asked: Asked,
+    texts: Texts,
+    found: Compared,
+    of_all: Figures | None,
+    of_vegetated: Figures | None,
+    standards: Standards,
+    layout: Layout | None,
+    held: bool,
+) -> list[str]:
+    said = [
+        texts("unusable", point=name, reason=texts.word("reason", reason))
+        for name, reason in found.not_usable[:NAMED]
+    ]
+    said += [texts("language.missing", sentence=key) for key in texts.missing]
+    if held:
+        said.append(texts("assume.fixed"))
+    if standards.asprs is not None:
+        said += _asprs_remarks(asked, texts, found, of_all, of_vegetated, standards.asprs)
+    if standards.lengths is not None:
+        said += _lengths_remarks(texts, standards.lengths)
+    if layout is not None:
+        said += _layout(texts, layout)
+    shift = None if of_all is None else of_all.bias["h"]
+    heights = None if of_all is None else of_all.parts["h"]
+    if shift is not None and heights is not None and _two_heights(found, shift, heights):
+        said.append(texts("bias.heights", mean=texts.length(shift.mean), sd=texts.length(heights.sd)))
+    return said
+
+
+def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
+    test, said = found.test, list[str]()
+    if not test.enough:
+        said.append(texts("lengths.few", lines=test.lines, least=test.least))
+    if not math.isfinite(test.longest):
+        said.append(texts("lengths.diagonal"))
+    elif not test.long_enough:
+        said.append(texts("lengths.short", share=texts.percent(test.longest)))
+    if not test.along_diagonal:
+        said.append(texts("lengths.direction", angle=texts.number(math.degrees(test.off_diagonal), 0)))
+    if found.expansion is None:
+        said.append(texts("lengths.warm"))
+    return said
+
+
+def _asprs_remarks(
+    asked: Asked,
+    texts: Texts,
+    found: Compared,
+    of_all: Figures | None,
+    of_vegetated: Figures | None,
+    own: Asprs,
+) -> list[str]:
+    said = []
+    n = 0 if of_all is None else of_all.n
+    if asked.classes and n < own.points_asked:
+        said.append(texts("asprs.points", asked=own.points_asked, n=n))
+    if of_vegetated is not None and of_vegetated.n < own.points_asked:
+        said.append(texts("asprs.points", asked=own.points_asked, n=of_vegetated.n))
+    for name, good in own.survey.items():
+        figure = own.figures[name]
+        if not good and figure is not None:
+            size = {"class": texts.size(asked.classes[name])}
+            said.append(texts("asprs.survey", survey=texts.length(figure.survey), **size))
+    for name, good in own.control.items():
+        rmse = own.control_rmse["hv".index(name)]
+        if not good and math.isfinite(rmse):
+            plain = asked.classes["h"]
+            limit = asked.classes["v"] / 2 if name == "v" and "v" in asked.classes else plain
+            limit = plain / 2 if name == "h" else limit
+            said.append(texts(f"asprs.control.{name}", sd=texts.length(rmse), limit=texts.size(limit)))
+    for each in own.remarks[:NAMED]:
+        fields = {
+            "component": texts(f"component.{each.component}"),
+            "value": texts.length(each.value),
+            "limit": texts.length(each.limit),
+        }
+        if each.point is None:
+            said.append(texts("asprs.mean", **fields))
+        else:
+            said.append(texts("asprs.difference", point=found.names[each.point], **fields))
+    return said
+
+
+def _layout(texts: Texts, found: Layout) -> list[str]:
+    said = []
+    if not found.even:
+        said.append(texts("layout.quadrants"))
+    if not found.apart:
+        said.append(texts("layout.spacing", spacing=texts.percent(found.least_spacing)))
+    if found.far > 0:
+        said.append(texts("layout.far", percent=texts.percent(found.far)))
+    if found.beyond_control:
+        said.append(texts("layout.outside", n=found.beyond_control))
+    return said
+
+
+def _two_heights(found: Compared, shift: Bias, own: Sized) -> bool:
+    """Return whether heights of two kinds may have been compared: all of one sign, far from 0, and alike."""
+    heights = found.differences[found.counted[:, 2], 2]
+    one_sign = bool((heights > 0).all() or (heights < 0).all())
+    return own.n > 2 and one_sign and abs(shift.z) > HEIGHT_KINDS and own.sd < abs(shift.mean) / 3

@@ -1,0 +1,352 @@
+"""Difference of two calibrations as arrays, and whether their uncertainties explain it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram import _photocore
+from photogram.arguments.types import Bools, Floats
+from photogram.lazy_dataclasses import dataclass, field
+from photogram.network.cameras import Camera
+from photogram.network.hull import hull, outside
+from photogram.show.summary import Brief, Rows
+from photogram.targets.datums import fixed_points
+from photogram.targets.difference_test import DifferenceTest
+from photogram.targets.housing import transformed
+from photogram.targets.imaging import imaged, unknown_of, values_of
+from photogram.targets.maps import distance_text, image_grid
+from photogram.targets.motion_fit import Criterion, Fitted, differences_at, fitted_motion, points_at
+from photogram.targets.projection import of_functions, point_partials, worst
+
+__all__ = ["CameraDifference", "Side", "compared"]
+
+DEFINED = 1e-5
+"""Of the largest: what the cofactors of differences over a grid say less of is rounding."""
+TESTED = (12, 8)
+"""The grid over which two different models are tested."""
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One of two calibrations.
+
+    Attributes
+    ----------
+    name, camera
+        The camera.
+    corners
+        (m, 2) where it has seen the board; none where that is not known.
+    covariance
+        (p, p) of its parameters; None where it is not known.
+    rows
+        (6, p) the datum `corners` (:func:`photogram.targets.datums.fixed_points`); None with `covariance`.
+    """
+
+    name: str
+    camera: Camera
+    corners: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    covariance: Floats | None = None
+    rows: Floats | None = None
+
+    def covariances(self, points: Floats, finite: bool, rows: Floats | None) -> Floats:
+        """Return (n, 2, 2) of the images of (n, 3) points in its axes, in the datum of (6, p) rows."""
+        assert self.covariance is not None
+        assert rows is not None
+        return of_functions(self.partials(points, finite, rows), self.covariance)
+
+    def partials(self, points: Floats, finite: bool, rows: Floats) -> Floats:
+        """Return (n, 2, p) partials of the images of points, in the datum of (6, p) rows."""
+        found = point_partials(self.camera, points, finite)
+        return np.asarray(found[:, :, :-6] + found[:, :, -6:] @ rows)
+
+    def sees(self, pixels: Floats) -> Bools:
+        """Return (n,) whether pixels lie where it has seen the board, as far as that is known."""
+        return ~outside(pixels, hull(self.corners)) if len(self.corners) else np.ones(len(pixels), dtype=bool)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class CameraDifference(Brief):
+    """Where two calibrated cameras image the same points.
+
+    Attributes
+    ----------
+    cameras, size, unit
+        Names of a and b, width and height of the pictures of a, and the unit of lengths.
+    criterion, fitted
+        How the motion between their axes was found, and the motion.
+    columns, rows
+        (w,) and (h,) of the grid over the picture of camera a.
+    distances
+        D, from the centre of camera a.
+    vectors
+        (D, h, w, 2) d: images by b, the motion out, less those by a, pixels.
+    covariances
+        (D, h, w, 2, 2) what they should have, a and b being independent; None where one is not known.
+    inside
+        (h, w) whether both, as far as is known, have seen the board there.
+    shared
+        Share of the corners of a that b has, too: above 0 they are not independent.
+    test
+        Of both together, free of the motion; None where one is not known, or they share corners.
+    """
+
+    cameras: tuple[str, str]
+    size: tuple[int, int]
+    unit: str
+    criterion: Criterion
+    fitted: Fitted
+    columns: Floats
+    rows: Floats
+    distances: tuple[float, ...]
+    vectors: Floats
+    covariances: Floats | None
+    inside: Bools
+    shared: float
+    test: DifferenceTest | None
+
+    @property
+    def rotation(self) -> float:
+        """Angle of the motion, degrees."""
+        return float(
+            np.degrees(np.linalg.norm(_photocore.rotation_vectors(self.fitted.motion[np.newaxis, :3, :3])))
+        )
+
+    @property
+    def translation(self) -> Floats:
+        """(3,) of the motion, in axes of camera b; zero at infinity."""
+        return self.fitted.motion[:3, 3]
+
+    @property
+    def lengths(self) -> Floats:
+        """(D, h, w) of the vectors."""
+        return np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the lengths where the board was seen, pixels."""
+        return float(np.sqrt(np.nanmean(self.lengths[:, self.inside] ** 2)))
+
+    @property
+    def largest(self) -> float:
+        """Largest length where the board was seen, pixels."""
+        return float(np.nanmax(self.lengths[:, self.inside]))
+
+    @property
+    def chi2(self) -> Floats | None:
+        """(D, h, w) d' (Q_a + Q_b)^-1 d / 2: about 1 where the uncertainties explain the difference."""
+        if self.covariances is None:
+            return None
+        with np.errstate(invalid="ignore"):
+            known = np.isfinite(self.covariances).all(axis=(-2, -1)) & np.isfinite(self.vectors).all(axis=-1)
+        found = np.full(known.shape, np.nan)
+        own = self.vectors[known]
+        found[known] = (own * np.linalg.solve(self.covariances[known], own[:, :, np.newaxis])[:, :, 0]).sum(
+            axis=1
+        )
+        return found / 2
+
+    @property
+    def title(self) -> str:
+        """What is compared."""
+        at = " and ".join(distance_text(each, self.unit) for each in self.distances)
+        return f"{self.cameras[1]} less {self.cameras[0]} {at}, the motion between them out"
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return the difference in a few lines."""
+        shift = ", ".join(f"{each:.3g}" for each in self.translation)
+        moved = f", {shift} {self.unit}" if self.fitted.finite else ""
+        rows = [
+            (
+                "motion",
+                f"{self.rotation:.4g} degrees{moved}",
+            ),
+            ("difference", f"rms {self.rms:.3g} px, largest {self.largest:.3g} px where the board was seen"),
+        ]
+        return self.title, rows + [("", each) for each in self.remarks]
+
+    @property
+    def sentences(self) -> list[str]:
+        """The difference in lines of text."""
+        title, rows = self.brief()
+        return [title, *(f"{name}: {said}" if name else said for name, said in rows)]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What limits the comparison, and what came out of its test."""
+        said = []
+        if self.fitted.finite and len(self.distances) == 1:
+            said.append("one distance leaves the translation arbitrary: give a near and a far one")
+        if self.shared > 0:
+            said.append(
+                f"{100 * self.shared:.0f} percent of the corners are the same: the two are not independent;"
+                " the difference shows what the models do, and is only a lower bound of the errors"
+            )
+        if self.covariances is None:
+            said.append("without covariances of both the difference cannot be tested")
+        if self.test is not None:
+            verdict = (
+                "explained by the uncertainties"
+                if self.test.explained
+                else (f"{self.test.factor:.2g} times what the uncertainties explain")
+            )
+            said.append(f"{self.test.name}: {verdict} (p {self.test.probability:.2g})")
+        return said
+
+
+def compared(
+    a: Side,
+    b: Side,
+    size: tuple[int, int],
+    distances: tuple[float, ...],
+    *,
+    unit: str = "m",
+    criterion: Criterion = "pixels",
+    radius: float | None = None,
+    grid: tuple[int, int] = (60, 40),
+) -> CameraDifference:
+    """Compare two cameras.
+
+    Parameters
+    ----------
+    a, b
+        The cameras.
+    size, unit
+        Width and height of the pictures of a, and the unit of lengths.
+    distances
+        At which they are compared.
+    criterion
+        What is least when the motion between them is fitted.
+    radius
+        Pixels about the middle that count in the fit; None: all where both are known, each with its weight,
+        else a sixth of the shorter side.
+    grid
+        Pixels across and down.
+    """
+    columns, rows, pixels = image_grid(size, grid)
+    known = a.covariance is not None and b.covariance is not None
+    reach = radius or (np.inf if known else min(size) / 6)
+    near = pixels[np.hypot(*(pixels - (np.array(size) - 1) / 2).T) < reach]
+    weights = _weights(a, b, near, distances, criterion) if known else None
+    fitted = fitted_motion(a.camera, b.camera, near, distances, criterion, weights)
+    vectors = np.stack([differences_at(a.camera, b.camera, fitted, pixels, each) for each in distances])
+    expected = _Expected(a, b, fitted, near, distances) if known else None
+    shape = (len(distances), len(rows), len(columns), 2)
+    shared = _shared(a.corners, b.corners)
+    return CameraDifference(
+        cameras=(a.name, b.name),
+        size=size,
+        unit=unit,
+        criterion=criterion,
+        fitted=fitted,
+        columns=columns,
+        rows=rows,
+        distances=distances,
+        vectors=vectors.reshape(shape),
+        covariances=None if expected is None else expected.covariances(pixels, distances).reshape(*shape, 2),
+        inside=(a.sees(pixels) & b.sees(pixels + vectors[0])).reshape(shape[1:3]),
+        shared=shared,
+        test=None if expected is None or shared > 0 else expected.test(size, distances),
+    )
+
+
+def _weights(a: Side, b: Side, pixels: Floats, distances: tuple[float, ...], criterion: Criterion) -> Floats:
+    """Return what the fit gives each pixel at each distance, by the uncertainties in the datum `corners`."""
+    found = []
+    for each in distances:
+        finite = bool(np.isfinite(each))
+        own, other = (
+            side.covariances(points_at(side.camera, pixels, [each]), finite, side.rows) for side in (a, b)
+        )
+        found.append(
+            _inverted(own + other) if criterion == "pixels" else 1 / (worst(own) * worst(other)) ** 2
+        )
+    return np.concatenate(found)
+
+
+def _inverted(covariances: Floats) -> Floats:
+    known = np.isfinite(covariances).all(axis=(1, 2))
+    found = np.full_like(covariances, np.nan)
+    found[known] = np.linalg.inv(covariances[known])
+    return found
+
+
+def _shared(a: Floats, b: Floats) -> float:
+    """Return the share of the corners of a that b has, too."""
+    if not len(a) or not len(b):
+        return 0.0
+    others = set(map(tuple, b.tolist()))
+    return sum(each in others for each in map(tuple, a.tolist())) / len(a)
+
+
+class _Expected:
+    """What a difference should be: both calibrations in the datum of the fit, whose motion is out of both."""
+
+    def __init__(
+        self, a: Side, b: Side, fitted: Fitted, pixels: Floats, distances: tuple[float, ...]
+    ) -> None:
+        self.a, self.b, self.fitted = a, b, fitted
+        points = points_at(a.camera, pixels, distances)
+        weights = _weights(a, b, pixels, distances, "pixels")
+        moved = self._moved(points, fitted.finite)
+        usable = np.isfinite(weights).all(axis=(1, 2)) & np.isfinite(imaged(b.camera, moved).xy).all(axis=1)
+        self.rows = [
+            fixed_points(side.camera, each[usable], weights[usable], fitted.finite)
+            for side, each in ((a, points), (b, moved))
+        ]
+
+    def _moved(self, points: Floats, finite: bool) -> Floats:
+        """Return points of axes of a in axes of b."""
+        motion = self.fitted.motion
+        return transformed(motion, points) if finite else points @ motion[:3, :3].T
+
+    def covariances(self, pixels: Floats, distances: tuple[float, ...]) -> Floats:
+        """Return (D, n, 2, 2) Q_a + Q_b."""
+        found = []
+        for each in distances:
+            finite = bool(np.isfinite(each))
+            points = points_at(self.a.camera, pixels, [each])
+            own = self.a.covariances(points, finite, self.rows[0])
+            found.append(own + self.b.covariances(self._moved(points, finite), finite, self.rows[1]))
+        return np.stack(found)
+
+    def test(self, size: tuple[int, int], distances: tuple[float, ...]) -> DifferenceTest:
+        """Test both together: parameters where the model is the same, else the differences over a grid."""
+        a, b = self.a, self.b
+        assert a.covariance is not None
+        assert b.covariance is not None
+        unknown = unknown_of(a.camera)
+        if a.camera.model == b.camera.model and np.array_equal(unknown, unknown_of(b.camera)):
+            change = (values_of(b.camera) - values_of(a.camera))[unknown]
+            chi2 = float(change @ np.linalg.solve(a.covariance + b.covariance, change))
+            return DifferenceTest.of("parameters of both cameras", chi2, len(change))
+        pixels = image_grid(size, TESTED)[2]
+        pixels = pixels[a.sees(pixels)]
+        vectors, effects = [], []
+        for each in distances:
+            finite = bool(np.isfinite(each))
+            points = points_at(a.camera, pixels, [each])
+            own = [
+                side.partials(places, finite, rows) @ _root(side.covariance)
+                for side, places, rows in zip(
+                    (a, b), (points, self._moved(points, finite)), self.rows, strict=True
+                )
+            ]
+            effects.append(np.concatenate(own, axis=2))
+            vectors.append(differences_at(a.camera, b.camera, self.fitted, pixels, each))
+        return _tested(np.concatenate(vectors), np.concatenate(effects))
+
+
+def _tested(vectors: Floats, effects: Floats) -> DifferenceTest:
+    """Test (n, 2) vectors by (n, 2, r) F of their covariance F F', which has no more than r dimensions."""
+    known = np.isfinite(vectors).all(axis=1) & np.isfinite(effects).all(axis=(1, 2))
+    u, s, _ = np.linalg.svd(effects[known].reshape(-1, effects.shape[2]), full_matrices=False)
+    defined = s > DEFINED * s[0]
+    chi2 = float((((u.T @ vectors[known].ravel())[defined] / s[defined]) ** 2).sum())
+    return DifferenceTest.of("differences over the picture", chi2, int(np.count_nonzero(defined)))
+
+
+def _root(covariance: Floats | None) -> Floats:
+    """Return S with S S' the covariance."""
+    assert covariance is not None
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

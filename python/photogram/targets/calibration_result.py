@@ -1,0 +1,265 @@
+"""An adjusted calibration: cameras, sensors, views and the board, with the cofactors of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from photogram.arguments.arrays import one_of
+from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import dataclass, fields, replace
+from photogram.network.attitudes import Attitudes
+from photogram.network.passages import Bend
+from photogram.network.trajectories import Clock
+from photogram.results.cameras import AdjustedCamera
+from photogram.results.result import Result
+from photogram.results.snooping_result import Snooped
+from photogram.results.unknowns import AdjustedUnknown
+from photogram.show.methods import Shown
+from photogram.show.summary import Brief, Rows
+from photogram.statistics.limits import GlobalTest
+from photogram.statistics.verdict import Verdict
+from photogram.targets.appraisal_report import Worth
+from photogram.targets.start import CLOCK, Start
+from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
+
+__all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "deviation_of_corners", "with_unknown_weight"]
+
+Part = Literal["cameras", "sensors", "board", "views"]
+"""What has cofactors."""
+Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats]]
+"""Names of unknowns, what they are in the result, and their partials by steps of the block."""
+STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")
+"""Steps of a pose in vision axes: R <- Exp(w) R, t <- t + dt."""
+
+
+class UnknownWeight(Result):
+    """A result whose standard deviations of corners are ratios alone: nothing tests it as a whole."""
+
+    KNOWN: ClassVar[bool] = False
+
+    @property
+    def global_test(self) -> GlobalTest | None:
+        """None: nobody has said how well corners are measured."""
+        return None
+
+
+def with_unknown_weight(result: Result) -> Result:
+    """Return a result as one whose unit weight nobody knows."""
+    return UnknownWeight(**{each.name: getattr(result, each.name) for each in fields(Result)})
+
+
+def deviation_of_corners(result: Result) -> float:
+    """Return the standard deviation of a corner of level 0 that residuals have, in those that were given."""
+    used = result.used_images
+    weighted = (result.residuals[used] / result.image_given_sd[used]) ** 2
+    return float(np.sqrt(weighted.sum() / np.nansum(result.redundancy[used])))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Calibrated(Brief, Shown):
+    """An adjusted calibration of K cameras in V views of a board of n points.
+
+    Attributes
+    ----------
+    calibration
+        What was adjusted; without outliers that were taken out.
+    result
+        The adjusted block: residuals, redundancy numbers, tests, the verdict.
+    unregularised
+        The adjustment without priors of cameras, where there are any: what these have moved.
+    snooped
+        What was taken out, where gross errors were looked for; `result` is what is left.
+    worth
+        Maps of uncertainty, cross-validation and what else was asked for, which reports show.
+    """
+
+    calibration: Start
+    result: Result
+    unregularised: Result | None = None
+    snooped: Snooped | None = None
+    worth: Worth | None = None
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return how the adjustment ended in a few lines."""
+        title, rows = self.result.brief()
+        return title, [*self.calibration.brief()[1], *rows]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the result can be used, and if not, what is wrong."""
+        return self.result.verdict
+
+    @property
+    def cameras(self) -> tuple[AdjustedCamera, ...]:
+        """K adjusted cameras with their cofactors."""
+        return self.result.cameras
+
+    @cached_property
+    def sensors(self) -> Floats:
+        """(K, 4, 4) adjusted: camera 0 -> camera k; the identity where cameras are not tied."""
+        found = np.tile(np.eye(4), (len(self.cameras), 1, 1))
+        for each in self.result.unknowns:
+            if each.kind == "sensor":
+                found[self._numbers[each.name]] = sensor_pose(each.position, each.attitude)
+        return found
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {each.name: k for k, each in enumerate(self.cameras)}
+
+    @cached_property
+    def photos(self) -> Indices:
+        """(V,) the photo of the block whose pose is that of each view."""
+        return self.calibration.frames()[1]
+
+    @cached_property
+    def poses(self) -> Floats:
+        """(V, 4, 4) adjusted: board -> camera 0, or the camera itself where images are not synchronised."""
+        rows, result = self.photos, self.result
+        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[rows])
+        return vision_poses(result.photo_positions[rows], attitudes)
+
+    @cached_property
+    def picture_poses(self) -> Floats:
+        """(P, 4, 4) adjusted: board -> the camera of each picture, at its time."""
+        own, result = slice(len(self.calibration.corners.pictures)), self.result
+        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[own])
+        return vision_poses(result.photo_positions[own], attitudes)
+
+    @property
+    def offsets(self) -> dict[str, AdjustedUnknown]:
+        """The adjusted offsets between cameras, by the names of those that have one, in seconds."""
+        clocks = [each for each in self.result.unknowns if each.kind == Clock.KIND]
+        return {each.name.removeprefix(CLOCK): each for each in clocks}
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3) adjusted points of the board; nominal where no picture shows them."""
+        found, board = self.result.point_positions, self.calibration.board
+        given = board.places if self.bend is None else board.bent(*self.bend.position[:2])
+        return np.where(np.isnan(found), given, found)
+
+    @property
+    def bend(self) -> AdjustedUnknown | None:
+        """The deflections of the middle of the board, where these are unknowns."""
+        return next((each for each in self.result.unknowns if each.kind == Bend.KIND), None)
+
+    def sensors_adjusted(self) -> list[int]:
+        """Return the cameras that have a sensor whose pose was adjusted."""
+        return [self._numbers[each.name] for each in self.result.unknowns if each.kind == "sensor"]
+
+    def restarted(self) -> Start:
+        """Return the calibration with what is free where the adjustment has ended; the rest is as given."""
+        own, bend, found = self.calibration, self.bend, self.offsets
+        late = np.array([found[each.name].values[0] if each.name in found else 0.0 for each in self.cameras])
+        free = np.isinf(np.asarray(own.sd_sensors)).all(axis=1)[:, np.newaxis, np.newaxis]
+        bends = own.bend if bend is None else np.where(np.isinf(own.sd_bend), bend.position[:2], own.bend)
+        # Priors as those of mrcal are added again to what is free; knots begin where they are in any case.
+        given = [
+            each if each.camera.knots is not None else replace(each, given=before)
+            for each, before in zip(self.cameras, own.cameras, strict=True)
+        ]
+        return own.replace(
+            cameras=[each.restarted() for each in given],
+            poses=self.poses,
+            sensors=np.where(free, self.sensors, np.asarray(own.sensors)),
+            bend=(float(bends[0]), float(bends[1])),
+            offsets=np.where(np.isinf(np.asarray(own.sd_offsets)), late, own.offsets),
+        )
+
+    def cofactors(self, parts: Sequence[Part] = ("cameras", "sensors")) -> tuple[list[str], Floats]:
+        """Return the joint cofactors of some parts: covariances for a priori unit weight.
+
+        Parameters
+        ----------
+        parts
+            In the order of rows: `cameras` (all parameters, and knots that are unknown; what is held has
+            zeros), `sensors` and `views` (six
+            steps each: R <- Exp(w) R, t <- t + dt in vision axes; dt, then w), `board` (x, y, z of the points
+            that pictures show, or `bend_x` and `bend_y`).
+
+        Returns
+        -------
+        Names of the q unknowns (`left fx`, `right tx`, `17.z`, `view 3 wx`), and (q, q) their cofactors.
+
+        Raises
+        ------
+        InputError, OutOfMemoryError, KeyboardInterrupt
+            As of :meth:`photogram.Result.covariance`; a part that there is not.
+        """
+        names, wanted, steps = self._selected(parts)
+        found = self.result.covariance(wanted) / self.result.covariance_scale
+        start = 0
+        for each in steps:
+            own = slice(start, start + len(each))
+            found[own] = each @ found[own]
+            found[:, own] = found[:, own] @ each.T
+            start += len(each)
+        return names, found
+
+    def combined(self, partials: Floats, parts: Sequence[Part]) -> Floats:
+        """Return the (m, m) cofactors of linear combinations of some parts: J Q J'.
+
+        Parameters
+        ----------
+        partials
+            (m, q) J: a column for each of the q unknowns of :meth:`cofactors`.
+        parts
+            As of :meth:`cofactors`.
+
+        Raises
+        ------
+        InputError, OutOfMemoryError, KeyboardInterrupt
+            As of :meth:`cofactors`.
+        """
+        _, wanted, steps = self._selected(parts)
+        own, start = partials.copy(), 0
+        for each in steps:
+            columns = slice(start, start + len(each))
+            own[:, columns] = own[:, columns] @ each
+            start += len(each)
+        return self.result.covariances().combined(own, wanted) / self.result.covariance_scale
+
+    def _selected(self, parts: Sequence[Part]) -> Chosen:
+        names: list[str] = []
+        wanted: list[tuple[str, list[str]]] = []
+        steps: list[Floats] = []
+        for part in parts:
+            one_of("part of a calibration", part, get_args(Part))
+            own_names, selections, partials = getattr(self, f"_{part}")()
+            names += own_names
+            wanted += [each for each in selections if each[1]]
+            steps += partials
+        return names, wanted, steps
+
+    def _cameras(self) -> Chosen:
+        names: list[str] = []
+        selections: list[tuple[str, list[str]]] = []
+        for each, given in zip(self.cameras, self.result.block.cameras, strict=True):
+            knots = [knot.name for knot in given.knot_unknowns]
+            own = each.names + (given.knot_names if knots else ())
+            names += [f"{each.name} {name}" for name in own]
+            selections += [("camera", [each.name]), ("unknown", knots)]
+        return names, selections, [np.eye(len(names))]
+
+    def _sensors(self) -> Chosen:
+        rows = self.sensors_adjusted()
+        own = [self.cameras[row].name for row in rows]
+        names = [f"{name} {step}" for name in own for step in STEPS]
+        return names, [("unknown", own)], [sensor_steps(self.sensors[row]) for row in rows]
+
+    def _board(self) -> Chosen:
+        if self.bend is not None:
+            return ["bend_x", "bend_y"], [("unknown", [self.bend.name])], [np.eye(2)]
+        seen = np.flatnonzero(self.result.used_points).tolist()
+        own = [self.calibration.board.names[row] for row in seen]
+        return [f"{name}.{axis}" for name in own for axis in "xyz"], [("point", own)], [np.eye(3)] * len(own)
+
+    def _views(self) -> Chosen:
+        photos = [self.result.block.photo_ids[row] for row in self.photos.tolist()]
+        names = [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
+        return names, [("step", photos)], [view_steps(pose) for pose in self.poses]

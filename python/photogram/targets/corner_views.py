@@ -1,0 +1,247 @@
+"""Corners as files have them, and which camera and which view each image is of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from fnmatch import translate
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass, field
+from photogram.messages import Message, listed
+from photogram.targets.board import Board
+from photogram.targets.corners import Corners
+
+__all__ = ["Grouping", "Measured", "ViewBy", "grouped"]
+
+ViewBy = Literal["name", "time"]
+Size = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What the files of one format hold: n corners in I images.
+
+    Attributes
+    ----------
+    path
+        The file or folder.
+    images
+        I names; the same may be there once for each camera.
+    image, point
+        (n,) the image of each corner, and the number of the board's point.
+    xy, sd, use
+        As of :class:`Corners`, but in the pixels of the file.
+    cameras, views
+        I names; None where the file does not say them.
+    times
+        (I,) seconds.
+    sizes
+        Width and height by the name of a camera, of all by "".
+    picture_sizes
+        I widths and heights, where pictures themselves say them.
+    board
+        The board, where the file says it.
+    messages
+        Remarks.
+    """
+
+    path: Path
+    images: Sequence[str]
+    image: Indices
+    point: Indices
+    xy: Floats
+    sd: Floats
+    use: Bools
+    cameras: Sequence[str] | None = None
+    views: Sequence[str] | None = None
+    times: Floats | None = None
+    sizes: Mapping[str, Size] = field(default_factory=dict)
+    picture_sizes: Sequence[Size] = ()
+    board: Board | None = None
+    messages: Sequence[Message] = ()
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """What a user says of cameras and views, where files or names of images do not.
+
+    Attributes
+    ----------
+    cameras
+        A pattern (`left*.jpg`) for each camera, which names its images.
+    views
+        Whether images of one view are known by their names or by their times.
+    within
+        Seconds that images of one view are apart at the most.
+    apart
+        Whether every image is a view of its own: they are not synchronised.
+    size
+        Width and height of all pictures.
+    origin
+        What is 0, 0: the `center` or the upper-left `corner` of the first pixel.
+    """
+
+    cameras: Sequence[str] = ()
+    views: ViewBy = "name"
+    within: float = 0.005
+    apart: bool = False
+    size: Size | None = None
+    origin: Literal["center", "corner"] = "center"
+
+
+def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
+    """Return corners by cameras and views, and remarks.
+
+    Raises
+    ------
+    InputError
+        An image that two cameras have or that is twice in a view, times that are asked for and missing, no
+        corners at all.
+    """
+    names, keys, keep, messages = _cameras_and_views(measured, how)
+    # An image without corners is no picture.
+    keep &= np.bincount(measured.image, minlength=len(keep)) > 0
+    if not keep.any():
+        raise InputError("holds no corners of a board", file=measured.path)
+    rows = np.flatnonzero(keep)
+    kept = rows.tolist()
+    camera_names = list(dict.fromkeys(names[row] for row in _in_order(names, kept, how)))
+    if how.apart:
+        views = np.arange(len(rows))
+    elif how.views == "time":
+        views = _by_time(measured, rows, [names[row] for row in kept], how.within)
+    else:
+        views = _numbered([keys[row] for row in kept])
+    place = np.full(len(keep), -1)
+    place[rows] = np.arange(len(rows))
+    own = keep[measured.image]
+    pictures = [measured.images[row] for row in kept]
+    if len(set(pictures)) < len(pictures):
+        pictures = [f"{names[row]}/{measured.images[row]}" for row in kept]
+    sizes = {**measured.sizes, **_sizes_of_pictures(measured, names, kept, how)}
+    shift = 0.5 if how.origin == "corner" else 0.0
+    try:
+        corners = Corners(
+            pictures=pictures,
+            cameras=[camera_names.index(names[row]) for row in kept],
+            views=views,
+            times=None if measured.times is None else measured.times[rows],
+            camera_names=camera_names,
+            sizes=[how.size or sizes.get(name) or sizes.get("") for name in camera_names],
+            picture=place[measured.image[own]],
+            point=measured.point[own],
+            xy=measured.xy[own] - shift,
+            sd=measured.sd[own],
+            use=measured.use[own],
+        )
+    except InputError as error:
+        raise InputError(error.message, file=measured.path) from None
+    return corners, messages
+
+
+def _sizes_of_pictures(
+    measured: Measured, names: Sequence[str], rows: list[int], how: Grouping
+) -> dict[str, Size]:
+    """Return the size of the pictures of each camera, where pictures say it: they are alike."""
+    found: dict[str, Size] = {}
+    for row in rows if measured.picture_sizes else ():
+        width, height = measured.picture_sizes[row]
+        wide, high = how.size or found.setdefault(names[row], (width, height))
+        if (wide, high) != (width, height):
+            raise InputError(
+                f"the picture {measured.images[row]} has {width} x {height} pixels, others of its camera"
+                f" {wide} x {high}: what is calibrated is a camera whose pictures are alike",
+                file=measured.path,
+            )
+    return found
+
+
+def _in_order(names: Sequence[str], rows: list[int], how: Grouping) -> list[int]:
+    """Return rows in the order of their cameras: that of the patterns, else that of the file."""
+    if not how.cameras:
+        return rows
+    order = [_name_of(each, k) for k, each in enumerate(how.cameras)]
+    return sorted(rows, key=lambda row: order.index(names[row]))
+
+
+def _cameras_and_views(
+    measured: Measured, how: Grouping
+) -> tuple[list[str], list[str], Bools, list[Message]]:
+    """Return of each image the name of its camera, what names its view, and whether it is wanted."""
+    images = measured.images
+    keep = np.ones(len(images), dtype=bool)
+    if how.cameras:
+        names, keys = [""] * len(images), [""] * len(images)
+        patterns = [re.compile(_with_groups(each)) for each in how.cameras]
+        for row, image in enumerate(images):
+            found = [(k, match) for k, each in enumerate(patterns) if (match := each.fullmatch(image))]
+            if len(found) > 1:
+                raise InputError(f"the image {image} belongs to two cameras of --cameras", file=measured.path)
+            keep[row] = bool(found)
+            for k, match in found:
+                names[row] = _name_of(how.cameras[k], k)
+                keys[row] = "".join(match.groups())
+        left = [images[row] for row in np.flatnonzero(~keep).tolist()]
+        told = [Message(f"left out, no pattern of --cameras names them: {listed(left)}")] if left else []
+        return names, _views_or(measured, keys), keep, told
+    if measured.cameras is None:
+        return ["camera"] * len(images), _views_or(measured, images), keep, []
+    names = list(measured.cameras)
+    several = len(set(names)) > 1
+    keys = [
+        _digits(image.replace(name, "", 1)) if several else image
+        for image, name in zip(images, names, strict=True)
+    ]
+    return names, _views_or(measured, keys), keep, []
+
+
+def _views_or(measured: Measured, keys: Sequence[str]) -> list[str]:
+    return list(keys if measured.views is None else measured.views)
+
+
+def _digits(text: str) -> str:
+    """Return the digits of a name, or all of it where it has none."""
+    return "-".join(re.findall(r"\d+", text)) or text
+
+
+def _with_groups(pattern: str) -> str:
+    """Return a pattern of names as a regular expression whose groups are what its marks stand for."""
+    parts = re.split(r"(\*|\?|\[[^]]*\])", pattern)
+    return "".join(
+        f"({translate(part).removeprefix('(?s:').removesuffix(')' + chr(92) + 'Z')})"
+        if k % 2
+        else re.escape(part)
+        for k, part in enumerate(parts)
+    )
+
+
+def _name_of(pattern: str, number: int) -> str:
+    """Return what a camera is called: what its pattern says beside its marks."""
+    bare = re.sub(r"\*|\?|\[[^]]*\]", "", pattern.rpartition(".")[0] or pattern).strip(" ._-/")
+    return bare or f"camera {number}"
+
+
+def _numbered(keys: Sequence[str]) -> Indices:
+    place: dict[str, int] = {}
+    return np.array([place.setdefault(key, len(place)) for key in keys], dtype=np.int64)
+
+
+def _by_time(measured: Measured, rows: Indices, names: Sequence[str], within: float) -> Indices:
+    """Return views of images whose times are near each other, no two of one camera."""
+    if measured.times is None:
+        raise InputError("has no times, by which --views time goes", file=measured.path)
+    times = measured.times[rows]
+    views = np.empty(len(rows), dtype=np.int64)
+    view, begin, seen = -1, -np.inf, set[str]()
+    for row in np.argsort(times, kind="stable").tolist():
+        if times[row] - begin > within or names[row] in seen:
+            view, begin, seen = view + 1, times[row], set()
+        views[row] = view
+        seen.add(names[row])
+    return views

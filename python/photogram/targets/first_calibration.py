@@ -1,0 +1,217 @@
+"""First values of cameras, poses and rig from corners of boards alone, for any lens."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
+from photogram.messages import Message, counted, listed
+from photogram.network.cameras import Camera
+from photogram.targets.board import Board
+from photogram.targets.corners import FEWEST, Corners
+from photogram.targets.first_camera import first_camera, picture_size
+from photogram.targets.homographies import frontal_tilts
+from photogram.targets.lens_fit import KNOTS
+from photogram.targets.orders import Pictures, rays_shown
+from photogram.targets.sensors import Rig, connected, mean_pose
+from photogram.targets.sightings import LISTED, Listings, Sightings
+from photogram.targets.vision import inverted
+
+__all__ = ["FirstCalibration", "first_values"]
+
+IN_A_PLANE = "all its points lie in one plane, but those of the board do not"
+HIDDEN = f"the lens shows fewer than {FEWEST} of its corners"
+FRONTAL = math.radians(3.0)
+"""Boards tilted by less say nothing of a focal length."""
+
+
+@dataclass(frozen=True, eq=False)
+class FirstCalibration:
+    """Where the adjustment of a calibration begins: K cameras, V views, P pictures.
+
+    Attributes
+    ----------
+    cameras
+        K cameras of the wanted model; what an adjustment may change is free.
+    sensors
+        (K, 4, 4) from the reference camera to each camera, axes of vision.
+    references
+        (K,) the reference of each camera: 0, or, of cameras without a view in common with those of 0, the
+        first of the cameras that hang together with them.
+    poses
+        (V, 4, 4) board -> reference, of the cameras with the lowest reference that see it; NaN where unknown.
+    picture_poses
+        (P, 4, 4) board -> camera of the picture; NaN where unknown.
+    corners
+        The corners, numbered anew where they were listed in another order.
+    without
+        Pictures without a pose, and why.
+    remarks
+        What was found on the way: orders of corners, frontal views, cameras by themselves.
+    """
+
+    cameras: list[Camera]
+    sensors: Floats
+    references: Indices
+    poses: Floats
+    picture_poses: Floats
+    corners: Corners
+    without: dict[str, str]
+    remarks: list[Message]
+
+
+def first_values(
+    board: Board, corners: Corners, model: str | None = None, knots: tuple[int, int] = KNOTS
+) -> FirstCalibration:
+    """Find cameras, rig and poses from corners of a board alone.
+
+    Parameters
+    ----------
+    board
+        The board. Where its points lie in no plane, pictures that show those of a plane alone have no pose.
+    corners
+        The corners of all cameras.
+    model
+        The lens that is wanted: a model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`,
+        `opencv_pinhole` with so many terms. None: `opencv5` below 90 degrees of horizontal field, `opencv8`
+        above, `opencv_fisheye` where corners are seen beside the camera and behind it, or hardly determine
+        that. Knots of `splined_stereographic` are fitted to what None gives.
+    knots
+        Along columns and rows, of a splined lens.
+
+    Raises
+    ------
+    InputError
+        Points that the board does not have, a camera without a picture that could be used, a model that
+        cannot be.
+    """
+    seen = Sightings.of_corners(board, corners)
+    without = {corners.pictures[row]: IN_A_PLANE for row in np.flatnonzero(seen.in_a_plane()).tolist()}
+    without |= corners.poor(board.places)
+    usable = np.array([name not in without for name in corners.pictures], dtype=bool)
+    cameras, remarks = _cameras(seen, corners, usable, without, model, knots)
+    hidden = usable & (rays_shown(seen, corners.cameras, cameras) < FEWEST)
+    if (hidden == usable).all():
+        raise InputError(
+            f"model: the lens that was found, {cameras[0].model}, shows the corners of no picture"
+        )
+    without |= {corners.pictures[row]: HIDDEN for row in np.flatnonzero(hidden).tolist()}
+    pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable & ~hidden)
+    orders, fits, of_orders = pictures.ordered()
+    made = pictures.adjusted(orders, fits)
+    rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
+    made = _turned(made, rig, seen.listings)
+    remarks += [*of_orders, *_of_rig(rig, corners), *(_frontal(made, corners) if seen.is_flat else ())]
+    made = made @ seen.axes
+    return FirstCalibration(
+        cameras=cameras,
+        sensors=rig.sensors,
+        references=rig.references,
+        poses=_of_views(made, rig, corners),
+        picture_poses=made,
+        corners=_renumbered(corners, seen.listings, orders, rig.turned),
+        without=without,
+        remarks=remarks,
+    )
+
+
+def _cameras(
+    seen: Sightings,
+    corners: Corners,
+    usable: Bools,
+    without: dict[str, str],
+    model: str | None,
+    knots: tuple[int, int],
+) -> tuple[list[Camera], list[Message]]:
+    """Return the first values of each camera by its usable pictures, and remarks."""
+    cameras, remarks = [], []
+    for k, name in enumerate(corners.camera_names):
+        own = seen.of((corners.cameras == k) & usable)
+        if not len(own.xy):
+            raise InputError(f"camera {name}: no picture has enough corners: {_reasons(corners, without, k)}")
+        size = picture_size(own, corners.sizes[k])
+        if corners.sizes[k] is None:
+            said = f"taken for {size[0]} x {size[1]} px, about whose middle the corners lie"
+            remarks.append(Message(f"camera {name}: the size of its pictures is not known: {said}"))
+        camera, told = first_camera(own, size, name, model, knots)
+        cameras.append(camera)
+        remarks += told
+    return cameras, remarks
+
+
+def _reasons(corners: Corners, without: dict[str, str], camera: int) -> str:
+    own = [name for name, k in zip(corners.pictures, corners.cameras.tolist(), strict=True) if k == camera]
+    return listed([f"{name} ({without[name]})" for name in own]) or "it has none"
+
+
+def _turned(made: Floats, rig: Rig, listings: Listings) -> Floats:
+    """Return the poses of pictures, the boards turned as the rig has shown."""
+    found = made.copy()
+    for order, turn in listings.turns.items():
+        found[rig.turned == order] = made[rig.turned == order] @ inverted(turn)
+    return found
+
+
+def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
+    """Return what is to be said of cameras on a rig."""
+    told = [
+        Message(
+            f"picture {corners.pictures[row]}: its corners begin at another corner of the board than those of"
+            f" other cameras in this view: taken for listed {LISTED[rig.turned[row]]}"
+        )
+        for row in np.flatnonzero(rig.turned).tolist()
+    ]
+    apart = [corners.pictures[row] for row in np.flatnonzero(rig.apart).tolist()]
+    if apart:
+        told.append(
+            Message(
+                f"pictures {listed(apart)}: their poses do not agree with the place of the camera on the rig:"
+                " are they of the same moment as those of the other cameras?"
+            )
+        )
+    alone = [k for k in range(1, len(corners.camera_names)) if rig.references[k] == k]
+    told += [
+        Message(
+            f"camera {corners.camera_names[k]} has no view in common with those before: its place on the rig"
+            " is not known, and it is adjusted apart"
+        )
+        for k in alone
+    ]
+    return told
+
+
+def _frontal(made: Floats, corners: Corners) -> list[Message]:
+    """Name the pictures whose boards are parallel to the image."""
+    names = [corners.pictures[row] for row in np.flatnonzero(frontal_tilts(made) < FRONTAL).tolist()]
+    if not names:
+        return []
+    return [
+        Message(
+            f"{counted(len(names), 'picture')} of a board that is parallel to the image within 3 degrees, and"
+            f" says nothing of the focal length: {listed(names)}"
+        )
+    ]
+
+
+def _of_views(made: Floats, rig: Rig, corners: Corners) -> Floats:
+    """Return (V, 4, 4) poses board -> reference camera, of all pictures of a view the middle."""
+    found = np.full((corners.view_count, 4, 4), np.nan)
+    known = np.isfinite(made).all(axis=(1, 2))
+    to_reference = np.linalg.inv(rig.sensors[corners.cameras]) @ made
+    of = rig.references[corners.cameras]
+    for view in range(corners.view_count):
+        own = known & (corners.views == view)
+        if own.any():
+            agreeing = own & ~rig.apart if (own & ~rig.apart).any() else own
+            found[view] = mean_pose(to_reference[agreeing & (of == of[agreeing].min())])
+    return found
+
+
+def _renumbered(corners: Corners, listings: Listings, orders: Indices, turned: Indices) -> Corners:
+    """Return the corners with the numbers that points have in the orders that were found."""
+    first = listings.points[orders[corners.picture], corners.point]
+    return corners.replace(point=listings.points[turned[corners.picture], first])

@@ -1,0 +1,144 @@
+"""A plan of views of a board: which to take, and the uncertainty of the camera that they promise."""
+
+from __future__ import annotations
+
+import math
+
+from photogram.lazy_dataclasses import dataclass
+from photogram.messages import counted
+from photogram.show.methods import Paged, document_of, report_of
+from photogram.show.summary import Brief, Rows
+from photogram.targets.calibration_result import Calibrated
+from photogram.targets.maps import UncertaintyMap, distance_text
+from photogram.targets.new_views import Candidate
+
+__all__ = ["PlannedView", "ViewPlan"]
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedView:
+    """A view to take.
+
+    Attributes
+    ----------
+    candidate
+        Where the board is to be held, in words, and its pose: board -> camera.
+    corners
+        How many the picture shows.
+    largest
+        Largest standard deviation over the picture with this view and those before it, pixels; NaN of the
+        first three.
+    """
+
+    candidate: Candidate
+    corners: int
+    largest: float
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ViewPlan(Brief, Paged):
+    """Views of a board that are to calibrate a camera, none of which has been taken.
+
+    Attributes
+    ----------
+    calibrated
+        The calibration as it would be adjusted, by corners without errors; its `calibration` has the corners
+        and poses, its `worth` the maps. Covariances are those a priori, residuals mean nothing.
+    views
+        In the order in which they help most.
+    distance
+        Of the map for which they were chosen, in the unit of the board; infinite: directions.
+    need
+        Largest standard deviation over the picture that was asked for, pixels; 0: none was.
+    """
+
+    calibrated: Calibrated
+    views: tuple[PlannedView, ...]
+    distance: float
+    need: float
+
+    @property
+    def maps(self) -> tuple[UncertaintyMap, ...]:
+        """Predicted maps of uncertainty."""
+        worth = self.calibrated.worth
+        return () if worth is None else worth.maps
+
+    @property
+    def largest(self) -> float:
+        """Largest standard deviation over the picture after all views, pixels."""
+        return self.views[-1].largest
+
+    @property
+    def enough(self) -> bool:
+        """Whether the views do what was asked for."""
+        return not self.need or self.largest <= self.need
+
+    @property
+    def headline(self) -> str:
+        """What the plan promises, in a sentence."""
+        at = distance_text(self.distance, self.calibrated.calibration.board.unit)
+        said = f"{counted(len(self.views), 'view')}: largest standard deviation {self.largest:.2g} px {at}"
+        if not self.need:
+            return said
+        return f"{said}, {'as good as' if self.enough else 'above'} the {self.need:g} px that are needed"
+
+    @property
+    def sentences(self) -> list[str]:
+        """The views, in the order in which to take them, and what each of them brings."""
+        said, before = [], math.nan
+        for each in self.views:
+            brings = (
+                f"largest {each.largest:.3g} px"
+                if math.isnan(before)
+                else f"largest {before:.3g} -> {each.largest:.3g} px"
+            )
+            said.append(each.candidate.name + ("" if math.isnan(each.largest) else f": {brings}"))
+            before = each.largest
+        return said
+
+    @property
+    def assumed(self) -> list[str]:
+        """What the plan rests on, in sentences."""
+        given = self.calibrated.calibration
+        lens = given.cameras[0]
+        (size,) = given.corners.sizes
+        wide, high = size or (0, 0)
+        return [
+            f"Board: {given.board.described}; corners good to {given.sd0:g} px (--sd images=).",
+            f"Camera: {wide} x {high} px, {lens.model} with a focal length of {lens.scale:.5g} px, each free"
+            " parameter known to a tenth of the width of the picture.",
+        ]
+
+    @property
+    def next(self) -> list[str]:
+        """What to do, in sentences."""
+        given = self.calibrated.calibration
+        board, own = given.board, "--board board.toml"
+        if board.kind == "chessboard":
+            own = f"--board {board.columns}x{board.rows} --spacing {board.pitch[0]:g}"
+        found = []
+        if not self.enough:
+            found.append(
+                f"Plan more views, a larger board, or nearer ones (--away): {len(self.views)} of these do not"
+                f" reach {self.need:g} px."
+            )
+        return [
+            *found,
+            "Hold the board about so, still while each picture is taken, and take some views more than are"
+            " planned: cross-validation needs them to test the lens, which a plan takes for right.",
+            f"photogram calibrate PHOTOGRAPHS {own} --sd images={given.sd0:g}",
+        ]
+
+    def brief(self) -> tuple[str, Rows]:
+        """Return the plan in a few lines."""
+        return f"Plan of {self.headline}", [
+            (f"{number}", said) for number, said in enumerate(self.sentences, 1)
+        ]
+
+    def report(self) -> str:
+        """Return the plan as text."""
+        return report_of(self)
+
+    def to_json(self) -> bytes:
+        """Return the plan as a JSON document (UTF-8); `docs/targets.md` lists its members."""
+        return document_of(self)
