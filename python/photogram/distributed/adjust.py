@@ -45,8 +45,8 @@ from photogram.network.datum import (
 )
 from photogram.network.films import Scan
 from photogram.network.refracted import check_cameras
+from photogram.results.block_files import STANDS
 from photogram.results.result import Result
-from photogram.results.trajectory_files import STANDS
 
 __all__ = ["adjust_in_parts", "fingerprint", "plan_in_parts"]
 

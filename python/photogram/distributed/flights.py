@@ -12,7 +12,7 @@ from photogram.network.motion import timed_photos
 from photogram.network.observations import Observation
 from photogram.network.trajectories import Spline, Trajectory
 from photogram.network.trajectory_arrays import timed_images
-from photogram.results.trajectory_files import KeptTrajectory
+from photogram.results.block_files import KeptTrajectory
 
 __all__ = ["with_flights"]
 

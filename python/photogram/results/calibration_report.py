@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.results.calibration import Calibration, ParameterTest, calibrations
-from photogram.results.distortion import DistortionCurve, distortion_curve
-from photogram.results.lens_field import LensField, lens_field
+from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.result import Result
 from photogram.show.sections import Section
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,19 +11,19 @@ import numpy as np
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined, counted
 from photogram.results.axes import point_axes
-from photogram.results.fixed_tests import held_tested
-from photogram.results.group_tests import groups_tested
-from photogram.results.lenses import fall_by_lens, how_to_calibrate
+from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_trial import KINDS, OBSERVATION
 from photogram.results.observation_rows import tested_singly
 from photogram.results.patterns import CameraImages, patterns
+from photogram.results.reliability_summary import ReliabilitySummary
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["HARMFUL", "block_findings", "has_redundancy", "network_findings", "unseen"]
+__all__ = ["HARMFUL", "block_findings", "groups_tested", "has_redundancy", "network_findings", "unseen"]
 
 ROBUST = "a robust loss changes the weights"
 """Why there is no global test with one."""
@@ -210,3 +211,51 @@ def unseen(result: AdjustedNetwork) -> list[str]:
         f"errors of {hidden} of {redundancy.size} image coordinates would not show in their residuals"
         f" (redundancy below {TESTABLE:g})"
     ]
+
+
+PLURALS = {
+    "image": "images",
+    "control": "control points",
+    "position": "positions of photos",
+    "attitude": "attitudes of photos",
+    "camera": "cameras",
+    "unknown": "common unknowns",
+}
+"""What the kinds are called; those of observations beside images have labels."""
+
+
+def groups_tested(
+    summary: ReliabilitySummary, labels: Sequence[str] = (), unit_weight: tuple[float, float] | None = None
+) -> list[Tested]:
+    """Return the tests of all groups, kind by kind.
+
+    Parameters
+    ----------
+    summary
+        With the tests.
+    labels
+        Of the observations beside images, in the order of the core.
+    unit_weight
+        The weighted sum of squares and the degrees of freedom where the unit weight is estimated; None where
+        it is known.
+    """
+    suspects, tests = summary.suspects, summary.tests
+    testable = summary.testable
+    found = []
+    for kind, name in enumerate(KINDS):
+        own = np.flatnonzero(suspects.kinds == kind)
+        parts = [(PLURALS.get(name, name), own)]
+        if kind == OBSERVATION:
+            named = np.array(labels, dtype=object)[suspects.subjects[own]]
+            parts = [(f"observations of the kind {each}", own[named == each]) for each in sorted(set(labels))]
+        for what, groups in parts:
+            if not testable[groups].any():
+                continue
+            values = np.where(testable[groups], tests.statistic[groups], math.nan)
+            tested = Tested(what, values, _names(summary, groups), "T", tests.rank[groups].astype(np.float64))
+            found.append(tested if unit_weight is None else by_f(tested, *unit_weight))
+    return found
+
+
+def _names(summary: ReliabilitySummary, groups: np.ndarray) -> Callable[[tuple[int, ...]], str]:
+    return lambda place: summary.suspects.name(int(groups[place[0]]))

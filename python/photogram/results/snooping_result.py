@@ -12,9 +12,10 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Judged, Paged
+from photogram.show.methods import Judged, Paged, findings_of
 from photogram.show.sections import Section, composed, headline, verdict_sections
 from photogram.show.summary import Brief, Rows, few
+from photogram.statistics.findings import Findings, Removed
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
@@ -23,7 +24,7 @@ from photogram.statistics.snooping.suspects import Standing, Suspects
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Snooped"]
+__all__ = ["Snooped", "snooped_findings"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -309,3 +310,24 @@ def _lines(entry: Removal) -> list[str]:
             f" {entry.prediction_log_probability / _LN10:.1f}"
         )
     return lines
+
+
+@findings_of.register(Snooped)
+def snooped_findings(found: Snooped) -> Findings:
+    """Return the findings on the network without gross errors, and what was taken out."""
+    document = found.document()
+    out = [entry.is_out for entry in found.log]
+    removed = [member for member, is_out in zip(document["log"], out, strict=True) if is_out]
+    kept = [f"suspect, but kept: {entry.name} ({entry.kept})" for entry in found.log if entry.kept]
+    rest = findings_of(found.result)
+    return replace(
+        rest,
+        snooped=Removed(
+            removed,
+            images=found.share_removed("image"),
+            control=found.share_removed("control"),
+            rivals=found.rivals,
+            exchanged=[each.sentence for each in found.exchanged],
+        ),
+        remarks=[*rest.remarks, *kept],
+    )

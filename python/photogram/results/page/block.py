@@ -3,25 +3,44 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from photogram.results.axes import point_axes
+from photogram.results.calibration import Calibration, ParameterTest, calibrations
+from photogram.results.calibration_report import outcome
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
-from photogram.results.page.cameras import cameras_section
-from photogram.results.page.features import features_section
-from photogram.results.page.films import films_section
-from photogram.results.page.parts import network_page, size_section
-from photogram.results.page.pictures import drawings
+from photogram.results.features import Features
+from photogram.results.features_report import expansion, through, written
+from photogram.results.film_report import film_table, form_table, mark_table, scanner_table
+from photogram.results.page.network import drawings, network_page, size_section
 from photogram.results.page.tables import beside_section, check_section, control_section, stations_section
 from photogram.results.report import size_of
 from photogram.results.result import Result
 from photogram.results.tables import redundancy_by_kind, unknowns
 from photogram.show.cells import page_table, unit_written
 from photogram.show.methods import page_of
-from photogram.show.page import Fact, Page, Section, Table, significant
+from photogram.show.page import (
+    Cell,
+    Column,
+    Drawing,
+    Fact,
+    Facts,
+    Layers,
+    Page,
+    Part,
+    Remarks,
+    Row,
+    Section,
+    Table,
+    Text,
+    decimals_of,
+    fixed,
+    significant,
+)
 
-__all__ = ["block_page"]
+__all__ = ["block_page", "cameras_section", "features_section", "films_section"]
 
 
 @page_of.register(Result)
@@ -142,3 +161,211 @@ def _datum(result: Result) -> str:
         if not result.datum.is_chosen
         else f"Datum: {result.datum}."
     )
+
+
+LISTED = 12
+"""Cameras with a table of their own."""
+
+
+def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
+    """Return adjusted cameras with their tests, correlations and distortion, and those that are held."""
+    found = calibrations(result)
+    tables = [_parameters(result, each) for each in found[:LISTED]]
+    parts: list[Part] = [Layers("camera-layers", tables)] if len(tables) > 1 else [*tables]
+    groups = [row for each in found[:LISTED] for row in _groups(each)]
+    if groups:
+        columns = (
+            Column("Camera", text=True),
+            Column("Terms together", text=True),
+            Column("F", decimals=2),
+            Column("p", figures=2),
+            Column("Outcome", text=True),
+        )
+        parts.append(Table("Terms of the lens tested together", columns, groups))
+    parts += drawings
+    remarks = [
+        f"{each.camera.name}: {sentence}"
+        for each in found[:LISTED]
+        for sentence in (*_pairs(each), *each.remarks())
+    ]
+    if remarks:
+        parts.append(Remarks(remarks))
+    if held := _held(result):
+        parts.append(held)
+    if len(found) > LISTED:
+        parts.append(
+            Facts(
+                "More cameras",
+                [Fact("Not shown here", f"{len(found) - LISTED}", note="the table of cameras has all")],
+            )
+        )
+    intro = (
+        "The interior orientation: what was given, what was found, and what the images say about it."
+        if found
+        else ""
+    )
+    return Section("cameras", "Cameras", parts, intro)
+
+
+def _parameters(result: Result, found: Calibration) -> Table:
+    law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
+    columns = (
+        Column("Parameter", text=True),
+        Column("Given"),
+        Column("sd given", figures=3),
+        Column("Adjusted"),
+        Column("sd adjusted", figures=3),
+        Column("Change"),
+        Column("t", law, decimals=2),
+        Column("p", decimals=4),
+        Column("R", "with all others", decimals=4),
+        Column("Outcome", text=True),
+    )
+    rows = [_parameter(each) for each in found.parameters]
+    camera = found.camera
+    note = (
+        f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images."
+        " t tests terms of the lens against zero, the others against the given value; R is the multiple"
+        " correlation with all other unknowns: near 1 nothing tells the parameter from them."
+    )
+    return Table(camera.name, columns, rows, note)
+
+
+def _parameter(each: ParameterTest) -> Row:
+    decimals = min(decimals_of(np.array([each.sd])) + 1, 15)
+
+    def written(value: float) -> Cell:
+        return Cell(fixed(value, decimals) if math.isfinite(value) else value, sorts=value)
+
+    return [
+        f"{each.name}, {each.unit}" if each.unit else each.name,
+        written(each.given),
+        "free" if math.isinf(each.given_sd) else each.given_sd,
+        written(each.value),
+        each.sd,
+        written(each.change),
+        each.test_value,
+        each.probability,
+        each.multiple_correlation,
+        Cell(outcome(each), tone="look" if not each.separable or each.contradicts else ""),
+    ]
+
+
+def _groups(found: Calibration) -> list[Row]:
+    return [
+        [
+            found.camera.name,
+            ", ".join(each.names),
+            each.test_value,
+            each.probability,
+            "significant" if each.significant else "not significant",
+        ]
+        for each in found.groups
+    ]
+
+
+def _pairs(found: Calibration) -> list[str]:
+    """Name what is correlated by more than 0.95."""
+    pairs = [
+        f"{each.first} and {each.second} are correlated by {each.coefficient:.4f}"
+        for each in found.correlations
+    ]
+    poses = [
+        f"{each.parameter} and {each.component} of {len(each.photos)} photos are correlated by"
+        f" {each.coefficient:.4f}"
+        for each in found.poses
+    ]
+    return [*pairs, *poses]
+
+
+def _held(result: Result) -> Facts | None:
+    held = [each for each in result.cameras if each.given.is_held]
+    if not held:
+        return None
+    facts = [
+        Fact(
+            f"{each.name}: {each.camera.model}",
+            ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0),
+            each.camera.unit or "",
+            f"{each.photos} photos, {each.images} images",
+        )
+        for each in held[:LISTED]
+    ]
+    if len(held) > LISTED:
+        facts.append(Fact("Not shown here", f"{len(held) - LISTED}", note="the table of cameras has all"))
+    return Facts("Cameras that are held", facts)
+
+
+def features_section(features: Features | None, picture: Drawing) -> Section:
+    """Return features with their quantities, and whether their form is more than errors."""
+    if not features:
+        return Section("features", "Features", [])
+    quantities: list[Row] = []
+    forms: list[Row] = []
+    for each in features:
+        for k, own in enumerate(each.quantities):
+            numbers = zip(written(each, own), (own.value, own.sd, own.expanded), strict=True)
+            cells = [Cell(text, sorts=number) for text, number in numbers]
+            quantities.append([each.name if k == 0 else "", own.name, *cells, own.unit])
+        if each.statistic is not None:
+            forms.append(
+                [each.name, through(each), each.statistic, each.freedom, each.probability, each.form]
+            )
+    parts: list[Part] = [
+        Table(
+            "Quantities of features",
+            [
+                *(Column(head, text=True) for head in ("Feature", "Quantity")),
+                *(Column(head) for head in ("Value", "sd", "U = k sd")),
+                Column("Unit", text=True),
+            ],
+            quantities,
+            f"Coverage factor k = {expansion(features)}.",
+        )
+    ]
+    if forms:
+        columns = [
+            *(Column(head, text=True) for head in ("Feature", "What")),
+            Column("T", figures=4),
+            Column("of", decimals=0),
+            Column("p", figures=2),
+            Column("Form", text=True),
+        ]
+        parts += [Table("Whether form is more than errors of points", columns, forms), picture]
+    parts += [Text(each) for each in features.remarks]
+    intro = (
+        "Least-squares features through adjusted points, with what follows from the joint covariance of the"
+        " points. T compares the deviations of the points from the feature with their standard deviations."
+    )
+    return Section("features", "Features", parts, intro)
+
+
+def films_section(result: Result, drawing: Drawing) -> Section:
+    """Return the section of films, with the picture of marks and patterns; empty without films."""
+    if not result.films:
+        return Section("films", "Film and fiducials", [])
+    intro = (
+        "Where films lay and how their size has changed, the form of six numbers that other programs have,"
+        " and marks of cameras: what a certificate was moved by, and what their readings leave."
+    )
+    form = (
+        "reading = a0 + a1 x + a2 y, x and y in the frame of the marks (mm); the scanner is errorless in"
+        " standard deviations."
+    )
+    scales = (
+        "Scales are mm of the film in a mm of the camera; between axes is the angle between their images less"
+        " 90 degrees."
+    )
+    photos, *rest = form_table(result)
+    numbers, said = rest[:2], rest[2:]
+    lost = "Lost are marks that were read on other photos. T is that of both coordinates of a reading."
+    marks = "Mean residuals are in the frame of the camera, of all photos."
+    parts: list[Part] = [
+        page_table("Films", film_table(result), lost),
+        page_table("The same as six numbers", [photos, *numbers], form),
+        page_table("Scales, angle between the axes, rotation", [photos, *said], scales),
+        drawing,
+        page_table("Fiducial marks", mark_table(result), marks),
+        page_table("Scanners", scanner_table(result)),
+    ]
+    return Section("films", "Film and fiducials", parts, intro)

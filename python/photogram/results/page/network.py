@@ -3,25 +3,46 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
 from photogram.results.observation_rows import tested_singly
-from photogram.results.page.observations import Worst, limit_of, worst_images, worst_of, worst_table
-from photogram.results.page.pictures import drawings
 from photogram.results.page.tables import photos_section, points_section
 from photogram.results.report import ORDERINGS, problems_of
 from photogram.show.cells import page_table, unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
-from photogram.show.page import Column, Drawing, Fact, Facts, Page, Part, Row, Section, Table, significant
+from photogram.show.page import (
+    Cell,
+    Column,
+    Drawing,
+    Fact,
+    Facts,
+    Page,
+    Part,
+    Row,
+    Section,
+    Table,
+    significant,
+)
+from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal, critical_student
 from photogram.statistics.findings import Tested
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 __all__ = [
+    "Worst",
+    "drawings",
+    "limit_of",
     "network_page",
     "size_section",
+    "worst_images",
+    "worst_of",
+    "worst_table",
 ]
 
 _NOT_CHECKED = 0.01
@@ -248,3 +269,143 @@ def iterations_section(result: AdjustedNetwork) -> Section:
     note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
     table = page_table("Iterations", iterations(result), note)
     return Section("iterations", "Iterations", [table, Facts("Course", facts)])
+
+
+WORST = 25
+"""Observations in the table of the worst."""
+Worst = tuple[float, Tested, tuple[int, ...]]
+"""The size of a test value, its kind, and its place there."""
+
+
+def worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
+    """Return the observations of least probability, with |test value| as the measure of what is alike."""
+    found: list[Worst] = []
+    for tested in groups:
+        sizes = np.where(np.isnan(tested.values), -1.0, np.abs(tested.values))
+        flat = sizes.ravel()
+        if not flat.size:
+            continue
+        few = np.argpartition(-flat, min(count, flat.size - 1))[:count]
+        for index in few[flat[few] > 0].tolist():
+            place = tuple(int(each) for each in np.unravel_index(index, sizes.shape))
+            found.append((float(flat[index]), tested, place))
+    found.sort(key=lambda each: (-each[0], each[1].kind, each[2]))
+    return found[:count]
+
+
+def worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
+    """Return photos and points of the images among the worst observations."""
+    own = [place[0] for _, tested, place in worst if tested.kind == "image coordinates"]
+    return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
+
+
+def worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Worst]) -> Table:
+    """Return the observations whose test values are the largest, of all kinds."""
+    terms = terms_of(result)
+    rows: list[list[Cell | str | float | None]] = []
+    for size, tested, place in worst:
+        beyond = limit is not None and size > limit
+        value = Cell(float(tested.values[place]), tone="look" if beyond else "")
+        if tested.kind == "image coordinates":
+            image, k = place
+            photo, point, axis = (
+                result.given.image_photos[image],
+                result.image_points[image],
+                terms.image_axes[k],
+            )
+            rows.append(
+                [
+                    f"image {axis.name}",
+                    Cell(str(terms.photos[photo]), goes_to=f"photo-{photo}"),
+                    Cell(str(terms.points[point]), goes_to=f"point-{point}"),
+                    float(result.residuals[place]) * axis.factor,
+                    float(result.image_given_sd[place]) * axis.factor,
+                    float(result.redundancy[place]),
+                    value,
+                ]
+            )
+        else:
+            rows.append([tested.name(place), None, None, None, None, None, value])
+    unit = unit_written(terms.image_axes[0].small)
+    statistic = worst[0][1].statistic if worst else "w"
+    columns = (
+        Column("Observation", text=True),
+        Column("Photo", text=True),
+        Column("Point", text=True),
+        Column("Residual", unit, decimals=2),
+        Column("sd given", unit, decimals=2),
+        Column("Redundancy", decimals=3),
+        Column(f"Test value {statistic}", decimals=2),
+    )
+    said = "" if limit is None else f" Beyond {limit:.2f} the test of a single observation rejects."
+    others = " Residuals of other kinds stand in their own tables."
+    note = f"The {len(rows)} of the largest test values.{said}{others}"
+    return Table("Worst observations", columns, rows, note)
+
+
+def limit_of(groups: Sequence[Tested]) -> float | None:
+    """Return what a test value of a single observation may be at most, 5 percent for all together."""
+    number = sum(int(np.count_nonzero(~np.isnan(each.values))) for each in groups)
+    if not number:
+        return None
+    level, second = bonferroni(LEVEL, number), float(np.asarray(groups[0].second))
+    return critical_normal(level) if np.isinf(second) else critical_student(level, second)
+
+
+CAPTIONS = {
+    "network": (
+        "Plan of the network",
+        "Photos with what they show, points by their number of rays, control and check points with their"
+        " differences, and error ellipses (95 percent). What is enlarged has a scale bar.",
+    ),
+    "residuals": (
+        "Image residuals over the frame",
+        "Observed minus computed, camera by camera: one by one, or the means of cells where there are many."
+        " Arrows that point alike in one part of the frame are what the camera model does not explain.",
+    ),
+    "redundancy": (
+        "Redundancy over the frame and over the network",
+        "Where the network checks itself, and where not: dark places have errors that nobody sees.",
+    ),
+    "tests": (
+        "Test values against the normal distribution",
+        "Left the histogram, right the ordered test values over those expected: they lie on the line where"
+        " the standard deviations are right, on a steeper one where these are too small; single ones"
+        " away from it"
+        " are gross errors.",
+    ),
+    "correlations": (
+        "Correlations of the parameters of cameras",
+        "Strong colours away from the diagonal: parameters that the network can hardly tell apart.",
+    ),
+    "distortion": (
+        "Radial distortion with its standard deviations",
+        "The curve, dashed where no image lies; where it is estimated, with one standard deviation beside.",
+    ),
+    "features": (
+        "Deviations of points from their features",
+        "Outside positive, of a plane on the side of its normal; bars are U to either side.",
+    ),
+    "films": (
+        "Residuals of fiducial marks, and patterns of films",
+        "Means over all photos, in the frame of the camera: marks that stay off on all of them are those of"
+        " the certificate, or a pattern that was left out. Patterns as the adjustment has them.",
+    ),
+}
+"""Title and caption by name."""
+
+
+def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
+    """Return the pictures that a result may have, by name; what there is nothing of draws nothing."""
+    return {
+        name: Drawing(f"picture-{name}", *words, _drawing(result, name)) for name, words in CAPTIONS.items()
+    }
+
+
+def _drawing(result: AdjustedNetwork, name: str) -> Callable[[], Figure | None]:
+    def draw() -> Figure | None:
+        from photogram.plots import figures  # takes long to import
+
+        return figures(result, [name]).get(name)
+
+    return draw
