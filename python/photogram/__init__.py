@@ -157,7 +157,7 @@ _HOMES = {
     "Simulation": "network.simulation",
     "Snooped": "results.snooping_result",
     "Statement": "results.statement.statement",
-    "statement": "results.statement.making",
+    "statement": "results.statement.statement",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",

@@ -12,7 +12,7 @@ from photogram.network.observations import FILM
 from photogram.results.film_pictures import MarkResiduals, mark_residuals
 from photogram.results.result import Result
 from photogram.show.lines import field, stacked, table_lines
-from photogram.show.quantity import Axis, Quantity
+from photogram.show.quantity import Axis, Quantity, members
 
 __all__ = [
     "fiducial_members",
@@ -206,51 +206,37 @@ def _mark_lines(result: Result) -> list[str]:
 
 def film_members(result: Result) -> list[dict[str, object]]:
     """Return the films of photos for documents: values, cofactors, the form of six numbers, the side."""
-    values, sd, cofactors, forms = result.film, result.film_sd, result.film_cofactors, result.film_forms
     *_, marks, lost, largest = film_table(result)
+    arrays = {"film": result.film, "sd": result.film_sd, "film_cofactors": result.film_cofactors}
+    forms = result.film_forms.values()
     return [
         {
             "photo": result.block.photo_ids[row],
-            "components": list(FILM),
-            "film": values[row].tolist(),
-            "sd": sd[row].tolist(),
-            "film_cofactors": cofactors[row].tolist(),
-            "affine": {name: _plain(value) for name, value in vars(form).items()},
+            "components": FILM,
+            **{name: values[row] for name, values in arrays.items()},
+            "affine": vars(form),
             "marks": marks.values[k],
             "lost": lost.values[k].split(),
-            "largest_T": float(largest.values[k]),
-            "mirrored": film.mirrored,
-            "scanner": film.scanner.name,
+            "largest_T": largest.values[k],
+            **members(film, "mirrored", scanner="scanner.name"),
         }
-        for k, ((row, film), form) in enumerate(zip(result.films, forms.values(), strict=True))
+        for k, ((row, film), form) in enumerate(zip(result.films, forms, strict=True))
     ]
-
-
-def _plain(value: Floats | float) -> object:
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def fiducial_members(result: Result) -> list[dict[str, object]]:
     """Return the marks of cameras for documents: certificate and adjusted, covariance, readings."""
     residuals, photos = mark_residuals(result), result.block.photo_ids
+    columns = residuals.photos, residuals.marks, residuals.xy, residuals.tests
+    readings: dict[str, list[dict[str, object]]] = {}
+    for photo, mark, xy, test in zip(*columns, strict=True):
+        readings.setdefault(mark, []).append({"photo": photos[photo], "residual_mm": xy, "T": test})
     return [
         {
             "fiducial": name,
-            "certificate_mm": each.given.position[:2].tolist(),
-            "value_mm": each.values.tolist(),
-            "sd_mm": each.sd.tolist(),
-            "covariance_mm2": each.covariance.tolist(),
-            "readings": [
-                {"photo": photos[photo], "residual_mm": xy, "T": test}
-                for photo, mark, xy, test in zip(
-                    residuals.photos.tolist(),
-                    residuals.marks,
-                    residuals.xy.tolist(),
-                    residuals.tests.tolist(),
-                    strict=True,
-                )
-                if mark == name
-            ],
+            "certificate_mm": each.given.position[:2],
+            **members(each, value_mm="values", sd_mm="sd", covariance_mm2="covariance"),
+            "readings": readings.get(name, []),
         }
         for name, each in result.fiducials.items()
     ]
@@ -262,14 +248,9 @@ def scanner_members(result: Result) -> list[dict[str, object]]:
     return [
         {
             "scanner": each.name,
-            "pitch_mm": counted[id(each.given)].pitch,
-            "origin": list(counted[id(each.given)].origin),
-            "rows_down": counted[id(each.given)].down,
+            **members(counted[id(each.given)], pitch_mm="pitch", origin="origin", rows_down="down"),
             "components": ["Sx", "Sy", "alpha_rad"],
-            "calibration": each.given.position.tolist(),
-            "value": each.values.tolist(),
-            "sd": each.sd.tolist(),
-            "covariance": each.covariance.tolist(),
+            **members(each, calibration="given.position", value="values", sd="sd", covariance="covariance"),
         }
         for each in _scanners(result)
         if id(each.given) in counted

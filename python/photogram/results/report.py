@@ -16,7 +16,7 @@ from photogram.network.knots import Knot
 from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
-from photogram.results.calibration_report import calibration_sections
+from photogram.results.calibration_report import calibration_sections, values_written
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
 from photogram.results.film_report import film_lines
@@ -373,8 +373,7 @@ def _photos(result: Result) -> list[str]:
 
 def _held_cameras(result: Result) -> list[str]:
     return [
-        f"{each.name:<16}{each.camera.model}, {each.photos} photos: "
-        + ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0)
+        f"{each.name:<16}{each.camera.model}, {each.photos} photos: {values_written(each.camera)}"
         for each in result.cameras
         if each.given.is_held
     ]

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.results.axes import point_axes
-from photogram.results.calibration import Calibration, ParameterTest, calibrations
-from photogram.results.calibration_report import outcome
+from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
+from photogram.results.calibration_report import law_of, outcome, values_written
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features import Features
 from photogram.results.features_report import expansion, through, written
@@ -40,7 +40,7 @@ from photogram.show.page import (
     significant,
 )
 
-__all__ = ["block_page", "cameras_section", "features_section", "films_section"]
+__all__ = ["block_page"]
 
 
 @page_of.register(Result)
@@ -53,8 +53,8 @@ def block_page(result: Result) -> Page:
         check_section(result),
         beside_section(result),
         stations_section(result),
-        cameras_section(result, [pictures[name] for name in ("correlations", "distortion")]),
-        films_section(result, pictures["films"]),
+        _cameras_section(result, [pictures[name] for name in ("correlations", "distortion")]),
+        _films_section(result, pictures["films"]),
         _unknowns_section(result),
     ]
     return network_page(
@@ -66,7 +66,7 @@ def block_page(result: Result) -> Page:
         title=result.block.title,
         more=_accuracy(result),
         redundancy=_redundancy_tables(result),
-        beside=[features_section(result.features, pictures["features"])],
+        beside=[_features_section(result.features, pictures["features"])],
         datum=_datum(result),
         poses=POSES if result.block.timed else "",
     )
@@ -167,171 +167,129 @@ LISTED = 12
 """Cameras with a table of their own."""
 
 
-def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
+def _cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
     """Return adjusted cameras with their tests, correlations and distortion, and those that are held."""
     found = calibrations(result)
-    tables = [_parameters(result, each) for each in found[:LISTED]]
+    shown, note = found[:LISTED], "the table of cameras has all"
+    tables = [_parameters(each, law_of(result)) for each in shown]
     parts: list[Part] = [Layers("camera-layers", tables)] if len(tables) > 1 else [*tables]
-    groups = [row for each in found[:LISTED] for row in _groups(each)]
-    if groups:
-        columns = (
-            Column("Camera", text=True),
-            Column("Terms together", text=True),
-            Column("F", decimals=2),
-            Column("p", figures=2),
-            Column("Outcome", text=True),
-        )
-        parts.append(Table("Terms of the lens tested together", columns, groups))
+    if groups := [(each.camera.name, group) for each in shown for group in each.groups]:
+        parts.append(_terms_together(groups))
     parts += drawings
-    remarks = [
-        f"{each.camera.name}: {sentence}"
-        for each in found[:LISTED]
-        for sentence in (*_pairs(each), *each.remarks())
-    ]
-    if remarks:
+    if remarks := [
+        f"{each.camera.name}: {sentence}" for each in shown for sentence in (*_pairs(each), *each.remarks())
+    ]:
         parts.append(Remarks(remarks))
-    if held := _held(result):
-        parts.append(held)
-    if len(found) > LISTED:
-        parts.append(
-            Facts(
-                "More cameras",
-                [Fact("Not shown here", f"{len(found) - LISTED}", note="the table of cameras has all")],
-            )
-        )
-    intro = (
-        "The interior orientation: what was given, what was found, and what the images say about it."
-        if found
-        else ""
-    )
-    return Section("cameras", "Cameras", parts, intro)
-
-
-def _parameters(result: Result, found: Calibration) -> Table:
-    law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
-    columns = (
-        Column("Parameter", text=True),
-        Column("Given"),
-        Column("sd given", figures=3),
-        Column("Adjusted"),
-        Column("sd adjusted", figures=3),
-        Column("Change"),
-        Column("t", law, decimals=2),
-        Column("p", decimals=4),
-        Column("R", "with all others", decimals=4),
-        Column("Outcome", text=True),
-    )
-    rows = [_parameter(each) for each in found.parameters]
-    camera = found.camera
-    note = (
-        f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images."
-        " t tests terms of the lens against zero, the others against the given value; R is the multiple"
-        " correlation with all other unknowns: near 1 nothing tells the parameter from them."
-    )
-    return Table(camera.name, columns, rows, note)
-
-
-def _parameter(each: ParameterTest) -> Row:
-    decimals = min(decimals_of(np.array([each.sd])) + 1, 15)
-
-    def written(value: float) -> Cell:
-        return Cell(fixed(value, decimals) if math.isfinite(value) else value, sorts=value)
-
-    return [
-        f"{each.name}, {each.unit}" if each.unit else each.name,
-        written(each.given),
-        "free" if math.isinf(each.given_sd) else each.given_sd,
-        written(each.value),
-        each.sd,
-        written(each.change),
-        each.test_value,
-        each.probability,
-        each.multiple_correlation,
-        Cell(outcome(each), tone="look" if not each.separable or each.contradicts else ""),
-    ]
-
-
-def _groups(found: Calibration) -> list[Row]:
-    return [
-        [
-            found.camera.name,
-            ", ".join(each.names),
-            each.test_value,
-            each.probability,
-            "significant" if each.significant else "not significant",
-        ]
-        for each in found.groups
-    ]
-
-
-def _pairs(found: Calibration) -> list[str]:
-    """Name what is correlated by more than 0.95."""
-    pairs = [
-        f"{each.first} and {each.second} are correlated by {each.coefficient:.4f}"
-        for each in found.correlations
-    ]
-    poses = [
-        f"{each.parameter} and {each.component} of {len(each.photos)} photos are correlated by"
-        f" {each.coefficient:.4f}"
-        for each in found.poses
-    ]
-    return [*pairs, *poses]
-
-
-def _held(result: Result) -> Facts | None:
     held = [each for each in result.cameras if each.given.is_held]
-    if not held:
-        return None
     facts = [
         Fact(
             f"{each.name}: {each.camera.model}",
-            ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0),
+            values_written(each.camera),
             each.camera.unit or "",
             f"{each.photos} photos, {each.images} images",
         )
         for each in held[:LISTED]
     ]
     if len(held) > LISTED:
-        facts.append(Fact("Not shown here", f"{len(held) - LISTED}", note="the table of cameras has all"))
-    return Facts("Cameras that are held", facts)
+        facts.append(Fact("Not shown here", f"{len(held) - LISTED}", note=note))
+    if facts:
+        parts.append(Facts("Cameras that are held", facts))
+    if len(found) > LISTED:
+        parts.append(Facts("More cameras", [Fact("Not shown here", f"{len(found) - LISTED}", note=note)]))
+    intro = "The interior orientation: what was given, what was found, and what the images say about it."
+    return Section("cameras", "Cameras", parts, intro if found else "")
 
 
-def features_section(features: Features | None, picture: Drawing) -> Section:
+def _parameters(found: Calibration, law: str) -> Table:
+    def written(each: ParameterTest, value: float) -> Cell:
+        decimals = min(decimals_of(np.array([each.sd])) + 1, 15)
+        return Cell(fixed(value, decimals) if math.isfinite(value) else value, sorts=value)
+
+    camera = found.camera
+    return Table.of(
+        camera.name,
+        found.parameters,
+        [
+            (Column("Parameter", text=True), lambda each: f"{each.name}, {each.unit}".removesuffix(", ")),
+            (Column("Given"), lambda each: written(each, each.given)),
+            (
+                Column("sd given", figures=3),
+                lambda each: "free" if math.isinf(each.given_sd) else each.given_sd,
+            ),
+            (Column("Adjusted"), lambda each: written(each, each.value)),
+            (Column("sd adjusted", figures=3), lambda each: each.sd),
+            (Column("Change"), lambda each: written(each, each.change)),
+            (Column("t", law, decimals=2), lambda each: each.test_value),
+            (Column("p", decimals=4), lambda each: each.probability),
+            (Column("R", "with all others", decimals=4), lambda each: each.multiple_correlation),
+            (
+                Column("Outcome", text=True),
+                lambda each: Cell(
+                    outcome(each), tone="look" if not each.separable or each.contradicts else ""
+                ),
+            ),
+        ],
+        f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images."
+        " t tests terms of the lens against zero, the others against the given value; R is the multiple"
+        " correlation with all other unknowns: near 1 nothing tells the parameter from them.",
+    )
+
+
+def _terms_together(groups: Sequence[tuple[str, GroupTest]]) -> Table:
+    return Table.of(
+        "Terms of the lens tested together",
+        groups,
+        [
+            (Column("Camera", text=True), lambda each: each[0]),
+            (Column("Terms together", text=True), lambda each: ", ".join(each[1].names)),
+            (Column("F", decimals=2), lambda each: each[1].test_value),
+            (Column("p", figures=2), lambda each: each[1].probability),
+            (Column("Outcome", text=True), lambda each: each[1].outcome),
+        ],
+    )
+
+
+def _pairs(found: Calibration) -> list[str]:
+    """Name what is correlated by more than 0.95."""
+    alike = [(f"{each.first} and {each.second}", each.coefficient) for each in found.correlations]
+    alike += [
+        (f"{each.parameter} and {each.component} of {len(each.photos)} photos", each.coefficient)
+        for each in found.poses
+    ]
+    return [f"{both} are correlated by {coefficient:.4f}" for both, coefficient in alike]
+
+
+def _features_section(features: Features | None, picture: Drawing) -> Section:
     """Return features with their quantities, and whether their form is more than errors."""
     if not features:
         return Section("features", "Features", [])
     quantities: list[Row] = []
-    forms: list[Row] = []
     for each in features:
         for k, own in enumerate(each.quantities):
             numbers = zip(written(each, own), (own.value, own.sd, own.expanded), strict=True)
             cells = [Cell(text, sorts=number) for text, number in numbers]
             quantities.append([each.name if k == 0 else "", own.name, *cells, own.unit])
-        if each.statistic is not None:
-            forms.append(
-                [each.name, through(each), each.statistic, each.freedom, each.probability, each.form]
-            )
-    parts: list[Part] = [
-        Table(
-            "Quantities of features",
-            [
-                *(Column(head, text=True) for head in ("Feature", "Quantity")),
-                *(Column(head) for head in ("Value", "sd", "U = k sd")),
-                Column("Unit", text=True),
-            ],
-            quantities,
-            f"Coverage factor k = {expansion(features)}.",
-        )
+    columns = [
+        *(Column(head, text=True) for head in ("Feature", "Quantity")),
+        *(Column(head) for head in ("Value", "sd", "U = k sd")),
+        Column("Unit", text=True),
     ]
-    if forms:
-        columns = [
-            *(Column(head, text=True) for head in ("Feature", "What")),
-            Column("T", figures=4),
-            Column("of", decimals=0),
-            Column("p", figures=2),
-            Column("Form", text=True),
-        ]
-        parts += [Table("Whether form is more than errors of points", columns, forms), picture]
+    note = f"Coverage factor k = {expansion(features)}."
+    parts: list[Part] = [Table("Quantities of features", columns, quantities, note)]
+    if tested := [each for each in features if each.statistic is not None]:
+        forms = Table.of(
+            "Whether form is more than errors of points",
+            tested,
+            [
+                (Column("Feature", text=True), lambda each: each.name),
+                (Column("What", text=True), through),
+                (Column("T", figures=4), lambda each: each.statistic),
+                (Column("of", decimals=0), lambda each: each.freedom),
+                (Column("p", figures=2), lambda each: each.probability),
+                (Column("Form", text=True), lambda each: each.form),
+            ],
+        )
+        parts += [forms, picture]
     parts += [Text(each) for each in features.remarks]
     intro = (
         "Least-squares features through adjusted points, with what follows from the joint covariance of the"
@@ -340,7 +298,7 @@ def features_section(features: Features | None, picture: Drawing) -> Section:
     return Section("features", "Features", parts, intro)
 
 
-def films_section(result: Result, drawing: Drawing) -> Section:
+def _films_section(result: Result, drawing: Drawing) -> Section:
     """Return the section of films, with the picture of marks and patterns; empty without films."""
     if not result.films:
         return Section("films", "Film and fiducials", [])

@@ -33,7 +33,7 @@ from photogram.statistics.error_radii import (
     upper_order,
 )
 
-__all__ = ["Figures", "Radius", "Sized", "figures"]
+__all__ = ["Figures", "Radius", "Sized", "figures", "root_mean"]
 
 PROBABILITIES = (0.9, 0.95)
 INSIDE = 0.95
@@ -175,17 +175,17 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
             "plan": _sized(plan, found.names, radial=True),
             "all": _sized(np.sqrt((d**2).sum(axis=1)), found.names, radial=True),
         },
-        rmse_h1=_root(plan**2),
-        rmse_v1=_root(heights**2),
-        rmse_h2=_root(np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan)),
-        rmse_v2=_root(np.where(in_height, survey[:, 2], np.nan)),
+        rmse_h1=root_mean(plan**2),
+        rmse_v1=root_mean(heights**2),
+        rmse_h2=root_mean(np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan)),
+        rmse_v2=root_mean(np.where(in_height, survey[:, 2], np.nan)),
         prediction={part: prediction(found, part) for part in ("e", "n", "h", "plan", "all")},
         bias={part: bias(found, part, k) for part in ("e", "n", "h")},
         points=tests,
         inside=_inside(tests, heights, in_height),
         radii=_radii(plan[in_plan], np.abs(heights[in_height])),
         moments=_moments(d[in_plan, :2]),
-        of_moments=_of_moments(_moments(d[in_plan, :2]), _root(heights**2)),
+        of_moments=_of_moments(_moments(d[in_plan, :2]), root_mean(heights**2)),
         mixture=_mixture(found, in_plan, in_height),
         surface=surface(found),
     )
@@ -199,10 +199,10 @@ def _sized(values: Floats, names: tuple[str, ...], *, radial: bool = False) -> S
     worst = int(own[np.argmax(np.abs(some))])
     mean = math.nan if radial else float(some.mean())
     sd = math.nan if radial or len(own) < 2 else float(some.std(ddof=1))
-    return Sized(len(own), mean, sd, _root(some**2), float(abs(values[worst])), names[worst])
+    return Sized(len(own), mean, sd, root_mean(some**2), float(abs(values[worst])), names[worst])
 
 
-def _root(squares: Floats) -> float:
+def root_mean(squares: Floats) -> float:
     """Return the root of the mean of what is known; NaN where nothing is."""
     known = squares[np.isfinite(squares)]
     return math.sqrt(float(known.mean())) if known.size else math.nan
