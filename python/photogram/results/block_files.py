@@ -138,13 +138,7 @@ def block_files(result: Result) -> dict[str, Content]:
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
-    """Return the result of a block that a folder keeps.
-
-    Raises
-    ------
-    InputError
-        Files that are missing, damaged or contradict each other.
-    """
+    """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
     saved = read_saved(
         folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
     )

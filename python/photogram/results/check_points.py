@@ -80,18 +80,10 @@ def check_points(
 ) -> CheckPoints:
     """Return the check points of an adjusted block with their tests.
 
-    Parameters
-    ----------
-    network, block
-        The result, and what was adjusted.
-    differences, kinds
-        (n, 3) adjusted minus given coordinates, and (n,) kinds of all points.
-    second
-        Degrees of freedom with which the variance of unit weight was estimated; infinite where it is known.
-    untested
-        Why nothing is tested.
-    whole
-        Whether the normal equations may be asked for the covariances of points with each other.
+    `differences` are (n, 3) adjusted minus given coordinates, `kinds` (n,) those of all points; `second` are
+    the degrees of freedom with which the variance of unit weight was estimated, infinite where it is known;
+    `untested` says why nothing is tested, `whole` whether the normal equations may be asked for the
+    covariances of points with each other.
     """
     rows = np.flatnonzero(network.used_points & (kinds == "check"))
     given, assumed = _given(block, rows, differences[rows])

@@ -94,14 +94,8 @@ class _Problems:
 def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
     """Find exchanged names among the images that a snooped network does without.
 
-    Parameters
-    ----------
-    block
-        The network with all its images, photos where the adjustment without gross errors has put them.
-    used
-        (m,) the images that take part in it.
-    variance
-        Its variance of unit weight.
+    `block` has all images, with photos where the adjustment without gross errors has put them; (m,) `used`
+    take part in that, and `variance` is its variance of unit weight.
     """
     plain, seen = seen_without_lenses(block)
     mounted = {each.photo for each in block.mounts}

@@ -50,16 +50,9 @@ def network_findings(
     systematic: Sequence[Systematic],
     labels: Sequence[str] = (),
 ) -> Findings:
-    """Return the tests that every network has.
+    """Return the tests that every network has: with those of what is held, and of patterns.
 
-    Parameters
-    ----------
-    result
-        The adjusted network.
-    held, systematic
-        The tests of what is held, and of patterns.
-    labels
-        Of the observations beside images, in the order of the core.
+    `labels` are those of the observations beside images, in the order of the core.
     """
     unit_weight = None if result.KNOWN else result.sum_and_freedom
     return Findings(
@@ -229,15 +222,8 @@ def groups_tested(
 ) -> list[Tested]:
     """Return the tests of all groups, kind by kind.
 
-    Parameters
-    ----------
-    summary
-        With the tests.
-    labels
-        Of the observations beside images, in the order of the core.
-    unit_weight
-        The weighted sum of squares and the degrees of freedom where the unit weight is estimated; None where
-        it is known.
+    `labels` are those of the observations beside images, in the order of the core, `unit_weight` the weighted
+    sum of squares and the degrees of freedom where that is estimated; None where it is known.
     """
     suspects, tests = summary.suspects, summary.tests
     testable = summary.testable

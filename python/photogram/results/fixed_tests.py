@@ -80,14 +80,8 @@ def held_tests(
 ) -> list[Tested]:
     """Return the tests of what is held, T each, where residuals are too large and covariances there.
 
-    Parameters
-    ----------
-    result
-        The adjusted network.
-    suspected_by
-        What is to be tested, by (m,) the weighted squares of the images.
-    partials_of
-        (p, m, 2) of the images by the unknowns of their photos, to which each has its places.
+    `suspected_by` says what is to be tested, by (m,) the weighted squares of the images; `partials_of` gives
+    (p, m, 2) partials of these by the unknowns of their photos, to which each has its places.
     """
     if result.loss or not is_suspected(result):
         return []
@@ -124,14 +118,9 @@ def is_suspected(result: AdjustedNetwork) -> bool:
 
 
 def held_remark(found: Sequence[Tested], largest: float) -> list[str]:
-    """Say of what is held that it explains more than anything that was taken out.
+    """Say that what is held explains more than anything that was taken out.
 
-    Parameters
-    ----------
-    found
-        Its tests, in the adjustment of everything.
-    largest
-        The largest T of what was taken out.
+    `found` are its tests, in the adjustment of everything, `largest` is the largest T of what was taken out.
     """
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
@@ -237,18 +226,11 @@ _USUAL = ("f", "fx", "fy", "c", "cx", "cy", "xp", "yp", "k", "k1", "k2", "p1", "
 
 
 def fall_by_lens(result: Result, images: Bools) -> float:
-    """Return by how much the weighted sum of squares would fall with a lens of its own; 0 where not known.
+    """Return by how much the weighted sum of squares would fall with a lens of their own for (m,) `images`.
 
     Rao's score (:mod:`photogram.results.scores`) of radial and tangential terms, principal point and distance
     about the middle of the frame, whatever the model of the camera has; of the radial terms alone where
-    unknowns take up others.
-
-    Parameters
-    ----------
-    result
-        The adjustment.
-    images
-        (m,) those of the camera.
+    unknowns take up others. 0 where it is not known.
     """
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0

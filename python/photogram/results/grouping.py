@@ -130,24 +130,14 @@ class Grouping:
 
 
 def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
-    """Return groups of the observations of a network.
+    """Return groups of the observations of a network; refuse other bases, and labels that do not fit.
 
-    Parameters
-    ----------
-    of
-        What the network has observations of.
-    groups
-        `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more together), or
-        `component` (x and y, plan and height of control, positions and attitudes of stations): all but `kind`
-        and `component` part the images only, the rest goes by kind. Several of these: a group for each
-        combination. Or labels of one's own: a mapping with arrays of `images` (m,) or (m, 2), `control` (n,)
-        or (n, 3), `stations` (P,) or (P, k), `observations` (o,); what has no label (None or an empty text)
-        keeps its weight, and parts that are not named go by kind.
-
-    Raises
-    ------
-    InputError
-        A basis that there is not, labels that do not fit.
+    Groups are by `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more
+    together), or `component` (x and y, plan and height of control, positions and attitudes of stations): all
+    but `kind` and `component` part the images only, the rest goes by kind. Several of these: a group for each
+    combination. Or they are labels of one's own: a mapping with arrays of `images` (m,) or (m, 2), `control`
+    (n,) or (n, 3), `stations` (P,) or (P, k), `observations` (o,); what has no label (None or an empty text)
+    keeps its weight, and parts that are not named go by kind.
     """
     if isinstance(groups, Mapping):
         labels = _own(of, groups)

@@ -276,26 +276,10 @@ def written(
 ) -> dict[str, Content]:
     """Return the files of a result.
 
-    Parameters
-    ----------
-    result
-        The result.
-    kind
-        What reads it again.
-    given
-        The field that holds what was adjusted.
-    parts
-        Of the tables `photos`, `points` and `images`.
-    leading
-        Columns that stand before these: names.
-    tables
-        Further tables, which are for people alone.
-    frame
-        Where on the earth its coordinates are.
-    summary
-        What a reader wants first.
-    stands
-        What is written for objects of some classes.
+    `kind` says what reads it again, `given` is the field that holds what was adjusted. `parts` are those of
+    the tables `photos`, `points` and `images`, `leading` the columns before them: names; `tables` are further
+    ones, for people alone. `frame` is where on the earth its coordinates are, `summary` what a reader wants
+    first, and `stands` what is written for objects of some classes.
     """
     unknowns, *state = result.state.__getnewargs__()
     about = _about(result, frame)
@@ -362,13 +346,7 @@ def _about(result: AdjustedNetwork, frame: Frame) -> dict[str, str]:
 
 
 def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any]) -> Saved:
-    """Read the tables of a folder.
-
-    Raises
-    ------
-    InputError
-        One of them is missing, damaged, or of another result.
-    """
+    """Read the tables of a folder; refuse one that is missing, damaged, or of another result."""
     tables = document["tables"]
     for name in dict.fromkeys((*_READ, *tables)):
         check_seal(folder / f"{name}.parquet", tables.get(name), SUMMARY)
@@ -377,13 +355,7 @@ def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any
 
 
 def read_summary(folder: Path) -> Mapping[str, Any]:
-    """Read the document of a folder.
-
-    Raises
-    ------
-    InputError
-        It is not there, or is that of another program or version.
-    """
+    """Read the document of a folder; refuse none, and that of another program or version."""
     path = folder / SUMMARY
     try:
         document = orjson.loads(read_bytes(path))
@@ -400,13 +372,7 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
 
 
 def rows_of(names: Repeated, known: Sequence[str], path: Path) -> np.ndarray:
-    """Return which of the known names each row of a column has.
-
-    Raises
-    ------
-    InputError
-        A name that is not known.
-    """
+    """Return which of the known names each row of a column has; refuse others."""
     places = {name: row for row, name in enumerate(known)}
     try:
         codes = np.array([places[name] for name in names.names], dtype=np.int64)

@@ -29,13 +29,7 @@ ANGLES = ("omega", "phi", "kappa")
 
 
 def block_suspects(block: Block, core: _photocore.NetworkSuspects, *, parts: bool = True) -> Suspects:
-    """Return the groups of observations of a block as the core has them.
-
-    Parameters
-    ----------
-    parts
-        Whether a part of a control point or of a station may go alone.
-    """
+    """Return the groups of observations of a block as the core has them; `parts` of some may go alone."""
     return _Named(block, core, parts).suspects()
 
 

@@ -27,10 +27,7 @@ LONG = 16
 def page_html(page: Page) -> bytes:
     """Return a page as an HTML file (UTF-8) that needs no network and no other file.
 
-    Raises
-    ------
-    ModuleNotFoundError
-        jinja2 or matplotlib is missing: `pip install 'photogram[report]'`.
+    It takes jinja2 and matplotlib (`pip install 'photogram[report]'`).
     """
     environment = _environment()
     sections = [drawn for section in page.sections if (drawn := _drawn(section)).parts]
@@ -138,13 +135,7 @@ DPI = 170
 
 
 def inlined(drawing: Drawing) -> Picture | None:
-    """Draw a picture; None where it has nothing to show.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        matplotlib is missing: `pip install 'photogram[report]'`.
-    """
+    """Draw a picture; None where it has nothing to show. It needs matplotlib, of `photogram[report]`."""
     from photogram.show.style import styled
 
     # Ticks are made when a figure is saved; identifiers are the same in every run.

@@ -161,16 +161,8 @@ def stacked(
 ) -> list[str]:
     """Return a table in which each thing has a line for each quantity, under the names of the components.
 
-    Parameters
-    ----------
-    names, head
-        Of the things, and what they are.
-    quantities
-        With the forms in which their numbers are written.
-    first
-        What stands behind the first of the lines.
-    above
-        Heads of the components.
+    `quantities` have the forms in which their numbers are written, `first` stands behind the first of the
+    lines, `above` are heads of the components.
     """
     longest = max((len(str(name)) for name in np.asarray(names.values).tolist()), default=0)
     width = max(10, longest + 1)

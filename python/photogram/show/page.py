@@ -333,16 +333,10 @@ def significant(value: float, figures: int = 4) -> str:
 def decimals_of(
     deviations: Floats, *, smallest: bool = False, unknown: int = 4, most: int = MOST_DECIMALS
 ) -> int:
-    """Return with how many decimals values are written whose standard deviations are these.
+    """Return with how many decimals values are written whose standard deviations are these, in their unit.
 
-    Parameters
-    ----------
-    deviations
-        In the unit in which values are written.
-    smallest
-        Whether the smallest of them keeps two significant figures; otherwise the median does.
-    unknown, most
-        Decimals where none is known, and at the most.
+    The smallest of them keeps two significant figures, or the median; `unknown` where none is known, `most`
+    at the most.
     """
     known = np.asarray(deviations, dtype=float)
     known = known[np.isfinite(known) & (known > 0)]

@@ -62,22 +62,11 @@ def network_page(
     datum: str = "",
     poses: str = "",
 ) -> Page:
-    """Return the page of a network.
+    """Return the page of a network: its number of `photos`, sections on its `size` and on what was `given`.
 
-    Parameters
-    ----------
-    result, what, title
-        The network, and what it is called.
-    size, given
-        How much and how good it is, and the sections of what was given.
-    photos, more
-        The number of its photos, and what a reader wants first besides.
-    redundancy
-        Beside the picture of redundancy numbers.
-    beside
-        What stands beside the plan.
-    datum, poses
-        What coordinates refer to, and what the poses of photos are where that is not plain.
+    `more` is what a reader wants first besides; `redundancy` stands beside the picture of redundancy numbers,
+    `beside` beside the plan; `datum` says what coordinates refer to, `poses` what the poses of photos are
+    where that is not plain.
     """
     return Page(
         what=what,

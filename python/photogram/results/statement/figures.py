@@ -151,13 +151,7 @@ class Figures:
 
 
 def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
-    """Return the figures of check points; None where there are none.
-
-    Parameters
-    ----------
-    coverage
-        Probability of the expanded uncertainty of biases.
-    """
+    """Return the figures of check points, biases with expanded uncertainties; None where there are none."""
     if not len(found):
         return None
     k = critical_student(1.0 - coverage, found.second)

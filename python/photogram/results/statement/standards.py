@@ -157,13 +157,7 @@ def standards(
     of_vegetated: Figures | None,
     left_out: Sequence[LeftOut],
 ) -> Standards:
-    """Return what the standards say that are asked for.
-
-    Raises
-    ------
-    InputError
-        Lengths between points that there are not; classes that cannot be.
-    """
+    """Return what the standards say that are asked for; refuse lengths between points that are not there."""
     lengths = _lengths(result, asked) if asked.lengths else None
     return Standards(
         asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)

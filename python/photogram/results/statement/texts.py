@@ -34,13 +34,7 @@ def table_of(language: str) -> Mapping[str, str]:
 
 
 def fields_of(sentence: str) -> set[str]:
-    """Return the names of the fields of a sentence.
-
-    Raises
-    ------
-    InputError
-        Braces that do not close, or that hold more than a name.
-    """
+    """Return the names of the fields of a sentence; refuse braces with more than a name, or not closed."""
     try:
         parts = list(Formatter().parse(sentence))
     except ValueError as error:
