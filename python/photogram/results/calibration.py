@@ -17,13 +17,13 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.block import ATTITUDE_COLUMNS, position_columns
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.distortion import INTERIOR
 from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
 from photogram.results.result import Result
 from photogram.results.scores import quadratic
+from photogram.results.selection import photo_components
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 
@@ -322,16 +322,15 @@ def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> 
     with np.errstate(invalid="ignore", divide="ignore"):
         table = np.abs(found / np.outer(camera.sd[rows], result.photo_sd.ravel()))
     table = table.reshape(len(rows), -1, 6)
-    components = [*position_columns(result.block), *ATTITUDE_COLUMNS]
     pairs = []
     for row, k in zip(table, rows, strict=True):
-        for column, component in enumerate(components):
+        for column, component in enumerate(photo_components(result.block)):
             order = np.argsort(-np.nan_to_num(row[:, column]), kind="stable")
             above = order[np.nan_to_num(row[order, column]) > CORRELATED]
             if above.size:
                 photos = tuple(result.block.photo_ids[photo] for photo in above.tolist())
-                name = component.removesuffix("_deg")
-                pairs.append(PoseCorrelation(camera.names[k], name, photos, float(row[above[0], column])))
+                largest = float(row[above[0], column])
+                pairs.append(PoseCorrelation(camera.names[k], component, photos, largest))
     return tuple(sorted(pairs, key=lambda pair: -pair.coefficient))
 
 

@@ -116,7 +116,7 @@ def _agreement(
         found.differences,
         network.point_cofactors[found.rows],
         survey,
-        name=partial(_named, found.names),
+        name=lambda place: found.names[place[0]],
         apart=partial(_apart, found.differences, point_axes(block)),
     )
     if not whole:
@@ -148,10 +148,6 @@ def point_kinds(block: Block) -> NDArray[np.str_]:
     held = np.isfinite(block.point_sd).any(axis=1)
     known = np.isfinite(block.point_positions).any(axis=1)
     return np.where(held, "control", np.where(known, "check", "pass"))
-
-
-def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:
-    return names[place[0]]
 
 
 def _apart(differences: Floats, axes: tuple[Axis, ...], place: tuple[int, ...], sd: Floats) -> str:

@@ -58,7 +58,11 @@ def network_findings(
     return Findings(
         status=result.status,
         observations=[
-            *_tested(result, labels, unit_weight),
+            *(
+                tested_singly(result)
+                if result.reliability_summary is None  # a loss has changed the weights
+                else groups_tested(result.reliability_summary, labels, unit_weight)
+            ),
             *(each if unit_weight is None else by_f(each, *unit_weight) for each in held),
         ],
         degrees_of_freedom=result.degrees_of_freedom,
@@ -131,14 +135,6 @@ def left_open(result: AdjustedNetwork) -> list[str]:
         if name in DISTANCES and sd > UNKNOWN * abs(value)
     ]
     return said or lengths
-
-
-def _tested(
-    result: AdjustedNetwork, labels: Sequence[str], unit_weight: tuple[float, float] | None
-) -> list[Tested]:
-    """Return the tests of groups; of single coordinates where a loss has changed the weights."""
-    summary = result.reliability_summary
-    return tested_singly(result) if summary is None else groups_tested(summary, labels, unit_weight)
 
 
 def _set_aside(result: Result) -> Removed | None:
@@ -238,10 +234,10 @@ def groups_tested(
             if not testable[groups].any():
                 continue
             values = np.where(testable[groups], tests.statistic[groups], math.nan)
-            tested = Tested(what, values, _names(summary, groups), "T", tests.rank[groups].astype(np.float64))
+            tested = Tested(what, values, _named(summary, groups), "T", tests.rank[groups].astype(np.float64))
             found.append(tested if unit_weight is None else by_f(tested, *unit_weight))
     return found
 
 
-def _names(summary: ReliabilitySummary, groups: np.ndarray) -> Callable[[tuple[int, ...]], str]:
+def _named(summary: ReliabilitySummary, groups: np.ndarray) -> Callable[[tuple[int, ...]], str]:
     return lambda place: summary.suspects.name(int(groups[place[0]]))

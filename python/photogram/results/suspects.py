@@ -104,7 +104,8 @@ class _Named(NamedSuspects):
         if observation.moment is not None:
             return self._flown(observation.moment.trajectory)
         if isinstance(observation, Smoothness):
-            return self._flown_with(observation)
+            own = self._of_coefficients.get(id(observation.unknowns[0]))
+            return np.zeros(0, dtype=np.int64) if own is None else self._flown(own)
         seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
         own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
         return np.unique(np.concatenate([own, *seen]))
@@ -112,11 +113,6 @@ class _Named(NamedSuspects):
     def _flown(self, trajectory: Trajectory) -> Indices:
         """Return the photos on a trajectory."""
         return self._on_trajectories.get(id(trajectory), np.zeros(0, dtype=np.int64))
-
-    def _flown_with(self, observation: Observation) -> Indices:
-        """Return the photos on the trajectory whose coefficients an observation is of."""
-        own = self._of_coefficients.get(id(observation.unknowns[0]))
-        return np.zeros(0, dtype=np.int64) if own is None else self._flown(own)
 
     @cached_property
     def _on_trajectories(self) -> dict[int, Indices]:

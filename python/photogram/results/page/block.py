@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,7 +17,7 @@ from photogram.results.features_report import expansion, through, written
 from photogram.results.film_report import film_table, form_table, mark_table, scanner_table
 from photogram.results.page.network import drawings, network_page, size_section
 from photogram.results.page.tables import beside_section, check_section, control_section, stations_section
-from photogram.results.report import size_of
+from photogram.results.report import rms_of, size_of
 from photogram.results.result import Result
 from photogram.results.tables import redundancy_by_kind, unknowns
 from photogram.show.cells import page_table, unit_written
@@ -78,7 +79,8 @@ def _accuracy(result: Result) -> list[Fact]:
     factors = np.array([axis.factor for axis in axes])
     check = result.used_points & (result.point_kinds == "check")
     if check.any():
-        worst = zip(axes, _rms_of(result.point_differences[check] * factors), strict=True)
+        columns = (result.point_differences[check] * factors).T
+        worst = zip(axes, (rms_of(column[np.isfinite(column)]) for column in columns), strict=True)
         note = ", ".join(f"{axis.name} {significant(each, 2)}" for axis, each in worst if math.isfinite(each))
         unit = "" if result.geographic else f" {axes[2].small}"
         found.append(Fact("Check points", f"{np.count_nonzero(check)}", note=f"rms {note}{unit}"))
@@ -89,15 +91,6 @@ def _accuracy(result: Result) -> list[Fact]:
         units = [unit_written(axis.small) for axis in axes]
         note = f"{axes[0].name} {x} {units[0]}, {axes[1].name} {y} {units[1]}"
         found.append(Fact(f"sd of points in {axes[2].name}, median", z, units[2], note))
-    return found
-
-
-def _rms_of(values: np.ndarray) -> list[float]:
-    """Return the rms of the finite values of each column."""
-    found = []
-    for column in values.T:
-        own = column[np.isfinite(column)]
-        found.append(math.sqrt(float(np.mean(own**2))) if own.size else math.nan)
     return found
 
 
@@ -119,10 +112,8 @@ _BASIS = {
 
 
 def _reasons(result: Result) -> str:
-    reasons: dict[str, int] = {}
-    for reason in result.dropped.values():
-        reasons[reason] = reasons.get(reason, 0) + 1
-    return ", ".join(f"{count}: {reason}" for reason, count in reasons.items())
+    counts = Counter(result.dropped.values())
+    return ", ".join(f"{count}: {reason}" for reason, count in counts.items())
 
 
 def _redundancy_tables(result: Result) -> list[Table]:
@@ -156,11 +147,9 @@ def _sentence(said: str) -> str:
 
 
 def _datum(result: Result) -> str:
-    return (
-        f"Coordinates and standard deviations refer to the datum that is {result.datum}."
-        if not result.datum.is_chosen
-        else f"Datum: {result.datum}."
-    )
+    if result.datum.is_chosen:
+        return f"Datum: {result.datum}."
+    return f"Coordinates and standard deviations refer to the datum that is {result.datum}."
 
 
 LISTED = 12

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -386,15 +387,10 @@ CAPTIONS = {
 
 def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
     """Return the pictures that a result may have, by name; what there is nothing of draws nothing."""
-    return {
-        name: Drawing(f"picture-{name}", *words, _drawing(result, name)) for name, words in CAPTIONS.items()
-    }
 
-
-def _drawing(result: AdjustedNetwork, name: str) -> Callable[[], Figure | None]:
-    def draw() -> Figure | None:
+    def draw(name: str) -> Figure | None:
         from photogram.plots import figures  # takes long to import
 
         return figures(result, [name]).get(name)
 
-    return draw
+    return {name: Drawing(f"picture-{name}", *words, partial(draw, name)) for name, words in CAPTIONS.items()}

@@ -12,7 +12,6 @@ from photogram.messages import counted
 from photogram.results.axes import point_axes
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.network_tables import Terms, control, part, photos, points, stations, terms_of
-from photogram.results.observation_kinds import ObservedKind
 from photogram.results.observation_rows import is_held
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observations, unheld
@@ -152,14 +151,13 @@ def _layers(name: str, tables: list[Table]) -> list[Layers] | list[Table]:
 
 def beside_section(result: Result) -> Section:
     """Return observations beside images, kind by kind."""
-    tables = [table for each in result.kinds.values() if each.used for table in _kind_tables(each)]
+    tables = []
+    for each in result.kinds.values():
+        if each.used:
+            tests = _tested(np.isfinite(each.residuals), each.standardized)
+            tables += long_table(each.kind[:1].upper() + each.kind[1:], observations(each), tests)
     intro = "Observations beside images: observed minus adjusted, with their tests."
     return Section("observations", "Other observations", _layers("beside", tables), intro)
-
-
-def _kind_tables(kind: ObservedKind) -> list[Table]:
-    tests = _tested(np.isfinite(kind.residuals), kind.standardized)
-    return long_table(kind.kind[:1].upper() + kind.kind[1:], observations(kind), tests)
 
 
 def chosen_rows(count: int, named: Iterable[int], orders: Sequence[Indices]) -> tuple[Indices, bool]:

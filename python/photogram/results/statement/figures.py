@@ -13,7 +13,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.statement.comparison import Compared
+from photogram.results.statement.comparison import PARTS, Compared
 from photogram.results.statement.honest import (
     Bias,
     PointTests,
@@ -157,29 +157,24 @@ def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
     k = critical_student(1.0 - coverage, found.second)
     d = np.where(found.counted, found.differences, np.nan)
     plan, heights = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
+    sizes = dict(zip(PARTS, (*d.T, plan, np.sqrt((d**2).sum(axis=1))), strict=True))
     in_plan, in_height = np.isfinite(plan), np.isfinite(heights)
-    survey = found.survey_variances
+    survey, moments = found.survey_variances, _moments(d[in_plan, :2])
     tests = point_tests(found)
     return Figures(
         n=len(found),
-        parts={
-            "e": _sized(d[:, 0], found.names),
-            "n": _sized(d[:, 1], found.names),
-            "h": _sized(heights, found.names),
-            "plan": _sized(plan, found.names, radial=True),
-            "all": _sized(np.sqrt((d**2).sum(axis=1)), found.names, radial=True),
-        },
+        parts={part: _sized(own, found.names, radial=part in ("plan", "all")) for part, own in sizes.items()},
         rmse_h1=root_mean(plan**2),
         rmse_v1=root_mean(heights**2),
         rmse_h2=root_mean(np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan)),
         rmse_v2=root_mean(np.where(in_height, survey[:, 2], np.nan)),
-        prediction={part: prediction(found, part) for part in ("e", "n", "h", "plan", "all")},
+        prediction={part: prediction(found, part) for part in PARTS},
         bias={part: bias(found, part, k) for part in ("e", "n", "h")},
         points=tests,
-        inside=_inside(tests, heights, in_height),
+        inside=_inside(tests, in_height),
         radii=_radii(plan[in_plan], np.abs(heights[in_height])),
-        moments=_moments(d[in_plan, :2]),
-        of_moments=_of_moments(_moments(d[in_plan, :2]), root_mean(heights**2)),
+        moments=moments,
+        of_moments=_of_moments(moments, root_mean(heights**2)),
         mixture=_mixture(found, in_plan, in_height),
         surface=surface(found),
     )
@@ -202,7 +197,7 @@ def root_mean(squares: Floats) -> float:
     return math.sqrt(float(known.mean())) if known.size else math.nan
 
 
-def _inside(tests: PointTests, heights: Floats, in_height: np.ndarray) -> dict[str, int]:
+def _inside(tests: PointTests, in_height: np.ndarray) -> dict[str, int]:
     limits = {
         k: _photocore.chi_square_quantile(1 - INSIDE, k, upper=True)
         for k in np.unique(tests.dimension[tests.dimension > 0]).tolist()
@@ -224,11 +219,9 @@ def _radii(plan: Floats, heights: Floats) -> dict[str, Radius | None]:
             if not len(values):
                 found[key] = None
                 continue
-            order, sample = sample_radius(values, p)
             upper = upper_order(len(values), p)
-            found[key] = Radius(
-                order, sample, upper, None if upper is None else float(np.sort(values)[upper - 1])
-            )
+            largest = None if upper is None else float(np.sort(values)[upper - 1])
+            found[key] = Radius(*sample_radius(values, p), upper, largest)
     return found
 
 
