@@ -133,8 +133,7 @@ def block_files(result: Result) -> dict[str, Content]:
         "datum": str(result.datum),
         "degrees_of_freedom": result.degrees_of_freedom,
     }
-    parts = _parts(block, result)
-    return written(result, KIND, "block", parts, leading, tables, block.frame, summary, STANDS)
+    return written(result, KIND, "block", _parts(block), leading, tables, block.frame, summary, STANDS)
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
@@ -147,7 +146,9 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     for kind in ("photo", "point"):
         sheet = saved.sheets[f"{kind}s"]
         own = sheet.names(kind)
-        names[kind] = own.names if (own.rows == np.arange(len(own))).all() else _spelt(own)
+        names[kind] = (
+            own.names if (own.rows == np.arange(len(own))).all() else [own.names[k] for k in own.rows]
+        )
         given[f"{kind}_ids"] = names[kind]
         given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
     parts = _parts_of(
@@ -167,7 +168,7 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     return Result(**members, **own_arrays, block=block, state=saved.state())
 
 
-def _parts(block: Block, result: Result) -> dict[str, list[Part]]:
+def _parts(block: Block) -> dict[str, list[Part]]:
     observed = [
         name for name in ("positions", "attitudes") if getattr(block, f"photo_{name}_observed") is not None
     ]
@@ -245,10 +246,6 @@ def _camera_column(block: Block) -> list[Column]:
         return []
     names = block.camera_names
     return [Column("camera", Repeated(names, block.photo_cameras), "", "name of the camera")]
-
-
-def _spelt(column: Repeated) -> list[str]:
-    return [column.names[row] for row in column.rows.tolist()]
 
 
 def _below(base: type) -> Iterator[type]:

@@ -104,7 +104,9 @@ def largest_radius(result: Result, camera: AdjustedCamera) -> float:
     if not len(xy):
         return 0.0
     if _is_backward(camera.camera):
-        return float(np.hypot(*(xy - _principal_point(camera.camera)).T).max())
+        names = ("xp", "yp") if "xp" in camera.names else ("cx", "cy")
+        principal_point = [camera.camera.parameters.get(name, 0.0) for name in names]
+        return float(np.hypot(*(xy - principal_point).T).max())
     rays = camera.camera.rays(xy)
     ideal = _ideal(camera.camera, rays)
     return camera.camera.scale * float(np.max(ideal[np.isfinite(ideal)], initial=0.0))
@@ -223,11 +225,6 @@ def _ideal(camera: Camera, rays: Floats) -> Floats:
     return np.arctan2(across, -rays[:, 2]) if _is_fisheye(camera) else across / -rays[:, 2]
 
 
-def _principal_point(camera: Camera) -> Floats:
-    names = ("xp", "yp") if "xp" in camera.names else ("cx", "cy")
-    return np.array([camera.parameters.get(name, 0.0) for name in names])
-
-
 def _is_backward(camera: Camera) -> bool:
     return camera.direction == "backward"
 
@@ -285,7 +282,10 @@ def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
     rays = None if own.direction == "backward" else own.rays(positions)
 
     def at(changes: dict[str, float]) -> Floats:
-        return _places(own.replace(parameters={**own.parameters, **changes}), positions, rays)
+        changed = own.replace(parameters={**own.parameters, **changes})
+        if rays is None:
+            return _photocore.camera_correct(changed.model, changed.values, positions)
+        return changed.project(rays)
 
     partials = np.empty((len(positions), 2, len(names)))
     rows = [camera.names.index(name) for name in names]
@@ -301,10 +301,3 @@ def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
             "nai,ij,nbj->nab", partials, camera.covariance[np.ix_(rows, rows)], partials, optimize=True
         ),
     )
-
-
-def _places(camera: Camera, positions: Floats, rays: Floats | None) -> Floats:
-    """Return corrected positions, or the images of rays."""
-    if rays is None:
-        return _photocore.camera_correct(camera.model, camera.values, positions)
-    return camera.project(rays)

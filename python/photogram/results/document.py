@@ -66,8 +66,13 @@ def network_members(result: AdjustedNetwork, photo_members: Table = ()) -> dict[
 
 def block_members(result: Result) -> dict[str, Any]:
     """Return the members of the document of an adjusted block."""
+    covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
+    of_photos = (
+        Quantity(covariances[:, place, place], member="position_covariance"),
+        Quantity(covariances[:, turn, turn], member="attitude_covariance"),
+    )
     return {
-        **network_members(result, _of_photos(result)),
+        **network_members(result, of_photos),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {
@@ -133,14 +138,6 @@ def _units(result: Result) -> dict[str, str]:
         "operations": "multiply-adds, each time the phase is carried out",
         "seconds": "s",
     }
-
-
-def _of_photos(result: Result) -> list[Quantity]:
-    covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
-    return [
-        Quantity(covariances[:, place, place], member="position_covariance"),
-        Quantity(covariances[:, turn, turn], member="attitude_covariance"),
-    ]
 
 
 def _cameras(result: Result) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -83,20 +84,17 @@ class Part:
 
     def columns(self, result: AdjustedNetwork) -> list[Column]:
         """Return its columns; none where the array is None."""
-        values = result
-        for name in self.field.split("."):
-            values = getattr(values, name)
-        array: Any = values
+        array: Any = attrgetter(self.field)(result)
         if array is None:
             return []
         if self.form == "matrix":
             triangles = packed(array) * result.covariance_scale
             return [Column(self.prefix, triangles, _products(self.units), self.description, self.names)]
-        if self.form == "list" and not len(array):
-            return []
         if self.form == "list":
-            cells, units = _rows_first(array), " ".join(self.units)
-            return [Column(self.prefix, cells, units, self.description, self.names)]
+            if not len(array):
+                return []
+            cells = array.transpose(1, 0, 2).reshape(array.shape[1], -1)
+            return [Column(self.prefix, cells, " ".join(self.units), self.description, self.names)]
         parts = array.T if array.ndim == 2 else [array]
         return [
             Column(self.prefix + name, part, unit, self.description.format(name))
@@ -108,9 +106,9 @@ class Part:
         if self.form == "matrix":
             k = len(self.names)
             return unpacked(_divided(sheet.numbers(self.prefix, k * (k + 1) // 2), scale))
-        if self.form == "list" and self.prefix not in sheet.columns:
-            return np.zeros((0, sheet.rows, len(self.names)))
         if self.form == "list":
+            if self.prefix not in sheet.columns:
+                return np.zeros((0, sheet.rows, len(self.names)))
             cells = sheet.numbers(self.prefix, -len(self.names))
             return np.ascontiguousarray(cells.reshape(len(cells), -1, len(self.names)).transpose(1, 0, 2))
         own = [self.prefix + name for name in self.names]
@@ -128,11 +126,6 @@ def _divided(products: np.ndarray, scale: float) -> np.ndarray:
         beside = np.nextafter(near, direction)
         found = np.where((found * scale != products) & (beside * scale == products), beside, found)
     return found
-
-
-def _rows_first(array: np.ndarray) -> np.ndarray:
-    """Return (P, i k) of (i, P, k)."""
-    return array.transpose(1, 0, 2).reshape(array.shape[1], -1)
 
 
 def _products(units: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +19,14 @@ from photogram.show.sections import Section, composed, headline, verdict_section
 from photogram.show.summary import Brief, Rows, few
 from photogram.statistics.findings import Findings, Removed
 from photogram.statistics.limits import global_test
-from photogram.statistics.snooping.log import Removal
+from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
 from photogram.statistics.snooping.suspects import Standing, Suspects
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["LN10", "Snooped", "estimated_errors", "snooped_findings"]
+__all__ = ["LN10", "Snooped", "estimated_errors", "rivals_of", "snooped_findings"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -134,7 +135,8 @@ class Snooped(Brief, Judged, Paged):
         return [*verdict_sections(self.verdict), *self._own()]
 
     def _own(self) -> list[Section]:
-        return [("Data snooping", self._head()), ("Taken out, in order", self._log())]
+        lines = [line for entry in self.log for line in _lines(entry)] or ["nothing"]
+        return [("Data snooping", self._head()), ("Taken out, in order", lines)]
 
     def report(self) -> str:
         """Return the report: that of the network without what was taken out, then the log of that."""
@@ -160,9 +162,6 @@ class Snooped(Brief, Judged, Paged):
             lines.append(f"the unit variance holds after removal of {out} groups: it is biased low by little")
         return lines
 
-    def _log(self) -> list[str]:
-        return [line for entry in self.log for line in _lines(entry)] or ["nothing"]
-
 
 _COLUMNS = (
     *("round", "kind", "name", "component", "unit", "error", "error_sd"),
@@ -177,7 +176,7 @@ def _rows(entry: Removal) -> list[dict[str, Any]]:
     after = math.nan if entry.prediction is None else entry.prediction
     log_p = member["prediction_log10_p"]
     common = member | {
-        "rivals": "; ".join(f"{rival.name} ({rival.odds:.3g} : 1)" for rival in entry.rivals),
+        "rivals": rivals_of(entry.rivals, 3),
         "consequences": "; ".join(entry.consequences),
         "prediction_T": after,
         "prediction_log10_p": math.nan if log_p is None else log_p,
@@ -231,6 +230,11 @@ def _said(standing: Standing) -> str:
     expected = f"{test.limits[0]:.3f} to {test.limits[1]:.3f}"
     freedom = standing.degrees_of_freedom
     return f"{test.variance:.4f} with {freedom} degrees of freedom, expected {expected}: {said}"
+
+
+def rivals_of(rivals: Iterable[Rival], figures: int) -> str:
+    """Return what else may be wrong in the place of what was taken out, with so many figures of the odds."""
+    return "; ".join(f"{rival.name} ({rival.odds:.{figures}g} : 1)" for rival in rivals)
 
 
 def estimated_errors(entry: Removal) -> str:

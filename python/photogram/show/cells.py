@@ -55,7 +55,11 @@ def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Writt
     """Return the columns of a quantity with their cells."""
     if each.of is not None and each.kind == "name":
         mixed = _mixed(each)
-        return [(Column(each.head, text=True), [_component(each.axes[k], mixed) for k in each.of.tolist()])]
+        names = [
+            f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
+            for axis in each.axes
+        ]
+        return [(Column(each.head, text=True), [names[k] for k in each.of.tolist()])]
     if not each.axes:
         return [(_column(each, each.head, "", None), _with_marks(_cells(each), each.marked))]
     if each.of is not None:
@@ -99,10 +103,6 @@ def long_table(
 
 def _mixed(each: Quantity) -> bool:
     return len({axis.small for axis in each.axes}) > 1
-
-
-def _component(axis: Axis, mixed: bool) -> str:
-    return f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
 
 
 def _column(each: Quantity, head: str, unit: str, decimals: int | None) -> Column:

@@ -35,16 +35,7 @@ from photogram.statistics.findings import Tested
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "Worst",
-    "drawings",
-    "limit_of",
-    "network_page",
-    "size_section",
-    "worst_images",
-    "worst_of",
-    "worst_table",
-]
+__all__ = ["drawings", "network_page", "size_section"]
 
 _NOT_CHECKED = 0.01
 
@@ -69,48 +60,36 @@ def network_page(
     `beside` beside the plan; `datum` says what coordinates refer to, `poses` what the poses of photos are
     where that is not plain.
     """
-    return Page(
-        what=what,
-        title=title,
-        judgements=[judged(result.verdict)],
-        advice=result.verdict.next,
-        highlights=[*highlights(result, photos), *more],
-        sections=_sections(result, size, given, redundancy, beside, (datum, poses)),
-        phases=result.seconds,
-    )
-
-
-def _sections(
-    result: AdjustedNetwork,
-    size: Section,
-    given: Sequence[Section],
-    redundancy: Sequence[Table],
-    beside: Sequence[Section],
-    intro_of: tuple[str, str],
-) -> list[Section]:
     pictures, groups = drawings(result), tested_singly(result)
-    datum, poses = intro_of
-    found = worst_of(groups)
-    photos, points = worst_images(result, found)
+    worst = _worst_of(groups)
+    worst_photos, worst_points = _worst_images(result, worst)
     intro = (
         "The redundancy number of an observation is the share of its error that shows in its own"
         " residual; the rest"
         " goes into the unknowns. Their sum is the number of observations beyond what is needed."
     )
-    return [
-        Section("network", "Plan of the network", [pictures["network"]]),
-        *beside,
-        size,
-        Section("residuals", "Image residuals", [pictures["residuals"]]),
-        Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
-        tests_section(result, pictures["tests"]),
-        worst_section(result, groups, found),
-        *given,
-        photos_section(result, photos, f"{datum} {poses}".strip()),
-        points_section(result, points, datum),
-        iterations_section(result),
-        remarks_section(problems_of(result)),
-    ]
+    return Page(
+        what=what,
+        title=title,
+        judgements=[judged(result.verdict)],
+        advice=result.verdict.next,
+        highlights=[*_highlights(result, photos), *more],
+        sections=[
+            Section("network", "Plan of the network", [pictures["network"]]),
+            *beside,
+            size,
+            Section("residuals", "Image residuals", [pictures["residuals"]]),
+            Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
+            _tests_section(result, pictures["tests"]),
+            _worst_section(result, groups, worst),
+            *given,
+            photos_section(result, worst_photos, f"{datum} {poses}".strip()),
+            points_section(result, worst_points, datum),
+            _iterations_section(result),
+            remarks_section(problems_of(result)),
+        ],
+        phases=result.seconds,
+    )
 
 
 def size_section(
@@ -121,18 +100,18 @@ def size_section(
     facts.append(Fact("Degrees of freedom", f"{result.degrees_of_freedom:.8g}"))
     parts: list[Part] = [
         Facts("How much", [*facts, *more]),
-        Facts("How good", [*good, *images_facts(result)]),
-        *precision_table(result),
+        Facts("How good", [*good, *_images_facts(result)]),
+        *_precision_table(result),
     ]
     return Section("size", "How much, how good", parts)
 
 
-def highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
+def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     """Return what a reader wants first of every network, with its number of photos."""
     used, (axis, _) = result.used_images, terms_of(result).image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
     found = [
-        unit_weight(result),
+        _unit_weight(result),
         Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
         Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
     ]
@@ -142,31 +121,19 @@ def highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     return found
 
 
-def unit_weight(result: AdjustedNetwork) -> Fact:
-    """Return the standard deviation of unit weight with what it may be."""
-    variance, test = result.variance_of_unit_weight, findings_test(result)
+def _unit_weight(result: AdjustedNetwork) -> Fact:
+    """Return the standard deviation of unit weight with what it may be, where that was tested."""
+    variance, name = result.variance_of_unit_weight, "Standard deviation of unit weight"
     if variance is None:
-        return Fact(
-            "Standard deviation of unit weight",
-            "–",
-            note="no degrees of freedom: covariances are scaled by 1",
-        )
+        return Fact(name, "–", note="no degrees of freedom: covariances are scaled by 1")
     note = ""
-    if test is not None:
-        low, high = (math.sqrt(each) for each in test)
-        note = f"{low:.3f} to {high:.3f} expected"
-    return Fact("Standard deviation of unit weight", f"{math.sqrt(variance):.3f}", note=note)
-
-
-def findings_test(result: AdjustedNetwork) -> tuple[float, float] | None:
-    """Return the limits of the global test, None where none was made."""
     for test in result.verdict.tests:
         if test.name == "global" and test.limits[0] is not None and test.limits[1] is not None:
-            return test.limits[0], test.limits[1]
-    return None
+            note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
+    return Fact(name, f"{math.sqrt(variance):.3f}", note=note)
 
 
-def images_facts(result: AdjustedNetwork) -> list[Fact]:
+def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     """Return how well images fit and are checked."""
     used, (axis, _) = result.used_images, terms_of(result).image_axes
     unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
@@ -205,7 +172,7 @@ def images_facts(result: AdjustedNetwork) -> list[Fact]:
     return facts
 
 
-def precision_table(result: AdjustedNetwork) -> list[Table]:
+def _precision_table(result: AdjustedNetwork) -> list[Table]:
     """Return how the standard deviations of adjusted values are spread; none where none were computed."""
     terms, rows = terms_of(result), list[Row]()
     for what, axes, deviations in (
@@ -229,7 +196,7 @@ def precision_table(result: AdjustedNetwork) -> list[Table]:
     return [Table("Precision", columns, rows, note)] if rows else []
 
 
-def tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
+def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
     """Return all tests, and the picture of single ones."""
     table = verdict_table(result.verdict)
     parts: list[Part] = [drawing, *([table] if table.rows else [])]
@@ -237,18 +204,18 @@ def tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
     return Section("tests", "Tests", parts, intro)
 
 
-def worst_section(result: AdjustedNetwork, groups: Sequence[Tested], worst: Sequence[Worst]) -> Section:
+def _worst_section(result: AdjustedNetwork, groups: Sequence[Tested], worst: Sequence[Worst]) -> Section:
     """Return the worst observations."""
     intro = (
         "A residual alone says little: an error shows in it only by the share of its redundancy number."
         " The test"
         " value takes both into account. Names of photos and points lead to their rows below."
     )
-    parts = [worst_table(result, limit_of(groups), worst)] if worst else []
+    parts = [_worst_table(result, _limit_of(groups), worst)] if worst else []
     return Section("worst", "Worst observations", parts, intro)
 
 
-def iterations_section(result: AdjustedNetwork) -> Section:
+def _iterations_section(result: AdjustedNetwork) -> Section:
     """Return the history."""
     facts = [
         Fact("Status", result.status),
@@ -267,7 +234,7 @@ Worst = tuple[float, Tested, tuple[int, ...]]
 """The size of a test value, its kind, and its place there."""
 
 
-def worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
+def _worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
     """Return the observations of least probability, with |test value| as the measure of what is alike."""
     found: list[Worst] = []
     for tested in groups:
@@ -283,13 +250,13 @@ def worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
     return found[:count]
 
 
-def worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
+def _worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
     """Return photos and points of the images among the worst observations."""
     own = [place[0] for _, tested, place in worst if tested.kind == "image coordinates"]
     return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
 
 
-def worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Worst]) -> Table:
+def _worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Worst]) -> Table:
     """Return the observations whose test values are the largest, of all kinds."""
     terms = terms_of(result)
     rows: list[list[Cell | str | float | None]] = []
@@ -333,7 +300,7 @@ def worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Wo
     return Table("Worst observations", columns, rows, note)
 
 
-def limit_of(groups: Sequence[Tested]) -> float | None:
+def _limit_of(groups: Sequence[Tested]) -> float | None:
     """Return what a test value of a single observation may be at most, 5 percent for all together."""
     number = sum(int(np.count_nonzero(~np.isnan(each.values))) for each in groups)
     if not number:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from photogram.results.snooping_result import LN10, Snooped, estimated_errors
+from photogram.results.snooping_result import LN10, Snooped, estimated_errors, rivals_of
 from photogram.show.methods import page_of
 from photogram.show.page import Column, Fact, Page, Remarks, Section, Table
 from photogram.statistics.snooping.log import Removal
@@ -36,7 +36,7 @@ def _log(found: Snooped) -> Section:
             (Column("Dimension", decimals=0), lambda each: each.dimension),
             (Column("log10 p", decimals=1), lambda each: each.log_probability / LN10),
             (Column("Redundancy", decimals=3), lambda each: each.redundancy),
-            (Column("Or instead", text=True), _rivals),
+            (Column("Or instead", text=True), lambda each: rivals_of(each.rivals[:3], 2)),
             (Column("Now", text=True), _state),
         ],
     )
@@ -50,10 +50,6 @@ def _log(found: Snooped) -> Section:
         f" {'known' if settings.known else 'unknown'}. The error is estimated from the rest of the network."
     )
     return Section("removed", "What was taken out", parts, intro)
-
-
-def _rivals(each: Removal) -> str:
-    return "; ".join(f"{rival.name} ({rival.odds:.2g} : 1)" for rival in each.rivals[:3])
 
 
 def _state(each: Removal) -> str:
