@@ -82,10 +82,7 @@ def block_findings(result: Result) -> Findings:
     intersected = not result.photo_given_sd.any()
     labels = [each.label for each in observations_of_core(result.block)]
     found = network_findings(
-        result,
-        [] if intersected else held_tested(result),
-        [] if intersected else _patterns(result),
-        labels,
+        result, [] if intersected else held_tested(result), [] if intersected else _patterns(result), labels
     )
     return replace(
         found,

@@ -142,10 +142,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
     of_points = np.bincount(block.image_points, of_images, points)
     mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
     rows: list[tuple[float, Held]] = []
-    for what, sd, shift in (
-        ("position", given[:, :3], 0),
-        ("attitude", given[:, 3:], 3),
-    ):
+    for what, sd, shift in (("position", given[:, :3], 0), ("attitude", given[:, 3:], 3)):
         held = np.asarray(sd == 0)
         if shift or block.geographic:  # Partials are by other axes than those of the components.
             held = held & held.all(axis=1, keepdims=True)

@@ -210,12 +210,7 @@ class Left:
         (G + 1,) observations, weighted sums of squares, sums of redundancy numbers.
     """
 
-    def __init__(
-        self,
-        result: AdjustedNetwork,
-        grouping: Grouping,
-        probing: Probing,
-    ) -> None:
+    def __init__(self, result: AdjustedNetwork, grouping: Grouping, probing: Probing) -> None:
         self.result, self.grouping, self._probing = result, grouping, probing
         total, freedom = result.sum_and_freedom
         counts, squares, redundancy = sums_of(result, grouping)

@@ -219,11 +219,7 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
 
 
 def score_test(
-    result: Result,
-    names: Sequence[str] = (),
-    *,
-    camera: str | None = None,
-    partials: ArrayLike | None = None,
+    result: Result, names: Sequence[str] = (), *, camera: str | None = None, partials: ArrayLike | None = None
 ) -> TermsTest:
     """Test terms that are held, or effects that the model has not, without adjusting with them (Rao).
 

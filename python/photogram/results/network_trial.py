@@ -66,12 +66,7 @@ class NetworkTrial:
     """
 
     def __init__(
-        self,
-        core: _photocore.NetworkTrial,
-        suspects: Suspects,
-        supported: Bools,
-        rough: float,
-        exact: float,
+        self, core: _photocore.NetworkTrial, suspects: Suspects, supported: Bools, rough: float, exact: float
     ) -> None:
         self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
         self.deviations: Floats = core.suspects.deviations

@@ -20,14 +20,7 @@ from photogram.results.network_tables import terms_of
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
-from photogram.statistics.patterns import (
-    SPEAKING,
-    Fit,
-    frame_pattern,
-    group_patterns,
-    normality,
-    regression,
-)
+from photogram.statistics.patterns import SPEAKING, Fit, frame_pattern, group_patterns, normality, regression
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["CameraImages", "patterns"]

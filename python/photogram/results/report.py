@@ -33,13 +33,7 @@ from photogram.results.observation_rows import (
     tested_observations,
 )
 from photogram.results.result import Result
-from photogram.results.tables import (
-    check_points,
-    observed_components,
-    redundancy_by_kind,
-    unheld,
-    unknowns,
-)
+from photogram.results.tables import check_points, observed_components, redundancy_by_kind, unheld, unknowns
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, stacked, table_lines
 from photogram.show.methods import report_of
@@ -98,10 +92,7 @@ def details(result: Result) -> list[Section]:
             "Control as observations: adjusted minus given, redundancy, standardized difference",
             control_lines(result),
         ),
-        (
-            "Components of control that are not held: adjusted minus given",
-            _unheld(result),
-        ),
+        ("Components of control that are not held: adjusted minus given", _unheld(result)),
         (
             "Stations as observations: adjusted minus given, redundancy, standardized difference",
             observed_lines(stations(result), "photo"),

@@ -65,11 +65,7 @@ class _Named(NamedSuspects):
         axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
         plan = "rad" if block.geographic else block.linear_unit
         super().__init__(
-            block,
-            core,
-            apart=parts,
-            components=(axes, axes, ANGLES),
-            lengths=(plan, plan, block.linear_unit),
+            block, core, apart=parts, components=(axes, axes, ANGLES), lengths=(plan, plan, block.linear_unit)
         )
         self.block = block
         self.observations = observations_of_core(block)

@@ -28,11 +28,7 @@ class Field:
 
 
 def field(
-    quantity: Quantity,
-    width: int,
-    form: str | Sequence[str] = "",
-    head: str = "{name} {unit}",
-    gap: str = "",
+    quantity: Quantity, width: int, form: str | Sequence[str] = "", head: str = "{name} {unit}", gap: str = ""
 ) -> list[Field]:
     """Return a quantity as fields, one for each of its components.
 
@@ -74,13 +70,7 @@ def field(
 
 
 def _numbers(
-    quantity: Quantity,
-    axis: Axis,
-    values: Floats,
-    width: int,
-    forms: Sequence[str],
-    head: str,
-    gap: str,
+    quantity: Quantity, axis: Axis, values: Floats, width: int, forms: Sequence[str], head: str, gap: str
 ) -> Field:
     unit = unit_of(quantity, axis)
     named = f"{gap}{head.format(name=axis.name, unit=unit).strip():>{width}}"

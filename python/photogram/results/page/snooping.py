@@ -17,11 +17,7 @@ def snooped_page(found: Snooped) -> Page:
     """Return the page of the network without what was taken out."""
     page = page_of(found.judged)
     gone = Fact("Taken out", f"{len(found.removed)}", note=f"of {len(found.suspects)} groups of observations")
-    return replace(
-        page,
-        highlights=[gone, *page.highlights],
-        sections=[_log(found), *page.sections],
-    )
+    return replace(page, highlights=[gone, *page.highlights], sections=[_log(found), *page.sections])
 
 
 def _log(found: Snooped) -> Section:

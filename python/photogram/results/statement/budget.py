@@ -190,13 +190,7 @@ def budgets(
 
 
 def _budget(
-    result: Result,
-    wanted: Wanted,
-    value: float,
-    t: Floats,
-    rows: Rows,
-    freedoms: _Freedoms,
-    coverage: float,
+    result: Result, wanted: Wanted, value: float, t: Floats, rows: Rows, freedoms: _Freedoms, coverage: float
 ) -> Budget:
     squares = result.covariance_scale * t**2
     variance = float(squares.sum())

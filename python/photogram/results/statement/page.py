@@ -217,10 +217,7 @@ def _metrology(found: Statement) -> list[Section]:
         test, decimals = lengths.test, decimals_for(lengths.test.sd)
         limits = np.full(len(lengths.lines), math.nan) if test.limits is None else test.limits
         columns = [
-            (
-                cells.column("line", text=True),
-                lambda k: f"{lengths.lines[k]}: {' – '.join(lengths.ends[k])}",
-            ),
+            (cells.column("line", text=True), lambda k: f"{lengths.lines[k]}: {' – '.join(lengths.ends[k])}"),
             cells.numbers("length", lengths.calibrated, decimals, unit),
             cells.numbers("error", test.errors, decimals, unit),
             cells.numbers("sd", test.sd, decimals, unit),

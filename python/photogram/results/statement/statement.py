@@ -180,8 +180,10 @@ class Statement(Brief):
 
         Needs reportlab and matplotlib (`pip install 'photogram[pdf]'`).
         """
-        from photogram.show.pdf import page_pdf
-
+        try:
+            from photogram.show.pdf import page_pdf
+        except ModuleNotFoundError:
+            raise InputError("a PDF needs reportlab and matplotlib: pip install 'photogram[pdf]'") from None
         return _written(page_pdf(page_of(self), author=self.asked.firm), path)
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
