@@ -1,4 +1,4 @@
-"""The radial distortion of an adjusted camera, with what is known of it.
+"""The distortion of an adjusted camera, radial and other, with what is known of it.
 
 A curve dr(r) of the radial terms k, its partials J = d(dr)/dk and the block Q of their cofactors give the
 band s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principal distance c. A forward camera
@@ -7,6 +7,10 @@ maps a ray to r + dr, which moves by J dk + (r / c) dc; a backward one maps a me
 (J, -r / c) with the block of k and c. Balanced, a part B r that c may take over is subtracted so that the
 curve vanishes at r0: J - r w with w = J(r0) / r0; the principal distance is then c / (1 + B), c (1 + B) where
 the lens is forward.
+
+What the other terms do to image positions (decentring, affinity and shear, the sets of Ebner and Gruen, thin
+prisms) stands on a grid: with the terms p, their partials J at a position and the block Q of their cofactors,
+the vector there has the covariance sigma0^2 J Q J'.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is held and may be wrong: fixed stations and fixed points, tested by scores.
+"""What is held and may be wrong: fixed stations and points, and lenses, tested by scores.
 
 They are no observations: an error of theirs lies in no residual of its own, and good observations around are
 named for it. B the partials of the images by the held coordinates, in standard deviations, and ~v the

@@ -173,12 +173,11 @@ _COLUMNS = (
 def _rows(entry: Removal) -> list[dict[str, Any]]:
     """Return the rows of the table: what the document has, but for what each component has of its own."""
     member = _member(entry)
-    after = math.nan if entry.prediction is None else entry.prediction
     log_p = member["prediction_log10_p"]
     common = member | {
         "rivals": rivals_of(entry.rivals, 3),
         "consequences": "; ".join(entry.consequences),
-        "prediction_T": after,
+        "prediction_T": math.nan if entry.prediction is None else entry.prediction,
         "prediction_log10_p": math.nan if log_p is None else log_p,
         "kept": entry.kept,
     }
@@ -204,11 +203,9 @@ def _member(entry: Removal) -> dict[str, Any]:
             members(rival, "name", T="statistic") | members(rival, "dimension", "odds")
             for rival in entry.rivals
         ],
-        "consequences": entry.consequences,
-        "prediction_T": entry.prediction,
+        **members(entry, "consequences", prediction_T="prediction"),
         "prediction_log10_p": None if after is None else after / LN10,
-        "predicted_error": entry.prediction_error,
-        "returned": entry.returned,
+        **members(entry, predicted_error="prediction_error", returned="returned"),
         "kept": entry.kept or None,
     }
 
@@ -278,15 +275,12 @@ def _lines(entry: Removal) -> list[str]:
 @findings_of.register(Snooped)
 def snooped_findings(found: Snooped) -> Findings:
     """Return the findings on the network without gross errors, and what was taken out."""
-    document = found.document()
-    out = [entry.is_out for entry in found.log]
-    removed = [member for member, is_out in zip(document["log"], out, strict=True) if is_out]
     kept = [f"suspect, but kept: {entry.name} ({entry.kept})" for entry in found.log if entry.kept]
     rest = findings_of(found.result)
     return replace(
         rest,
         snooped=Removed(
-            removed,
+            [_member(entry) for entry in found.removed],
             images=found.share_removed("image"),
             control=found.share_removed("control"),
             rivals=found.rivals,

@@ -1,4 +1,4 @@
-"""Trajectories after the adjustment: poses at any time with their covariance, corrections, images."""
+"""Trajectories after the adjustment: poses at any time, their covariance, images, the start of another."""
 
 from __future__ import annotations
 

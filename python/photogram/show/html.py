@@ -1,4 +1,7 @@
-"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`."""
+"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`.
+
+Pictures of few things stand in it as vectors, those of many as dots.
+"""
 
 from __future__ import annotations
 

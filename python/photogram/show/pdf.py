@@ -1,7 +1,7 @@
 """A page as a PDF document on A4; what makes it is the extra `photogram[pdf]`, and matplotlib for pictures.
 
 The first sections stand on the first page as far as they go; sections that are annexes begin on pages of
-their own. Equal pages give equal bytes.
+their own; tables have letters as small as it takes for them to go on a sheet. Equal pages give equal bytes.
 """
 
 from __future__ import annotations
