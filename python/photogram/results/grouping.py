@@ -216,7 +216,7 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
         raise InputError(f"labels are of {', '.join(PARTS)}, not {shown(sorted(map(str, unknown))[0])}")
     by_kind = _by(of, ["kind"])
     parts = {"images": "images", "control": "points", "stations": "photos", "observations": "observations"}
-    found: dict[str, _Labels] = {}
+    found: dict[str, Any] = {}
     for name, part in parts.items():
         if name in given:
             default: _Labels = getattr(by_kind, part)

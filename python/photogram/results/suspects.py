@@ -100,8 +100,8 @@ class _Named(NamedSuspects):
         if observation.moment is not None:
             return self._flown(observation.moment.trajectory)
         if isinstance(observation, Smoothness):
-            own = self._of_coefficients.get(id(observation.unknowns[0]))
-            return np.zeros(0, dtype=np.int64) if own is None else self._flown(own)
+            smoothed = self._of_coefficients.get(id(observation.unknowns[0]))
+            return np.zeros(0, dtype=np.int64) if smoothed is None else self._flown(smoothed)
         seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
         own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
         return np.unique(np.concatenate([own, *seen]))

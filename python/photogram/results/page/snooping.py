@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from photogram.results.snooping_result import LN10, Snooped, estimated_errors, rivals_of
 from photogram.show.methods import page_of
-from photogram.show.page import Column, Fact, Page, Remarks, Section, Table
+from photogram.show.page import Column, Fact, Page, Part, Remarks, Section, Table
 from photogram.statistics.snooping.log import Removal
 
 __all__ = ["snooped_page"]
@@ -38,7 +38,7 @@ def _log(found: Snooped) -> Section:
     )
     consequences = [f"{each.name}: {line}" for each in found.log for line in each.consequences]
     sentences = [*([] if found.log else ["Nothing was taken out."]), *found.outcome.remarks, *consequences]
-    parts = [*([table] if found.log else []), *([Remarks(sentences)] if sentences else [])]
+    parts: list[Part] = [*([table] if found.log else []), *([Remarks(sentences)] if sentences else [])]
     settings = found.settings
     rate = "false discovery rate" if settings.fdr else "level of all tests together"
     intro = (

@@ -45,7 +45,7 @@ def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None
 
 
 def _radial(own: Sized | None) -> dict[str, Any] | None:
-    return own and members(own, "n", "rmse", "largest", largest_point="point")
+    return None if own is None else members(own, "n", "rmse", "largest", largest_point="point")
 
 
 _PREDICTION = {

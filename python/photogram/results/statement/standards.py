@@ -140,13 +140,10 @@ class Standards:
     @property
     def nssda_member(self) -> dict[str, Any] | None:
         """What the JSON document has of the NSSDA."""
-        return self.nssda and members(
-            self.nssda,
-            *("ratio", "accuracy_r_equal"),
-            accuracy_r_unequal="accuracy_r",
-            ce95="ce95",
-            accuracy_z="accuracy_z",
-        )
+        if self.nssda is None:
+            return None
+        more = {"accuracy_r_unequal": "accuracy_r", "ce95": "ce95", "accuracy_z": "accuracy_z"}
+        return members(self.nssda, "ratio", "accuracy_r_equal", **more)
 
 
 def standards(
