@@ -10,11 +10,19 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.coefficients import outside
 from photogram.adjustment.first_features import started
-from photogram.adjustment.remarks import behind, folded, harmful, rounded, too_coarse, undetermined
+from photogram.adjustment.remarks import (
+    behind,
+    check_cameras,
+    folded,
+    harmful,
+    refraction_remarks,
+    rounded,
+    too_coarse,
+    undetermined,
+)
 from photogram.adjustment.robust import Loss, loss_row, remark
-from photogram.adjustment.undetermined import one_place, undetermined_combinations
+from photogram.adjustment.undetermined import one_place, outside, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -31,7 +39,6 @@ from photogram.network.datum import (
     minimum_row,
 )
 from photogram.network.motion import refuse_datum
-from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
 from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
@@ -421,7 +428,7 @@ def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message
     lost = [each.name for each in block.observations if dropped.intersection(each.points)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
-    return messages + remarks(block, solution.photo_positions)
+    return messages + refraction_remarks(block, solution.photo_positions)
 
 
 def _rises(iterations: list[Iteration]) -> list[Message]:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian, Known
+from photogram.adjustment.a_priori import Known
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import replace
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.cameras import rays_of_row
+from photogram.network.geometry import Cartesian
 from photogram.network.observations import Attitude, Observation
 from photogram.network.rays import meet
 from photogram.network.rigs import Mount
@@ -52,21 +52,9 @@ def started(block: Block) -> Block:
         own = [one for one in block.observations if any(other is each for other in one.unknowns)]
         found[id(each)] = _FINDERS[type(each)](sites, each, own)
     return block.replace(
-        observations=[_with(each, found) for each in block.observations],
+        observations=[each.with_unknowns(found) for each in block.observations],
         mounts=[_on(each, found) for each in block.mounts],
     )
-
-
-def _with(observation: Observation, found: Mapping[int, Unknown]) -> Observation:
-    """Return an observation with unknowns that have their values."""
-    if not observation.UNKNOWNS:
-        return observation
-    changes: dict[str, Any] = {
-        name: found[id(each)]
-        for (name, _), each in zip(observation.UNKNOWNS, observation.unknowns, strict=True)
-        if id(each) in found
-    }
-    return replace(observation, **changes) if changes else observation
 
 
 def _on(mount: Mount, found: Mapping[int, Unknown]) -> Mount:
@@ -79,7 +67,7 @@ class _Sites:
     """Where points and photos of a block are before its adjustment, in cartesian axes."""
 
     def __init__(self, block: Block) -> None:
-        self.block, self.axes = block, Cartesian.of(block)
+        self.block, self.axes = block, Cartesian(block.spheroid)
         self.known = Known.of(block, self.axes)
         self.points = {name: row for row, name in enumerate(block.point_ids)}
         self.photos = {name: row for row, name in enumerate(block.photo_ids)}

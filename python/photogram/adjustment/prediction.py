@@ -22,6 +22,7 @@ from photogram.network.cameras import images_of
 from photogram.network.motion import on_shared, timed_photos
 from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
 from photogram.network.projecting import projected_images
+from photogram.network.subset import image_rows
 from photogram.results.result import Result
 
 __all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
@@ -140,10 +141,7 @@ def at_adjusted(result: Result) -> Block:
         point_positions=np.where(
             result.used_points[:, np.newaxis], result.point_positions, block.point_positions
         ),
-        image_photos=block.image_photos[used],
-        image_points=block.image_points[used],
-        image_xy=block.image_xy[used],
-        image_sd=block.image_sd[used],
+        **image_rows(block, used),
     )
 
 
@@ -161,8 +159,7 @@ def image_depths(block: Block) -> Floats:
         points = geometry.geographic_to_geocentric(points, block.spheroid)
         photos = geometry.geographic_to_geocentric(photos, block.spheroid)
     rays = points[block.image_points] - photos[block.image_photos]
-    depths: Floats = np.einsum("mi,mi->m", rays, directions[block.image_photos])
-    return depths
+    return np.asarray(np.einsum("mi,mi->m", rays, directions[block.image_photos]))
 
 
 def _check_observations(block: Block) -> Block:

@@ -1,35 +1,42 @@
-"""How an adjustment ended, where a reader must be careful: remarks and errors with the names concerned."""
+"""How an adjustment ended, and where a reader must be careful: remarks and errors with names."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.coefficients import named_unknowns
-from photogram.adjustment.undetermined import weak_in_words
-from photogram.errors import AdjustmentError, RankError
+from photogram.adjustment.undetermined import named_unknowns, weak_in_words
+from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
+from photogram.network.motion import on_shared
+from photogram.network.refraction import metres_per_unit
 from photogram.network.trajectories import Coefficient
 
 __all__ = [
     "behind",
+    "check_cameras",
     "folded",
     "hardly_determined",
     "harmful",
     "harmful_points",
     "hidden",
+    "refraction_remarks",
     "rounded",
     "too_coarse",
     "undetermined",
 ]
 
+
 NEAR = 1e-3
 """A point nearer to a station than this part of the median of such distances is at its place."""
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
+HIGHEST_GIANT = 9000.0
+"""Metres: the flying height up to which Appendix F of the GIANT guide holds."""
 
 
 def undetermined(
@@ -253,3 +260,52 @@ def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
         " them by more than their standard deviations, or than image coordinates show: count from an origin"
         " nearby (a standard deviation of 0 fixes a value)"
     )
+
+
+def check_cameras(block: Block) -> None:
+    """Refuse photos taken from below the water.
+
+    Raises
+    ------
+    InputError
+        A photo whose initial position is at the water level or below.
+    """
+    refraction = block.refraction
+    if refraction is None or refraction.water is None:
+        return
+    sunk = np.flatnonzero((block.photo_positions[:, 2] <= refraction.water_level) & ~on_shared(block))
+    if sunk.size:
+        photo = int(sunk[0])
+        height, unit = block.photo_positions[photo, 2], block.linear_unit
+        raise InputError(
+            f"photo {block.photo_ids[photo]} is not above the water: its height is {height:.3f} {unit},"
+            f" the water level {refraction.water_level:.3f} {unit}"
+        )
+
+
+def refraction_remarks(block: Block, photo_positions: NDArray[np.float64]) -> list[Message]:
+    """Say where the models in force do not quite hold.
+
+    Parameters
+    ----------
+    block
+        The block.
+    photo_positions
+        (P, 3) its adjusted stations.
+    """
+    refraction = block.refraction
+    if refraction is None or (refraction.air is None and refraction.water is None):
+        return []
+    messages = []
+    heights = metres_per_unit(block.linear_unit) * photo_positions[:, 2]
+    high = [block.photo_ids[photo] for photo in np.flatnonzero(heights > HIGHEST_GIANT)]
+    if refraction.air == "giant" and high:
+        messages.append(
+            Message(
+                f"the air refraction of GIANT holds up to {HIGHEST_GIANT:g} m, below the photos"
+                f' {listed(high)}: the model "standard" has no such limit'
+            )
+        )
+    if not block.geographic:
+        messages.append(Message("refraction in rectangular space takes Z as the height and the vertical"))
+    return messages

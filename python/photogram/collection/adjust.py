@@ -19,8 +19,7 @@ from photogram.adjustment.adjustment import (
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.collection import Collection
-from photogram.collection.core_arrays import collection_network
-from photogram.collection.failures import named
+from photogram.collection.core_arrays import collection_network, named
 from photogram.collection.result import AdjustedCollection
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.core_arrays import CoreOptions

@@ -12,8 +12,6 @@ from photogram.collection.result import AdjustedCollection
 from photogram.results.group_sums import observables
 from photogram.results.grouping import Grouping, Observables
 
-__all__: list[str] = []
-
 DECREASE = 1e-12
 """Part of the sum of squares by which steps still lower it: components want adjustments that are sharp."""
 

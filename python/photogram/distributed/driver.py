@@ -18,7 +18,7 @@ from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
 from photogram.distributed.datum import InDatum, Mover
 from photogram.distributed.executors import Executor, Handle
-from photogram.distributed.progress import Course
+from photogram.distributed.run import Course
 from photogram.distributed.tasks import (
     Chord,
     Job,
@@ -131,7 +131,7 @@ class Driver:
             state of the last complete iteration stays.
         """
         if resume:
-            self._course = Course.read(self.job)
+            self._course = Course.read(self.job.folder, self.job.source)
         try:
             return self._run()
         except BaseException:
@@ -249,7 +249,7 @@ class Driver:
         course.damping, course.curved = at.damping, at.curved
         course.near = self.stop.reweighted and iteration.largest_change <= RULES["near"]
         course.iterations.append(iteration)
-        course.write(self.job)
+        course.write(self.job.folder, self.job.source)
         if old not in (course.before, course.state):
             self._walks.remove(old)
         self._walks.tell("iteration", iteration.number, 0, iteration)
@@ -270,7 +270,7 @@ class Driver:
                 return self._finish(up)
             self._accept(last, Point(after))
         course.ending = status, course.state, course.state
-        course.write(self.job)
+        course.write(self.job.folder, self.job.source)
         if up.at == Point(course.state):
             return self._finish(up)
         self._walks.forget(up)

@@ -11,7 +11,6 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Indices
 from photogram.distributed.datum import local_row
-from photogram.distributed.engine import Node
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.parts import Names, Part
 from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
@@ -89,7 +88,7 @@ class CoreEngine:
         # The last of its files: with it the node is done.
         write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
 
-    def unknowns(self, run: Path, number: int, node: Node) -> Indices:
+    def unknowns(self, run: Path, number: int, node: _photocore.Node) -> Indices:
         """Return (N, 3) what the unknowns of a node belong to, rows being those of the whole block."""
         part, names = read_node(run, read_manifest(run), number), node.unknown_names
         cameras = np.arange(len(part.block.cameras))

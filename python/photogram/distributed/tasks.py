@@ -12,19 +12,22 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.datum import InDatum, rights_of, with_columns
-from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.shelf import shelf
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import give_back
+
+if TYPE_CHECKING:
+    from photogram._photocore import ContributionRow, FormedNode, Node
+    from photogram.distributed.nodes import CoreEngine
 
 __all__ = [
     "Chord",
@@ -95,7 +98,7 @@ class Job:
     """
 
     folder: Path
-    engine: Engine
+    engine: CoreEngine
     version: str
     threads: int = 0
     memory: int | None = None

@@ -33,11 +33,9 @@ from photogram.network.observations import (
     observation_rows,
     of_records,
 )
-from photogram.network.observations.knots import with_knots
 from photogram.network.observations.observation import Group
-from photogram.network.observations.smoothness import with_smoothness
+from photogram.network.observations.unknowns import with_knots, with_smoothness
 from photogram.network.passages import Figure, Passage, checked_passages
-from photogram.network.photo_cameras import checked_cameras, photo_indices
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
 from photogram.network.tables import (
@@ -45,8 +43,10 @@ from photogram.network.tables import (
     GEOGRAPHIC_COLUMNS,
     RECTANGULAR_COLUMNS,
     Table,
+    checked_cameras,
     different,
     numbered,
+    photo_indices,
     table_arguments,
 )
 from photogram.network.trajectories import Trajectory

@@ -229,8 +229,7 @@ class Reseau(Pattern):
         found = np.zeros((2 * rows * columns,) * 2)
         for k, sd in enumerate(np.asarray(self.sd).tolist()):
             found[k::2, k::2] = np.linalg.inv(np.eye(rows * columns) / sd**2 + stiff)
-        symmetric: Floats = (found + found.T) / 2
-        return symmetric
+        return np.asarray((found + found.T) / 2)
 
 
 def _nodes(photo: str, shifts: Floats, sd: float) -> list[Weights]:

@@ -13,9 +13,9 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.geometry import geographic_to_geocentric
+from photogram.network.motion import timed_images
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
-from photogram.network.trajectory_arrays import timed_images
 from photogram.network.unknowns import Unknown
 
 __all__ = ["camera_of", "projected", "projected_images", "standing"]

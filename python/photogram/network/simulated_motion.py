@@ -26,7 +26,7 @@ from photogram.network.projecting import camera_of, projected_images
 from photogram.network.simulated_layout import Layout
 from photogram.network.trajectories import Polynomial, Readout, Spline
 
-__all__ = ["LineScanner", "RollingShutter", "photo_angles", "photo_axes", "rolled", "rotations_of"]
+__all__ = ["LineScanner", "RollingShutter", "photo_angles", "rolled", "rotations_of"]
 
 _GUSTS = 0.03
 """Standard deviation of a component of a velocity, as part of the speed."""
@@ -151,12 +151,6 @@ def _check_numbers(
             raise InputError(f"{name} must not be negative")
 
 
-def photo_axes(block: Block) -> Floats:
-    """Return (P, 3, 3) the axes of the photos, as columns, in X, Y, Z or in east, north, up there."""
-    matrices = geometry.rotation_matrix(block.photo_attitudes)
-    return matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
-
-
 def photo_angles(axes: Floats, photo_to_ground: bool) -> Floats:
     """Return (P, 3) omega, phi, kappa of photos with (P, 3, 3) axes as columns."""
     return geometry.rotation_angles(axes if photo_to_ground else axes.transpose(0, 2, 1))
@@ -231,7 +225,7 @@ def _with_attitudes(block: Block, truth: Block, draw: Floats) -> Block:
     sd = truth.photo_attitude_sd
     if not ((sd > 0) & np.isfinite(sd)).any():
         return block
-    observed = photo_axes(truth) @ rotations_of(sd * draw)
+    observed = geometry.photo_axes(truth.photo_attitudes, truth.photo_to_ground) @ rotations_of(sd * draw)
     return block.replace(
         photo_attitude_sd=np.inf,
         photo_attitudes_observed=None,

@@ -10,14 +10,14 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
+from photogram.network.motion import about, given_poses
 from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.observations import Attitude, Observation, Position
 from photogram.network.projecting import projected, standing
-from photogram.network.simulated_frames import Taken
+from photogram.network.simulated_images import Taken
 from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_ids, window
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
-from photogram.network.whereabouts import about, given_poses
 
 __all__ = ["Flown", "scanned"]
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.csm.lists import read_list, read_support
@@ -25,9 +24,9 @@ from photogram.formats.project import Project, assembled
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import Message, counted, listed
-from photogram.network.geometry import Spheroid
+from photogram.network.geometry import Cartesian, Spheroid
+from photogram.network.motion import about
 from photogram.network.moving_photos import Timed
-from photogram.network.whereabouts import about
 
 __all__ = ["read"]
 

@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import trajectory_of
 from photogram.messages import quoted
-from photogram.network.whereabouts import given_poses
+from photogram.network.motion import given_poses
 
 __all__ = ["observation_number", "observations_of", "one_flight"]
 

@@ -6,12 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.isis.contents import Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.points import per_metre
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.geometry import local_frames
+from photogram.network.geometry import Cartesian, local_frames
 from photogram.network.motion import focal_images
 from photogram.results.result import Result
 
@@ -99,7 +98,7 @@ class Outcome:
     @cached_property
     def xyz(self) -> Floats:
         """(n, 3) adjusted points, fixed to the body, metres; NaN where left out."""
-        return Cartesian.of(self.result.block).positions(np.array(self.result.point_positions))
+        return Cartesian(self.result.block.spheroid).positions(np.array(self.result.point_positions))
 
     @cached_property
     def latitudes(self) -> Floats:

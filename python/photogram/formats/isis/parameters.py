@@ -10,8 +10,8 @@ from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.contents import Image
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.motion import about
 from photogram.network.trajectories import Trajectory
-from photogram.network.whereabouts import about
 from photogram.results.trajectories import AdjustedTrajectory
 
 __all__ = ["Parameter", "parameters"]

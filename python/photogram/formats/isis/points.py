@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, counted, listed
-from photogram.network.geometry import Spheroid, local_frames
+from photogram.network.geometry import Cartesian, Spheroid, local_frames
 from photogram.network.observations import Control
 
 __all__ = ["KnownPoints", "full_matrices", "given_starts", "known_points", "per_metre"]

@@ -1,7 +1,8 @@
-"""What frames take of the ground of a simulated block."""
+"""What cameras take of the ground of a simulated block: frames, then other cameras in their place."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,15 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network import geometry
+from photogram.network.block import Block
+from photogram.network.cameras import Camera, images_of
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Refraction
 from photogram.network.simulated_layout import Layout, candidates, photo_ids
 from photogram.network.simulated_motion import RollingShutter
+from photogram.network.tables import checked_cameras
 
-__all__ = ["Taken", "photograph", "seen_side"]
+__all__ = ["Taken", "photograph", "photographed", "seen_side"]
 
 
 @dataclass(frozen=True)
@@ -115,3 +119,54 @@ def seen_side(
     if not side > frame_size / 2:
         raise InputError("readout: the photos move too far while they are read")
     return side
+
+
+def photographed(
+    truth: Block, block: Block, cameras: Sequence[Camera], start_cameras: Sequence[Camera] | None
+) -> tuple[Block, Block]:
+    """Let cameras take the photos of a simulated block in turn.
+
+    The errors of image coordinates and their standard deviations are those of the block, as angles near the
+    axis: in the unit of a camera they grow with its principal distance.
+
+    Parameters
+    ----------
+    truth, block
+        The block without errors and the one with them, both with one principal distance.
+    cameras
+        The true ones; the first photo has the first.
+    start_cameras
+        What is known of them: with these the block starts, and what is unknown of them is so there. None:
+        they are known.
+
+    Returns
+    -------
+    The two blocks with cameras.
+
+    Raises
+    ------
+    InputError
+        What are no cameras of one unit, another number of them to start with, a point that no image shows.
+    """
+    start = cameras if start_cameras is None else checked_cameras(start_cameras)
+    if len(start) != len(cameras) or start[0].unit != cameras[0].unit:
+        raise InputError("start_cameras are as many as cameras, and in their unit")
+    distance = truth.known_distances("the simulation")[0]
+    photo_cameras = np.arange(len(truth.photo_ids)) % len(cameras)
+    of_images = photo_cameras[truth.image_photos]
+    directions = np.column_stack([truth.image_xy, np.full(len(truth.image_xy), distance)])
+    # The camera looks along -z, whatever the sign of the principal distance.
+    images = images_of(cameras, of_images, -np.sign(distance) * directions)
+    if not np.isfinite(images).all():
+        name = cameras[of_images[np.flatnonzero(~np.isfinite(images).all(axis=1))[0]]].title
+        raise InputError(f"the camera {name} has no image of some points: they are beyond its lens terms")
+    larger = np.array([each.scale for each in cameras])[of_images, np.newaxis] / abs(distance)
+    changes = {
+        "principal_distances": None,
+        "photo_cameras": photo_cameras,
+        "image_sd": truth.image_sd * larger,
+    }
+    return (
+        truth.replace(**changes, cameras=cameras, image_xy=images),
+        block.replace(**changes, cameras=start, image_xy=images + larger * (block.image_xy - truth.image_xy)),
+    )
