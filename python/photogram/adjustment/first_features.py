@@ -26,22 +26,13 @@ FLAT = 1e-3
 
 
 def started(block: Block) -> Block:
-    """Return a block whose common unknowns all have values to start from.
+    """Return a block with poses whose common unknowns all have values to start from.
 
     Planes and lines follow the principal axes of their points, which stand at their given places or where
     their rays meet; plumb lines go through their middle, levels have their mean height. A boresight is the
     chordal mean of A' A_obs, a sensor the median of positions and the chordal mean of rotations in the frames
-    of its photos (the rotation nearest to the mean of matrices).
-
-    Parameters
-    ----------
-    block
-        With poses of the photos that are needed.
-
-    Raises
-    ------
-    InputError
-        An unknown whose points or photos do not give it.
+    of its photos (the rotation nearest to the mean of matrices). InputError: an unknown whose points or
+    photos do not give it.
     """
     waiting = [each for each in block.unknowns if each.is_open]
     if not waiting:

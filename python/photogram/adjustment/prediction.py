@@ -119,14 +119,8 @@ def _frame_images(block: Block) -> Floats:
 def at_adjusted(result: Result) -> Block:
     """Return the block of an adjustment with adjusted for given values, ready for :func:`predict`.
 
-    Images of points that were left out are left out too.
-
-    Raises
-    ------
-    AdjustmentError
-        The adjustment has not converged.
-    InputError
-        Photos on trajectories.
+    Images of points that were left out are left out too. AdjustmentError: the adjustment has not converged;
+    InputError: photos on trajectories.
     """
     if not result.converged:
         raise AdjustmentError(f"the adjustment has {result.status}: its positions are no plan")

@@ -54,15 +54,7 @@ def undetermined(
 
 
 def hardly_determined(status: str, weak: str, words: str = "") -> Message:
-    """Remark on a combination of unknowns that no step could follow to its end.
-
-    Parameters
-    ----------
-    status
-        Of the adjustment.
-    weak, words
-        The unknowns that it moves, and what that is, if anybody knows.
-    """
+    """Remark on unknowns, `weak`, that no step could follow to their end, and what that is in `words`."""
     ends = "stands still, but" if status == "converged" else "creeps:"
     return Undetermined(
         f"the sum of squares {ends} the observations hardly determine a combination of"
@@ -95,12 +87,8 @@ def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 def harmful_points(weak: Sequence[tuple[int, float, float]], point_ids: Sequence[str]) -> list[Message]:
     """Remark on points at a station's own place, and on nearly parallel rays.
 
-    Parameters
-    ----------
-    weak
-        Points, how much worse they are along their rays than across, and their distance from a station.
-    point_ids
-        The names of all points.
+    Weak are points with how much worse they are along their rays than across, and their distance from a
+    station.
     """
     near = [(point, distance) for point, _, distance in weak if distance < NEAR]
     flat = [(point, ratio) for point, ratio, distance in weak if distance >= NEAR]
@@ -159,13 +147,7 @@ def _unknowns(
 
 
 def rounded(excess: float | None) -> list[Message]:
-    """Remark on cofactors and redundancy numbers that rounding has reached.
-
-    Parameters
-    ----------
-    excess
-        Sum of all redundancy numbers minus the degrees of freedom; None where it is not known.
-    """
+    """Remark on cofactors that rounding has reached: redundancy numbers sum up to so much in excess."""
     if excess is None or abs(excess) <= NOTABLE_EXCESS:
         return []
     return [
@@ -191,13 +173,8 @@ def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions.
 
     Points that are known give the ray, so that camera, pose or coordinates are wrong by more than an error of
-    measurement: that is an error. Where the point itself is unknown, one image may be a mistake, which its
-    residual shows: that is a remark, and the result is there to look for it.
-
-    Raises
-    ------
-    AdjustmentError
-        The point of such an image has given coordinates.
+    measurement: that is an AdjustmentError. Where the point itself is unknown, one image may be a mistake,
+    which its residual shows: that is a remark, and the result is there to look for it.
     """
     images = np.asarray(solution.images_folded)
     if not len(images):
@@ -236,14 +213,9 @@ def _fold_of(block: Block, solution: _photocore.BlockSolution, image: int) -> st
 
 
 def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
-    """Remark on image points whose point stands behind the camera: no ray can have made them.
+    """Remark on images, so many, whose point stands behind the camera: no ray can have made them.
 
-    Parameters
-    ----------
-    images
-        How many there are; zero for no remark.
-    points, photos
-        Names of what is concerned; no photos where there is one only.
+    No photos are named where there is one only.
     """
     if not images:
         return []
@@ -263,13 +235,7 @@ def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
 
 
 def check_cameras(block: Block) -> None:
-    """Refuse photos taken from below the water.
-
-    Raises
-    ------
-    InputError
-        A photo whose initial position is at the water level or below.
-    """
+    """Refuse photos taken from below the water."""
     refraction = block.refraction
     if refraction is None or refraction.water is None:
         return
@@ -284,15 +250,7 @@ def check_cameras(block: Block) -> None:
 
 
 def refraction_remarks(block: Block, photo_positions: NDArray[np.float64]) -> list[Message]:
-    """Say where the models in force do not quite hold.
-
-    Parameters
-    ----------
-    block
-        The block.
-    photo_positions
-        (P, 3) its adjusted stations.
-    """
+    """Say where the models in force do not quite hold, for (P, 3) adjusted stations."""
     refraction = block.refraction
     if refraction is None or (refraction.air is None and refraction.water is None):
         return []

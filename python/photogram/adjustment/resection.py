@@ -321,13 +321,7 @@ class Observed:
         principal_distance: float,
         point_ids: Sequence[str] | None,
     ) -> Self:
-        """Check what a caller gave.
-
-        Raises
-        ------
-        InputError
-            Another shape, a value that is not finite, or a standard deviation that is none.
-        """
+        """Return what a caller gave; InputError of another shape, or of values that cannot be."""
         count = length("image_xy", xy)
         ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
         if len(ids) != count:
@@ -371,12 +365,7 @@ def solve(
 ) -> _photocore.ResectionSolution:
     """Resect with everything the core offers: :func:`resect` and the programs on top of it call this.
 
-    Raises
-    ------
-    RankError
-        The pose is not determined; the message says why.
-    AdjustmentError
-        Any other failure.
+    RankError: the pose is not determined; the message says why. AdjustmentError: any other failure.
     """
     try:
         return _photocore.resect(

@@ -154,13 +154,7 @@ def snooped_network(
 def settings_of(
     level: float, fdr: float | None, unit_weight: str, robust: bool | None, max_rounds: int
 ) -> Settings:
-    """Return checked options.
-
-    Raises
-    ------
-    InputError
-        One that cannot be.
-    """
+    """Return checked options."""
     one_of("unit_weight", unit_weight, ("known", "unknown"))
     if robust is not None:
         truth_value("robust", robust)
@@ -240,16 +234,8 @@ def finished(
 ) -> Snooped:
     """Return what snooping gives, with what it has to say among the messages of its result.
 
-    Parameters
-    ----------
-    result
-        The adjustment without what is out.
-    trial, outcome, settings
-        What was tried, and what came of it.
-    held
-        Tests what is held in an adjustment of everything: it may explain more than what was taken out.
-    exchanged
-        Names that are exchanged.
+    The result is without what is out; `held` tests what is held in an adjustment of everything: it may
+    explain more than what was taken out.
     """
     largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
     said = list(outcome.remarks)

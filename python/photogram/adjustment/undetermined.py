@@ -278,18 +278,8 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
 def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> str:
     """Return what parameters of cameras and parts of poses cannot be told apart, and what would help.
 
-    Parameters
-    ----------
-    names
-        The parameters.
-    poses
-        `along`, `across`, `tilt`, `swing`.
-    setting
-        How the photos stand; None where that is not known.
-
-    Returns
-    -------
-    Nothing for what has no name.
+    Parts are `along`, `across`, `tilt`, `swing`; None stands for a setting that is not known. Nothing for
+    what has no name.
     """
     at = setting or Setting()
     radial = {name for name in names if name[0] in "KkA" and name[1:].isdigit()}
@@ -350,15 +340,7 @@ def _of_setting(names: set[str], at: Setting) -> str:
 
 
 def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
-    """Name common unknowns; coefficients not one by one, but by their trajectories and, of splines, times.
-
-    Parameters
-    ----------
-    block
-        Which has them.
-    unknowns
-        Each once or more often.
-    """
+    """Name common unknowns, each once; coefficients by their trajectories and, of splines, times."""
     found = list(dict.fromkeys(each.title for each in unknowns if not isinstance(each, Coefficient)))
     wanted = {id(each) for each in unknowns if isinstance(each, Coefficient)}
     if not wanted:
@@ -389,16 +371,9 @@ def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
 def outside(block: Block, photo: int, points: Sequence[int], seconds: Sequence[float]) -> str:
     """Say what is at a time that its trajectory does not reach.
 
-    Parameters
-    ----------
-    block
-        The block.
-    photo
-        Its index; records on trajectories stand behind the photos.
-    points
-        The point of its image at that time; none where it is the photo itself, or a record.
-    seconds
-        That time, and the first and the last that the trajectory reaches, from its origin.
+    Records on trajectories stand behind the photos; `points` has the point of the image, none where it is the
+    photo itself, or a record. `seconds` are that time, and the first and the last that the trajectory
+    reaches, from its origin.
     """
     count = len(block.photo_ids)
     if photo < count:
@@ -419,14 +394,9 @@ def outside(block: Block, photo: int, points: Sequence[int], seconds: Sequence[f
 
 
 def of_motion(kinds: set[str], *, placed: bool) -> str:
-    """Say what unknowns of motion cannot be told apart, and what would help; nothing for others.
+    """Say what unknowns of motion of such kinds cannot be told apart, and what would help; else nothing.
 
-    Parameters
-    ----------
-    kinds
-        The types of the unknowns that move together.
-    placed
-        Whether there is control, or anything beside images, so that it may not be the datum that is open.
+    `placed`: there is control, or anything beside images, so that it may not be the datum that is open.
     """
     coefficients = kinds & {"position coefficient", "rotation coefficient"}
     if "readout" in kinds and coefficients:

@@ -282,19 +282,9 @@ class Run:
     def adjust(
         self, progress: Callable[[Progress], None] | None = None, block: Block | None = None
     ) -> Outcome:
-        """Adjust, or go on where a run that died has ended.
+        """Adjust, or go on where a run that died has ended; as :func:`photogram.adjust` raises.
 
-        Parameters
-        ----------
-        progress
-            Told of what is going on.
-        block
-            What was divided: it is needed where it is to be taken to a datum.
-
-        Raises
-        ------
-        RankError, AdjustmentError, OutOfMemoryError, InputError
-            As :func:`photogram.adjust`.
+        `block` is what was divided: it is needed where it is to be taken to a datum.
         """
         self.plan(measured=False).check()
         options = self.manifest.options
@@ -324,25 +314,9 @@ def opened(
 ) -> Iterator[Run]:
     """Open a run: connect to workers, and divide the block unless its parts lie there already.
 
-    Parameters
-    ----------
-    folder
-        Of the run.
-    source
-        What tells the block and the options from others.
-    photos
-        How many the block has.
-    counted
-        Counts the work of a number of parts.
-    divided
-        Writes a number of parts into the folder.
-    division, threads
-        As of :func:`photogram.adjust_in_parts`; the folder of the division is not looked at.
-
-    Raises
-    ------
-    InputError
-        Options that cannot be, workers that cannot work together, a folder of another run.
+    `counted` counts the work of a number of parts, `divided` writes them into the folder; the folder of the
+    division is not looked at. InputError: options that cannot be, workers that cannot work together, a folder
+    of another run.
     """
     memory = division.memory_bytes
     with ExitStack() as stack:
@@ -374,17 +348,7 @@ def opened(
 
 
 def _parts_for(counted: Callable[[int], Counts], photos: int, workers: int, room: int | None) -> int:
-    """Return how many parts a block is cut into: some for each worker, and small enough for its memory.
-
-    Parameters
-    ----------
-    counted
-        Counts the work of a number of parts.
-    photos
-        How many the block has.
-    workers, room
-        How many workers, and the bytes that each has for nodes.
-    """
+    """Return how many parts a block is cut into: some for each worker, whose bytes for nodes are `room`."""
     most = max(photos // LEAST_PHOTOS, 1)
     parts = min(PARTS_A_WORKER * workers if workers > 1 else 2, most)
     while room is not None and 2 * parts <= most:

@@ -48,14 +48,9 @@ IMAGE_BYTES = 1300.0
 
 @dataclass(frozen=True)
 class Incidence:
-    """Which vertices some edges touch, in no order; an edge stands in one incidence alone.
+    """Which (k,) vertices (k,) edges touch, in no order; an edge stands in one incidence alone.
 
-    Attributes
-    ----------
-    vertices, edges
-        (k,) each vertex of each edge; edges are counted from 0 here.
-    count
-        How many edges there are.
+    Edges are counted from 0 here; `count` is how many there are.
     """
 
     vertices: Indices
@@ -107,15 +102,7 @@ class Tree(Valued):
 
 @dataclass(frozen=True)
 class Cut:
-    """Photos in the nodes of a tree.
-
-    Attributes
-    ----------
-    tree
-        The tree.
-    owners
-        (V,) the node of each vertex.
-    """
+    """Photos in the nodes of a tree: `owners` are (V,) the node of each vertex."""
 
     tree: Tree
     owners: Indices
@@ -143,18 +130,10 @@ def tree_of(parts: int) -> Tree:
 
 
 def cut(positions: Floats, weights: Floats, incidences: Callable[[], Iterable[Incidence]], parts: int) -> Cut:
-    """Cut photos into parts with separators.
+    """Cut photos at (V, 3) positions, in one unit of length, with (V,) weights, into parts with separators.
 
-    Parameters
-    ----------
-    positions
-        (V, 3) in one unit of length.
-    weights
-        (V,) what a photo weighs: its image points.
-    incidences
-        Gives all edges, some at a time; called once for each level of the tree.
-    parts
-        How many.
+    `incidences` gives all edges, some at a time; it is called once for each level of the tree. A photo weighs
+    its image points.
     """
     tree = tree_of(parts)
     owners = np.full(len(positions), -1, dtype=np.int64)
@@ -299,20 +278,10 @@ def counted_work(
     parts: int,
     unknowns: float = UNKNOWNS,
 ) -> tuple[Tree, Counts]:
-    """Count the work of a block in parts.
+    """Count the work of a block in parts, with (P, 3) positions and (P,) image points of its photos.
 
-    Parameters
-    ----------
-    positions
-        (P, 3) of the photos, in one unit of length.
-    images
-        (P,) image points of each.
-    incidences
-        Which photos the points tie; those of a thinned block do.
-    parts
-        How many; cut further, twice as fine again and again, for counting.
-    unknowns
-        Of a photo: of its pose, and of its film.
+    `incidences` are what points tie, in a thinned block perhaps; `unknowns` are of a photo, its pose and
+    film.
     """
     pieces = 1
     while len(positions) / (parts * pieces * 2) >= SMALLEST:

@@ -95,17 +95,7 @@ class Outcome:
 
 
 class Driver:
-    """Adjusts in parts.
-
-    Parameters
-    ----------
-    job, tree, executor, progress
-        As of :class:`photogram.distributed.walks.Walks`.
-    stop
-        When to stop.
-    mover
-        Takes the block to a datum when it is adjusted.
-    """
+    """Adjusts in parts; `mover` takes the block to a datum when it is adjusted."""
 
     def __init__(
         self,
@@ -122,13 +112,9 @@ class Driver:
     def run(self, *, resume: bool = False) -> Outcome:
         """Adjust; with `resume` from the last complete iteration that the folder of the run has.
 
-        Raises
-        ------
-        RankError
-            The observations do not determine all unknowns.
-        AdjustmentError
-            The initial values give no finite sum of squares; a disk is full, a worker was lost too often: the
-            state of the last complete iteration stays.
+        RankError: the observations do not determine all unknowns. AdjustmentError: the initial values give no
+        finite sum of squares; a disk is full, a worker was lost too often: the state of the last complete
+        iteration stays.
         """
         if resume:
             self._course = Course.read(self.job.folder, self.job.source)
@@ -204,9 +190,7 @@ class Driver:
     def _take(self, up: Up, change: float, *, chord: bool) -> tuple[Up, bool]:
         """Take a step, and a chord after it where that pays, or take it back and go on with more damping.
 
-        Returns
-        -------
-        What is formed next, and whether the sum of squares has stood still there.
+        Returns what is formed next, and whether the sum of squares has stood still there.
         """
         course, damping = self._course, up.at.damping
         after, course.chord = self._step(up), None
@@ -344,9 +328,7 @@ class Driver:
     def _settled(self, sums: tuple[float, float, float, float]) -> tuple[float, float | None]:
         """Have the nodes scale what they have found by q / r, of all but photos (docs/weights.md).
 
-        Returns
-        -------
-        The sum of redundancy numbers r and the variance of unit weight; None without redundancy.
+        Returns the sum of redundancy numbers r and the variance of unit weight; None without redundancy.
         """
         found = self._walks.all(redundancies, phase="invert")
         freedom = math.fsum(own for _, *measured in found for own in measured)

@@ -49,16 +49,10 @@ class Executor(Protocol):
     def submit(
         self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
     ) -> Handle:
-        """Have a task done, where possible on a certain worker.
+        """Have a task done; handles among the arguments, and in lists among these, are replaced.
 
-        Parameters
-        ----------
-        function, arguments
-            The task; handles among the arguments, and in lists among these, are replaced.
-        near
-            Where another one was done; empty for anywhere.
-        cost
-            The higher, the earlier it is done of those that wait.
+        `near` is where another one was done, empty for anywhere; the higher its `cost`, the earlier it is
+        done of those that wait.
         """
 
     def places(self) -> list[str]:
@@ -78,13 +72,7 @@ class Executor(Protocol):
 
 
 class Serial:
-    """Does every task at once, in this process; what tasks give is kept on disk.
-
-    Parameters
-    ----------
-    directory
-        Where temporary files go; None for the one of the system.
-    """
+    """Does every task at once, in this process; what tasks give is kept on disk, in the `directory`."""
 
     def __init__(self, directory: Path | None = None) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="photogram-", dir=directory))
@@ -155,15 +143,10 @@ class _Handle(int):
 
 
 class Workers:
-    """Has tasks done by the workers of a cluster.
+    """Has tasks done by the workers of a cluster, by a client that is connected to its scheduler.
 
     Lost results are computed again by Dask itself: tasks are functions of what they are given. Where a task
     asks for a factor that was lost with a worker, the driver has it formed again.
-
-    Parameters
-    ----------
-    client
-        Connected to the scheduler.
     """
 
     def __init__(self, client: Client) -> None:
@@ -227,21 +210,10 @@ class Workers:
 
 @contextmanager
 def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator[Client]:
-    """Connect to a scheduler, or start a cluster on this machine.
+    """Connect to a scheduler, or start a cluster on this machine of so many workers and bytes of each.
 
-    Parameters
-    ----------
-    cluster
-        A client, which is left as it is; `local`; or the address of a scheduler.
-    workers, memory
-        Of a cluster on this machine: how many, and bytes of each.
-
-    Raises
-    ------
-    InputError
-        Nobody answers at the address.
-    ModuleNotFoundError
-        dask.distributed is not installed.
+    `cluster` is a client, which is left as it is, `local`, or an address. InputError: nobody answers there.
+    ModuleNotFoundError: dask.distributed is not installed.
     """
     import dask
 
@@ -282,17 +254,10 @@ def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator
 
 
 def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
-    """Count the workers, and refuse what cannot work together.
+    """Count the workers, and refuse what cannot work together: versions that differ, a folder not seen.
 
-    Returns
-    -------
-    How many there are; the least memory of one, None where nothing bounds it; the most that one holds
+    Returns how many there are; the least memory of one, None where nothing bounds it; the most that one holds
     before it begins, all that it needs being loaded.
-
-    Raises
-    ------
-    InputError
-        No worker, another version of the package on one of them, or one that does not see the folder.
     """
     versions: dict[str, str] = client.run(_version)
     if not versions:

@@ -34,15 +34,7 @@ class CoreEngine:
     """Nodes of the core."""
 
     def node(self, run: Path, number: int) -> _photocore.Node:
-        """Return a node.
-
-        Raises
-        ------
-        InputError
-            Its part is missing or damaged.
-        RankError, AdjustmentError, OutOfMemoryError
-            It cannot be adjusted; names the photos and points concerned.
-        """
+        """Return a node; InputError of a damaged part, else as :func:`photogram.adjust` raises."""
         manifest = read_manifest(run)
         part = read_node(run, manifest, number)
         own = len(part.block.unknowns)
@@ -123,13 +115,7 @@ def _write(folder: Path, result: Result) -> None:
 
 
 def read_outcome(folder: Path) -> dict[str, Any]:
-    """Return what the tables of a node have no place for.
-
-    Raises
-    ------
-    InputError
-        It is missing or damaged.
-    """
+    """Return what the tables of a node have no place for; InputError where it is missing or damaged."""
     path = folder / OUTCOME
     found: dict[str, Any] = Decoder([], path).value(read_json(path))
     return found

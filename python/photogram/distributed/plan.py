@@ -181,14 +181,9 @@ class PartsPlan:
 
 
 def measured_rates(part: _photocore.Node, bandwidth: float = 1e9) -> Rates:
-    """Measure what this process does in a second, at one part.
+    """Measure what this process does in a second, at one part, formed and inverted for nothing else.
 
-    Parameters
-    ----------
-    part
-        A part, formed and inverted here, at what it starts from, for nothing else.
-    bandwidth
-        Bytes a second between workers: 10 Gbit Ethernet.
+    `bandwidth` is in bytes a second between workers: 10 Gbit Ethernet.
     """
     prediction = part.prediction
     size = len(part.outer)
@@ -218,15 +213,7 @@ def _product_rate() -> float:
 
 @dataclass(frozen=True)
 class Rates:
-    """What a worker does in a second.
-
-    Attributes
-    ----------
-    formation, factor, inverse
-        Multiply-adds.
-    bandwidth
-        Bytes to or from another worker.
-    """
+    """What a worker does in a second: multiply-adds, and bytes to or from another worker."""
 
     formation: float
     factor: float
@@ -236,15 +223,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds on some workers.
-
-    Attributes
-    ----------
-    up, down, inversion
-        Forming and reducing once; solving once; inverting.
-    moved_up, moved_down, moved_inversion
-        Bytes that go from one worker to another in these.
-    """
+    """Seconds on some workers: forming and reducing, solving, inverting once; bytes moved in these."""
 
     up: float
     down: float
@@ -267,22 +246,11 @@ def scheduled(
     workers: int,
     bandwidth: float,
 ) -> Times:
-    """Work a tree off.
+    """Work a tree off: seconds of each node up, down and in the inversion, (N,), and its `traffic` in bytes.
 
     A task that is ready goes to the worker that is free first; one with children to that of one of them,
     where it can begin earlier. The way down goes where the factors are. A worker receives one message at a
-    time.
-
-    Parameters
-    ----------
-    tree
-        The tree.
-    up, down, inversion
-        (N,) seconds of each node.
-    traffic
-        (N,) bytes of each node up, down in a step, down in the inversion.
-    workers, bandwidth
-        How many, and bytes a second.
+    time, of so many bytes a second.
     """
     time, moved, placed = _up(tree, up, traffic[0], workers, bandwidth)
     step, step_moved = _down(tree, down, traffic[1], placed, workers, bandwidth)

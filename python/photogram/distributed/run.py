@@ -127,23 +127,9 @@ def partition(
     source: str,
     datum: DatumRow | None = None,
 ) -> Manifest:
-    """Cut a block that is in memory into parts on disk.
+    """Cut a block with all poses and common unknowns into parts on disk, in a folder that is made.
 
-    Parameters
-    ----------
-    block
-        With poses of all photos and values of common unknowns.
-    run
-        The folder, which is made.
-    parts
-        How many.
-    options, source, datum
-        As in :class:`Manifest`.
-
-    Raises
-    ------
-    AdjustmentError
-        The folder cannot be written to; a datum is asked for, and the block is not free.
+    AdjustmentError: the folder cannot be written to; a datum is asked for, and the block is not free.
     """
     held = held_for_datum(block, options)
     if datum is not None and not held:
@@ -170,10 +156,7 @@ def partition(
 def held_for_datum(block: Block, options: CoreOptions) -> list[tuple[int, int]]:
     """Return what an adjustment of a whole block would hold, nothing else giving a datum.
 
-    Raises
-    ------
-    RankError, AdjustmentError
-        As of :func:`photogram.adjust`, before its first iteration.
+    RankError, AdjustmentError: as of :func:`photogram.adjust`, before its first iteration.
     """
     if np.isfinite(block.point_sd[np.unique(block.image_points)]).any():
         return []
@@ -193,25 +176,9 @@ def divided(
     held: list[tuple[int, int]],
     datum: DatumRow | None = None,
 ) -> Manifest:
-    """Write the parts of a block, one after the other.
+    """Write the parts of a block, one after the other: `part_at` is told what nodes below hand up.
 
-    Parameters
-    ----------
-    block
-        The block, or all of it but points and images.
-    run, options, source
-        As of :func:`partition`.
-    held, datum
-        As in :class:`Manifest`.
-    tree
-        The tree.
-    part_at
-        Gives the part of a node, told what nodes below hand up.
-
-    Raises
-    ------
-    AdjustmentError
-        The folder cannot be written to.
+    The block may be without points and images. AdjustmentError: the folder cannot be written to.
     """
     shared, of_unknowns, alone = shared_cameras(block), photos_of_unknowns(block), alone_of(block)
     outer: list[Names] = []
@@ -285,13 +252,7 @@ def write_manifest(run: Path, manifest: Manifest) -> None:
 
 
 def read_manifest(run: Path) -> Manifest:
-    """Read what :func:`write_manifest` has written.
-
-    Raises
-    ------
-    InputError
-        It is missing, damaged or of another version.
-    """
+    """Read what :func:`write_manifest` has written; InputError of another version, or of damage."""
     document = read_json(run / MANIFEST)
     if document.get("version") != _photocore.__version__:
         raise InputError(
@@ -319,13 +280,7 @@ def _as_tuple(value: Any) -> Any:
 
 
 def read_node(run: Path, manifest: Manifest, number: int) -> Part:
-    """Read the part of a node.
-
-    Raises
-    ------
-    InputError
-        It is missing, damaged, or that of another node or run.
-    """
+    """Read the part of a node; InputError where it is missing, damaged, of another node or run."""
     return read_part(part_folder(run, number), manifest.seals[number])
 
 
@@ -403,10 +358,7 @@ class Course:
     def read(cls, run: Path, source: str) -> Course:
         """Return what the folder of the run has; the beginning where it has nothing.
 
-        Raises
-        ------
-        InputError
-            It is damaged, or the progress of another run.
+        InputError: it is damaged, or the progress of another run.
         """
         if not (run / PROGRESS).is_file():
             return cls()

@@ -62,14 +62,9 @@ GIVEN = "0"
 
 @dataclass(frozen=True)
 class Lost:
-    """What a task gives whose node has lost its factor: it has to be formed again.
+    """What a task gives whose node, of this number, has lost its factor: it has to be formed again.
 
     No error, which Dask would log as a failure.
-
-    Attributes
-    ----------
-    number
-        The node.
     """
 
     number: int
@@ -164,12 +159,7 @@ def state_path(folder: Path, number: int, state: str) -> Path:
 def formed(job: Job, number: int, at: Point, contributions: Sequence[Contribution]) -> Contribution:
     """Form a node at a state and eliminate what is at home there; its factor stays on the shelf.
 
-    Raises
-    ------
-    RankError
-        Its observations leave something undetermined.
-    AdjustmentError, InputError, OutOfMemoryError
-        As the engine.
+    RankError: its observations leave something undetermined.
     """
     with shelf.lock:
         start = time.perf_counter()
@@ -213,9 +203,7 @@ def about(contribution: Contribution) -> Formed:
 def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[Floats] | Lost:
     """Solve a node for its step, given that of the outer unknowns, and write the state after it.
 
-    Returns
-    -------
-    The steps of what each child is over; or that its factor is lost.
+    Returns the steps of what each child is over; or that its factor is lost.
     """
     with shelf.lock:
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
@@ -230,18 +218,8 @@ def reduced_chord(
 ) -> Chord | None:
     """Reduce the right-hand side that the equations of a node have after a step; its factor is of before.
 
-    Parameters
-    ----------
-    job, number, at
-        As in :func:`formed`.
-    after
-        The state after the step.
-    below
-        What the children have left.
-
-    Returns
-    -------
-    What is left; None where a factor is lost, or has not kept what this takes: no chord is worth another one.
+    `after` is the state after the step, `below` what the children have left. None where a factor is lost, or
+    has not kept what this takes: no chord is worth another one.
     """
     left = [each.left for each in below if each is not None]
     with shelf.lock:
@@ -264,16 +242,7 @@ def solved_chord(
 ) -> list[Floats] | Lost:
     """Solve a node for a chord, given that of the outer unknowns, and write the state `further` after it.
 
-    Parameters
-    ----------
-    job, number, at, after, below
-        As in :func:`reduced_chord`.
-    outer, further
-        As `outer` and `after` in :func:`solved`.
-
-    Returns
-    -------
-    The chords of what each child is over; or that its factor is lost.
+    Returns the chords of what each child is over; or that its factor is lost. Else as :func:`reduced_chord`.
     """
     with shelf.lock:
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
@@ -323,18 +292,9 @@ def inverted(
 ) -> Inverted | Lost:
     """Invert a node, and write what has become of its observations and unknowns; or say which factor is lost.
 
-    Parameters
-    ----------
-    job, number, at
-        As in :func:`formed`; the factor is used up.
-    after
-        The state reached.
-    variance
-        The variance of unit weight of the whole.
-    above, place
-        What the parent has handed down, and which of its children this one is; None for the root.
-    datum
-        Where the block was moved to a datum, what takes cofactors there.
+    The factor at a point is used up. `after` is the state reached, `variance` that of unit weight of the
+    whole, `above` what the parent has handed down, None for the root, `place` which of its children this is.
+    Where the block was moved to a datum, `datum` takes cofactors there.
     """
     if isinstance(above, Lost):
         return above
@@ -391,8 +351,6 @@ def settled(job: Job, number: int, variance: float | None) -> None:
 def counted(job: Job, number: int) -> tuple[int, int, int, int, int, int]:
     """Return how many observations and unknowns are at home in a node.
 
-    Returns
-    -------
     Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
     unknowns, fixed ones too; 1 where its last steps may fall slowly, so that a chord pays.
     """

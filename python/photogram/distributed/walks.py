@@ -41,13 +41,7 @@ class Up:
 
 
 class LostFactorError(PhotogramError):
-    """The factor of a node is lost: it has to be formed again.
-
-    Parameters
-    ----------
-    number
-        The node.
-    """
+    """The factor of a node is lost: it has to be formed again."""
 
     def __init__(self, number: int) -> None:
         super().__init__(f"the factor of node {number} is lost")
@@ -55,19 +49,7 @@ class LostFactorError(PhotogramError):
 
 
 class Walks:
-    """Walks over the tree.
-
-    Parameters
-    ----------
-    job
-        What tasks are told.
-    tree
-        The tree of the nodes.
-    executor
-        Does the tasks.
-    progress
-        Told of parts done.
-    """
+    """Walks over the tree of the nodes: `job` is what tasks are told, `progress` is told of parts done."""
 
     def __init__(
         self,
@@ -269,14 +251,8 @@ class Reforming:
     """Nodes that are formed again, one at a time on each worker.
 
     A factor that waits for its task is the first that a worker gives up for another: the next one is formed
-    there when the task is over.
-
-    Parameters
-    ----------
-    form
-        Has a node formed; returns the handle of what tells that it is.
-    place
-        The worker of a node.
+    there when the task is over. `form` has a node formed, and returns the handle of what tells that it is;
+    `place` gives the worker of a node.
     """
 
     def __init__(self, form: Callable[[int], Handle], place: Callable[[int], str]) -> None:

@@ -400,17 +400,7 @@ class Camera(Valued, Brief):
 
 
 def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> Floats:
-    """Return (m, 2) the images of directions, each by its camera.
-
-    Parameters
-    ----------
-    cameras
-        The cameras.
-    which
-        (m,) the index of each direction's camera.
-    directions
-        (m, 3) as for :meth:`Camera.project`.
-    """
+    """Return (m, 2) images of (m, 3) directions, as for :meth:`Camera.project`, each by its camera's row."""
     images = np.full((len(directions), 2), np.nan)
     for row, camera in enumerate(cameras):
         own = which == row

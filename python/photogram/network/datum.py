@@ -101,25 +101,13 @@ class MinimumConstraints:
 
 
 def check_datum(datum: object) -> None:
-    """Refuse what is no datum to choose.
-
-    Raises
-    ------
-    InputError
-        It is none.
-    """
+    """Refuse what is no datum to choose."""
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
 
 
 def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
-    """Return inner constraints as the core knows them.
-
-    Raises
-    ------
-    InputError
-        Points or photos that are not in the block.
-    """
+    """Return inner constraints as the core knows them; InputError of what is not in the block."""
 
     def rows(kind: str, wanted: Sequence[str] | None) -> list[int]:
         ids = block.photo_ids if kind == "photo" else block.point_ids
@@ -132,10 +120,7 @@ def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
 def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int, int] | None] | None:
     """Return what is to be held as the core knows it; None where it is left to the core.
 
-    Raises
-    ------
-    InputError
-        A photo or coordinate that is not there.
+    InputError: a photo or coordinate that is not there.
     """
     if datum.photo is None:
         return None

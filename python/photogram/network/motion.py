@@ -39,13 +39,7 @@ __all__ = [
 
 
 def refuse_datum(block: Block, what: str) -> None:
-    """Refuse to choose a datum for trajectories: what moves one as a whole is not worked out.
-
-    Raises
-    ------
-    InputError
-        A photo, or observations, on a trajectory, named.
-    """
+    """Refuse to choose a datum for trajectories: what moves one as a whole is not worked out."""
     refuse_trajectories(block, what, "and the datum of trajectories is that of the observations")
 
 
@@ -117,18 +111,10 @@ def timed_images(block: Block) -> Iterator[tuple[Timed, Trajectory, int, Indices
 
 
 def about(trajectory: Trajectory, time: float) -> tuple[Floats, Floats]:
-    """Return the pose of a trajectory by what is given of its corrections.
+    """Return the pose of a trajectory at a time by what is given of its corrections.
 
-    Parameters
-    ----------
-    trajectory
-        The trajectory.
-    time
-        Seconds; beyond what it reaches the pose is that of its end.
-
-    Returns
-    -------
-    (3,) X, Y, Z, geocentric where the object space is geographic, and (3, 3) the axes of the photo in these.
+    Beyond what it reaches the pose is that of its end: (3,) X, Y, Z, geocentric where the object space is
+    geographic, and (3, 3) the axes of the photo in these.
     """
     places, matrices = given_poses(trajectory, np.clip([time], *trajectory.reach))
     return places[0], matrices[0]

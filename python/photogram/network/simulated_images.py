@@ -24,18 +24,11 @@ __all__ = ["Taken", "photograph", "photographed", "seen_side"]
 
 @dataclass(frozen=True)
 class Taken:
-    """What cameras have taken of the ground.
+    """What cameras have taken of the ground: P photos with true poses, m images of points without errors.
 
-    Attributes
-    ----------
-    photo_ids, positions, attitudes
-        Of the P photos: names and true poses, of scanners those in the middle of their images.
-    image_photos, image_points, image_xy
-        (m,), (m,) and (m, 2) images of points, without errors; of scanners samples and lines.
-    per_error
-        (m, 2, 2) image coordinates by millimetres in the focal plane; None: these are the same.
-    true, given
-        Further arguments of the block: as they truly are, and as they are known.
+    Poses of scanners are those in the middle of their images, which are samples and lines; `per_error` are
+    (m, 2, 2) image coordinates by millimetres in the focal plane, None: these are the same. `true` and
+    `given` are further arguments of the block: as they truly are, and as they are known.
     """
 
     photo_ids: list[str]
@@ -65,20 +58,10 @@ def photograph(
     photo_to_ground: bool,
     refraction: Refraction | None,
 ) -> Taken:
-    """Take the ground by frames of one side, in the unit of the principal distance.
+    """Take the ground, (n, 3) points of a grid, by frames of one side, in the unit of the principal distance.
 
-    Parameters
-    ----------
-    plan
-        The strips, with a grid of points.
-    ground
-        (n, 3) these, in the object space.
-    poses
-        (P, 3) positions and attitudes of the photos.
-
-    Returns
-    -------
-    The images of points that are seen at least twice.
+    `poses` are (P, 3) positions and attitudes of the photos. Returned are images of points that are seen at
+    least twice.
     """
     found = []
     positions, attitudes = poses
@@ -108,10 +91,7 @@ def seen_side(
 ) -> float:
     """Return the side of the part of the frame whose images stay in it while photos are read.
 
-    Raises
-    ------
-    InputError
-        That is less than half of it.
+    InputError: that is less than half of it.
     """
     if motion is None:
         return frame_size
@@ -124,29 +104,13 @@ def seen_side(
 def photographed(
     truth: Block, block: Block, cameras: Sequence[Camera], start_cameras: Sequence[Camera] | None
 ) -> tuple[Block, Block]:
-    """Let cameras take the photos of a simulated block in turn.
+    """Let cameras take the photos of a simulated block in turn; return truth and block with cameras.
 
-    The errors of image coordinates and their standard deviations are those of the block, as angles near the
-    axis: in the unit of a camera they grow with its principal distance.
-
-    Parameters
-    ----------
-    truth, block
-        The block without errors and the one with them, both with one principal distance.
-    cameras
-        The true ones; the first photo has the first.
-    start_cameras
-        What is known of them: with these the block starts, and what is unknown of them is so there. None:
-        they are known.
-
-    Returns
-    -------
-    The two blocks with cameras.
-
-    Raises
-    ------
-    InputError
-        What are no cameras of one unit, another number of them to start with, a point that no image shows.
+    The two have one principal distance. The errors of image coordinates and their standard deviations are
+    those of the block, as angles near the axis: in the unit of a camera they grow with its principal
+    distance. With `start_cameras` the block starts, and what is unknown of them is so there; None: they are
+    known. InputError: what are no cameras of one unit, another number of them to start with, a point that no
+    image shows.
     """
     start = cameras if start_cameras is None else checked_cameras(start_cameras)
     if len(start) != len(cameras) or start[0].unit != cameras[0].unit:

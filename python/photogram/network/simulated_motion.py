@@ -169,22 +169,11 @@ def rolled(
     frame: float,
     random: np.random.Generator,
 ) -> tuple[Block, Block]:
-    """Let the photos of a simulated block be read row by row while they move.
+    """Let the photos of a simulated block be read row by row while they move; return truth and block.
 
-    Parameters
-    ----------
-    truth, block
-        The block without errors and the one with them, in rectangular space.
-    shutter
-        How they are read, and how they move.
-    layout
-        The strips, which are flown in opposite directions.
-    frame
-        Its side, in principal distances.
-
-    Returns
-    -------
-    The two blocks with photos that have motions of their own: in the first the true ones are given.
+    Both are in rectangular space, with strips that are flown in opposite directions; `frame` is the side of
+    the frame in principal distances. Photos get motions of their own: in the first block the true ones are
+    given.
     """
     count = len(truth.photo_ids)
     strip, along = np.divmod(np.arange(count), layout.photos_per_strip)

@@ -249,9 +249,8 @@ def with_rig(
     if offsets.shape != turns.shape or offsets.shape[1] != 3:
         raise InputError("positions and rotations of a rig have three numbers for each sensor")
     axes, (centres, turned) = Cartesian(truth.spheroid), _poses(truth)
-    ids = list(truth.photo_ids)
     mounts: tuple[list[Mount], list[Mount]] = ([], [])
-    added: dict[str, list[Any]] = {"positions": [], "attitudes": [], "photos": [], "points": [], "xy": []}
+    added: list[tuple[Floats, Floats, Indices, Indices, Floats]] = []
     for k, (offset, turn) in enumerate(zip(offsets, rotations_of(turns), strict=True)):
         start = rotations_of(rotation_error * random.standard_normal((1, 3)))[0]
         sensors = (
@@ -263,47 +262,43 @@ def with_rig(
         photos, points, xy = _seen(truth, own, angles, distances, frame_size)
         names = [f"{name} {k + 2}" for name in truth.photo_ids]
         for parts, sensor in zip(mounts, sensors, strict=True):
-            parts.extend(Mount(name, frame, sensor) for name, frame in zip(names, ids, strict=False))
-        added["positions"].append(own)
-        added["attitudes"].append(angles)
-        added["photos"].append(photos + len(truth.photo_ids) * (k + 1))
-        added["points"].append(points)
-        added["xy"].append(xy)
-    names = [mount.photo for mount in mounts[0]]
-    stacked = {name: np.concatenate(parts) for name, parts in added.items()}
-    sd = np.broadcast_to(truth.image_sd[:1], stacked["xy"].shape)
-    noise = sd * random.standard_normal(sd.shape)
-    times = len(offsets)
-
-    def grown(block: Block, own: Sequence[Mount], xy: Floats) -> Block:
-        free = np.full((len(names), 3), np.inf)
-        observed = {
-            name: None if given is None else np.concatenate([given, extra])
-            for name, given, extra in (
-                ("photo_positions_observed", block.photo_positions_observed, stacked["positions"]),
-                ("photo_attitudes_observed", block.photo_attitudes_observed, stacked["attitudes"]),
+            parts.extend(
+                Mount(name, frame, sensor) for name, frame in zip(names, truth.photo_ids, strict=True)
             )
-        }
+        added.append((own, angles, photos + len(truth.photo_ids) * (k + 1), points, xy))
+    names = [mount.photo for mount in mounts[0]]
+    own, angles, photos, points, xy = (np.concatenate(parts) for parts in zip(*added, strict=True))
+    sd = np.broadcast_to(truth.image_sd[:1], xy.shape)
+    noise = sd * random.standard_normal(sd.shape)
+    free = np.full((len(names), 3), np.inf)
+    further = {
+        "photo_positions": own,
+        "photo_positions_observed": own,
+        "photo_position_sd": free,
+        "photo_attitudes": angles,
+        "photo_attitudes_observed": angles,
+        "photo_attitude_sd": free,
+        "image_photos": photos,
+        "image_points": points,
+        "image_xy": xy,
+        "image_sd": sd,
+    }
+
+    def grown(block: Block, own: Sequence[Mount], errors: Floats | float) -> Block:
+        rows = further | {"image_xy": xy + errors}
         return block.replace(
             photo_ids=[*block.photo_ids, *names],
-            photo_positions=np.concatenate([block.photo_positions, stacked["positions"]]),
-            photo_attitudes=np.concatenate([block.photo_attitudes, stacked["attitudes"]]),
-            photo_position_sd=np.concatenate([block.photo_position_sd, free]),
-            photo_attitude_sd=np.concatenate([block.photo_attitude_sd, free]),
-            principal_distances=np.tile(distances, times + 1),
-            image_photos=np.concatenate([block.image_photos, stacked["photos"]]),
-            image_points=np.concatenate([block.image_points, stacked["points"]]),
-            image_xy=np.concatenate([block.image_xy, xy]),
-            image_sd=np.concatenate([block.image_sd, sd]),
+            principal_distances=np.tile(distances, len(offsets) + 1),
             mounts=[*block.mounts, *own],
-            **observed,
+            **{
+                name: np.concatenate([given, extra])
+                for name, extra in rows.items()
+                if (given := getattr(block, name)) is not None
+            },
         )
 
-    return replace(
-        simulation,
-        truth=grown(truth, mounts[0], stacked["xy"]),
-        block=grown(simulation.block, mounts[1], stacked["xy"] + noise),
-    )
+    block = grown(simulation.block, mounts[1], noise)
+    return replace(simulation, truth=grown(truth, mounts[0], 0.0), block=block)
 
 
 def _positive(**values: float) -> None:

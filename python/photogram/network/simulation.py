@@ -327,10 +327,7 @@ def _looks(
 ) -> tuple[float, float]:
     """Return how far aside cameras see, and how far they may be inclined, of (tilt, crab); radians.
 
-    Raises
-    ------
-    InputError
-        Photos that see too little, or to the horizon, or past each other.
+    InputError: photos that see too little, or to the horizon, or past each other.
     """
     tilt, crab = angles
     spread = frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab))

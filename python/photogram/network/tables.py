@@ -194,13 +194,7 @@ def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
 
 
 def checked_cameras(cameras: object) -> tuple[Camera, ...]:
-    """Return the cameras of a block.
-
-    Raises
-    ------
-    InputError
-        What is no list of cameras, equal names, different units.
-    """
+    """Return the cameras of a block; InputError of what is none, equal names, different units."""
     if not isinstance(cameras, Sequence):
         raise InputError(f"cameras is no list: {shown(cameras)}")
     for each in cameras:
@@ -219,20 +213,9 @@ def checked_cameras(cameras: object) -> tuple[Camera, ...]:
 def photo_indices(given: object, cameras: Sequence[Camera], photos: int) -> Indices:
     """Return (P,) which camera each photo has.
 
-    Parameters
-    ----------
-    given
-        (P,) indices or names of cameras, one for all photos, or None: the only camera there is, or one for
-        each photo.
-    cameras
-        The cameras.
-    photos
-        P.
-
-    Raises
-    ------
-    InputError
-        Cameras that are not there, another number of photos, None where it does not say which.
+    Given are (P,) indices or names of cameras, one for all photos, or None: the only camera there is, or one
+    for each photo. InputError: cameras that are not there, another number of photos, None where it does not
+    say which.
     """
     if given is None:
         if len(cameras) not in (1, photos):

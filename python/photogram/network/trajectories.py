@@ -21,7 +21,7 @@ from photogram.arguments.arrays import names, number, numbers, one_of, shaped, s
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.network.unknowns import Unknown
+from photogram.network.unknowns import Numbers, Unknown
 
 __all__ = [
     "Clock",
@@ -43,12 +43,8 @@ BasisRow = tuple[str, int, list[float]]
 DEGREES = {"polynomial": (0, 8), "spline": (1, 5)}
 
 
-@dataclass(frozen=True, eq=False)
-class Coefficient(Unknown):
+class Coefficient(Numbers):
     """A coefficient c_k or r_k of a trajectory."""
-
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
 
 
 class PositionCoefficient(Coefficient):
@@ -63,8 +59,7 @@ class RotationCoefficient(Coefficient):
     KIND = "rotation coefficient"
 
 
-@dataclass(frozen=True, eq=False)
-class GyroBias(Unknown):
+class GyroBias(Numbers):
     """What a gyroscope says of a body at rest: b, about the axes of the body.
 
     Parameters
@@ -76,9 +71,6 @@ class GyroBias(Unknown):
     """
 
     KIND = "gyro bias"
-
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
 
 
 class _Scalar(Unknown):

@@ -260,12 +260,7 @@ def observation_rows(
 ) -> list[tuple[list[int], Group]]:
     """Return observations kind by kind: their rows among the given ones, and what the core takes.
 
-    Times on trajectories stand behind the photos.
-
-    Raises
-    ------
-    InputError
-        A point or photo that is not there.
+    Times on trajectories stand behind the photos. InputError: a point or photo that is not there.
     """
     if not observations:
         return []
