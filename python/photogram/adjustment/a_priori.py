@@ -17,16 +17,11 @@ __all__ = ["Known"]
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of P photos and n points; NaN where nothing is.
+    """What is known of P photos and n points, in cartesian axes; NaN where nothing is.
 
-    Attributes
-    ----------
-    positions, attitudes
-        (P, 3) and (P, 3, 3), photo to object: given poses, both parts or none.
-    observed_positions, observed_attitudes
-        The same of photos without a given pose, as observed or given by halves.
-    points, point_sd
-        (n, 3) positions of control, and their standard deviations; infinite where they are not held.
+    Given poses are (P, 3) and (P, 3, 3), photo to object, both parts or none; observed ones the same of
+    photos without a given pose, as observed or given by halves. Points are (n, 3) of control, their standard
+    deviations infinite where they are not held.
     """
 
     positions: Floats

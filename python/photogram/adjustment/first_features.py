@@ -15,6 +15,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import rays_of_row
 from photogram.network.geometry import Cartesian
 from photogram.network.observations import Attitude, Observation
+from photogram.network.observations.observation import with_unknowns
 from photogram.network.rays import meet
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
@@ -43,7 +44,7 @@ def started(block: Block) -> Block:
         own = [one for one in block.observations if any(other is each for other in one.unknowns)]
         found[id(each)] = _FINDERS[type(each)](sites, each, own)
     return block.replace(
-        observations=[each.with_unknowns(found) for each in block.observations],
+        observations=[with_unknowns(each, found) for each in block.observations],
         mounts=[_on(each, found) for each in block.mounts],
     )
 

@@ -68,20 +68,9 @@ _ON_LINE = 1e-3
 class Setting:
     """How the photos of a block stand, as far as their words depend on it.
 
-    Attributes
-    ----------
-    photos
-        How many there are.
-    parallel
-        Whether all look in about the same direction.
-    upright
-        Whether none is turned about its axis: the x axes, or the y axes, of all are across one direction.
-    control
-        Whether something is known of points.
-    heights
-        Whether a height of a point or photo is known.
-    on_line
-        Whether all places that are known, of points and photos, are on one straight line.
+    They are `parallel` where all look in about the same direction, `upright` where none is turned about its
+    axis: the x axes, or the y axes, of all are across one direction. `control` is known of points, `heights`
+    of a point or photo; `on_line` are all known places, of points and photos, on one straight line.
     """
 
     photos: int = 0
@@ -99,7 +88,7 @@ def setting_of(block: Block) -> Setting:
     moving = on_shared(block) | scanners(block)
     if photos < 2 or block.geographic or moving.any() or not np.isfinite(block.photo_attitudes).all():
         return Setting(photos, control=control)
-    axes = photo_axes(block.photo_attitudes, block.photo_to_ground)
+    axes = photo_axes(block.photo_attitudes, block.photo_to_ground).transpose(0, 2, 1)
     across = [float(np.linalg.svd(axes[:, k], compute_uv=False)[-1]) for k in (0, 1)]
     known = np.concatenate(
         [

@@ -62,14 +62,9 @@ class Incidence:
 class Tree(Valued):
     """A binary tree over parts; its nodes are numbered so that children come before their parent.
 
-    Attributes
-    ----------
-    parents
-        (N,) the root, which is the last node, has -1.
-    children
-        Of each node, in the fixed order in which their contributions are added; parts have none.
-    spans
-        (N, 2) the first part below a node and the one after the last.
+    Of N `parents` the root, the last node, has -1. Children of a node are in the fixed order in which their
+    contributions are added; parts have none. `spans` are (N, 2) the first part below a node and the one after
+    the last.
     """
 
     parents: Indices
@@ -236,14 +231,9 @@ def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:
 class Counts:
     """Counted work of each of N nodes.
 
-    Attributes
-    ----------
-    photos, images, outer
-        (N,) photos eliminated there, image points at home there, unknowns of nodes above that it touches.
-    formation, factor, inverse
-        (N,) multiply-adds of one formation with the reduction of points, one factorisation, one inversion.
-    factor_bytes, memory_bytes
-        (N,) of the factor, and at the most while the node is worked on.
+    Photos are eliminated there, image points at home there, `outer` unknowns are of nodes above that it
+    touches. Multiply-adds are of one formation with the reduction of points, one factorisation, one
+    inversion; bytes of the factor, and at the most while the node is worked on.
     """
 
     photos: Indices

@@ -62,24 +62,12 @@ class Stop:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an adjustment in parts has come to.
+    """What an adjustment in parts has come to: `converged`, `not converged` or `diverged`.
 
-    Attributes
-    ----------
-    status
-        `converged`, `not converged` or `diverged`.
-    initial_sum_of_squares, iterations
-        The history.
-    sums_of_squares
-        Weighted, of camera, ground, plates and observations beside images.
-    counts
-        Observations, weighted unknowns, unknowns.
-    degrees_of_freedom, variance_of_unit_weight
-        Of the chosen unit variance; None without degrees of freedom.
-    state, before
-        The last state of the nodes, and the one before the last step.
-    formations
-        How often the normal equations were formed.
+    Sums of squares are weighted, of camera, ground, plates and observations beside images; `counts` are
+    observations, weighted unknowns, unknowns. Degrees of freedom and variance are those of the chosen unit
+    variance, None without degrees of freedom. `state` is the last of the nodes, `before` the one before the
+    last step; `formations` says how often the normal equations were formed.
     """
 
     status: str

@@ -54,24 +54,12 @@ IN_TABLES = ("photo_ids", "point_ids", *(name for each in TABLES.values() for na
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What a node has of a block.
+    """What a node has of a block: a block of its own, and which things of the whole block these are.
 
-    Attributes
-    ----------
-    node
-        Its number in the tree.
-    block
-        Its photos, which are its own and those of nodes above that its observations or those of nodes below
-        touch, and the points, images and other observations that are at home here. Its cameras are all of the
-        whole block.
-    owners
-        (P,) the node that each photo belongs to: this one or one above it.
-    photos, points, images, observations
-        Which photo, point, image and observation of the whole block each one is.
-    unknowns
-        Which common unknowns of the whole block are known here.
-    common
-        These themselves.
+    Its photos are its own and those of nodes above that its observations or those of nodes below touch;
+    points, images and other observations are at home here; its cameras are all of the whole block. `owners`
+    are (P,) the node that each photo belongs to: this one or one above it. Rows of common unknowns that are
+    known here stand in `unknowns`, these themselves in `common`.
     """
 
     node: int

@@ -59,30 +59,12 @@ PROGRESS = "progress.json"
 class Manifest:
     """What all nodes of a run have in common.
 
-    Attributes
-    ----------
-    version
-        Of the package that made it.
-    source
-        What tells the block from others.
-    tree
-        The tree.
-    outer
-        What each node hands up.
-    middle
-        (3,) the median of the positions of all photos.
-    options
-        How the core adjusts.
-    weighted
-        Weighted unknowns of photos, cameras and common unknowns that are at home in each node.
-    photos, points, images
-        How many each node has at home.
-    seals
-        Of the parts of the nodes.
-    held
-        What is held where nothing gives a datum: photos, each with the number of one of its six unknowns.
-    datum
-        The datum that the block is taken to when it is adjusted; None for what is held, or observed.
+    `version` is that of the package that made it, `source` tells the block from others, `outer` what each
+    node hands up, `middle` (3,) the median of the positions of all photos. `weighted` counts weighted
+    unknowns of photos, cameras and common unknowns at home in each node; so do `photos`, `points` and
+    `images`; `seals` are those of the parts. Where nothing gives a datum photos are `held`, each with the
+    number of one of its six unknowns; `datum` is what the block is taken to when it is adjusted, None for
+    what is held, or observed.
     """
 
     version: str

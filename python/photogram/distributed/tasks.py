@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,22 +73,10 @@ class Lost:
 class Job:
     """What all tasks of a run are told.
 
-    Attributes
-    ----------
-    folder
-        Of the run, on a disk that all workers see.
-    engine
-        Makes the nodes.
-    version
-        Of the package on the machine that drives; every worker must have it.
-    threads
-        Of each task; 0 for all processors.
-    memory
-        Bytes that a process may hold; None for any number.
-    source
-        What tells the block and its options from others.
-    columns
-        How many right-hand sides the datum takes that the block is moved to at the end; 0 without one.
+    Its folder is on a disk that all workers see; every worker has the version of the package on the machine
+    that drives. `threads` are of each task, 0 for all processors, `memory` the bytes that a process may hold,
+    None for any number; `source` tells the block and its options from others; `columns` are how many
+    right-hand sides the datum takes that the block is moved to at the end, 0 without one.
     """
 
     folder: Path
@@ -114,10 +101,8 @@ class Point:
 class Formed:
     """What the driver wants to know of a node that was formed."""
 
-    number: int
     sum_of_squares: float
     decrease: float
-    seconds: float
     place: str
     products: Floats | None = None
     """(d, d) its share in B^T Q B, where there is a datum to go to."""
@@ -162,7 +147,6 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
     RankError: its observations leave something undetermined.
     """
     with shelf.lock:
-        start = time.perf_counter()
         node = _node(job, number)
         prediction = _prediction(job, node)
         # A factor at another state is of no use any more.
@@ -189,8 +173,7 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
             columns = columns.reshape(len(rights), -1)
             # A node may have nothing to eliminate.
             products = products.reshape(len(rights), -1) if rights.size else np.zeros((len(rights),) * 2)
-        seconds = time.perf_counter() - start
-        told = Formed(number, found.sum_of_squares, found.decrease, seconds, _place(), products)
+        told = Formed(found.sum_of_squares, found.decrease, _place(), products)
         shelf.put(_factor_key(job, number, at), found, prediction["factor_bytes"])
         return Contribution(row, told, columns)
 

@@ -26,9 +26,9 @@ Weights = Literal["corrected", "measured"]
 """Of a backward camera: what the standard deviations of images are those of."""
 
 _MEASURED = "_measured"
+"""What the core calls backward cameras whose residuals lie in the measured image."""
 _SQUARED = math.sqrt(sys.float_info.max)
 """Standard deviations beyond have no variance."""
-"""What the core calls backward cameras whose residuals lie in the measured image."""
 
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""

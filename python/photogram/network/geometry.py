@@ -20,13 +20,11 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
 
 __all__ = [
-    "Cartesian",
     "Spheroid",
     "geocentric_to_geographic",
     "geographic_to_geocentric",
     "lengths_of_units",
     "local_frames",
-    "photo_axes",
     "project",
     "refraction_shift",
     "rotation_angles",
@@ -116,13 +114,7 @@ def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
 
 @dataclass(frozen=True)
 class Cartesian:
-    """The cartesian axes of a block: its own when rectangular, else geocentric.
-
-    Attributes
-    ----------
-    spheroid
-        Of geographic space; None for rectangular space.
-    """
+    """The cartesian axes of a block: its own when rectangular, `spheroid` being None, else geocentric."""
 
     spheroid: Spheroid | None
 

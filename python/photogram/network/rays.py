@@ -78,14 +78,8 @@ def frame_radius(block: Block) -> float:
 class Intersection:
     """Every point where its rays meet, whichever side of the cameras that is.
 
-    Attributes
-    ----------
-    positions
-        (n, 3) in the metric axes; NaN with fewer than two rays, or parallel ones.
-    residuals
-        (m, 2) observed minus computed, millimetres; NaN where the point is.
-    in_front
-        (m,) whether the point lies in front of the camera.
+    Positions are (n, 3) in the metric axes, NaN with fewer than two rays, or parallel ones; residuals (m, 2)
+    observed minus computed, millimetres; `in_front` (m,) whether the point lies in front of the camera.
     """
 
     positions: Floats
@@ -100,22 +94,10 @@ class Intersection:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """The rays of a block: from the projection centres through the image points.
+    """The rays of a block: from the projection centres through the image points that are `used`, (m,).
 
-    Attributes
-    ----------
-    block
-        The block.
-    axes
-        Its metric axes.
-    centres
-        (P, 3) projection centres in the metric axes.
-    cameras
-        (P, 3, 3) rotations from the photos to the metric axes.
-    used
-        (m,) the images that count.
-    unit
-        What the image coordinates of the block are called in reports.
+    In its metric axes: (P, 3) projection centres, (P, 3, 3) rotations from the photos. `unit` is what the
+    image coordinates of the block are called in reports.
     """
 
     block: Block

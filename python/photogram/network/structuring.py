@@ -33,14 +33,9 @@ class Overflow:
 class Structure:
     """The order of the parameter sets and what it costs.
 
-    Attributes
-    ----------
-    photos
-        (P',) photos with images in the order of their entry.
-    entry, exit
-        (P',) places, in `points`, of the points at which they enter, and of the last points they observe.
-    points
-        (n',) points with images in the order of their first image.
+    Of P' photos with images, in the order of their entry, `entry` and `exit` are the places, in `points`, of
+    the points at which they enter, and of the last they observe; n' points are in the order of their first
+    image.
     """
 
     photos: Indices

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,7 @@ __all__ = [
     "moments",
     "observation_rows",
     "of_records",
+    "with_unknowns",
 ]
 
 Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
@@ -70,11 +71,11 @@ class Observation:
     """What its components are called: rotations are in radians, all others in the linear unit."""
     LOCAL: ClassVar[bool] = False
     """Whether in geographic space these are east, north and up."""
-    PER: ClassVar[str] = ""
+    _PER: ClassVar[str] = ""
     """What follows the units of its components: `/s` of rates."""
     MISSING: ClassVar[bool] = False
     """Whether NaN stands for components that were not observed."""
-    POSITIVE: ClassVar[bool] = False
+    _POSITIVE: ClassVar[bool] = False
     """Whether its first value, a length, must be positive."""
 
     points: tuple[str, ...] = field(init=False, repr=False)
@@ -106,7 +107,7 @@ class Observation:
         if not use.any():
             raise InputError(f"{self.name} has no component that was observed")
         self._set("precision", self._covariance(use))
-        if self.POSITIVE and not self.observed[0] > 0:
+        if self._POSITIVE and not self.observed[0] > 0:
             name = self.VALUES[0][0]
             raise InputError(f"{name} of {self.name} is not positive: {getattr(self, name)}")
 
@@ -151,7 +152,9 @@ class Observation:
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
         """Return the units of its components; nothing for plain numbers."""
-        return tuple(("rad" if name in ROTATIONS else linear_unit) + self.PER for name in self.own_components)
+        return tuple(
+            ("rad" if name in ROTATIONS else linear_unit) + self._PER for name in self.own_components
+        )
 
     @property
     def own_components(self) -> tuple[str, ...]:
@@ -162,12 +165,6 @@ class Observation:
         """Return the names of its components; of places in geographic space those of local axes."""
         own = self.own_components
         return ("east", "north", "up")[: len(own)] if geographic and self.LOCAL else own
-
-    def with_unknowns(self, others: Mapping[int, Unknown]) -> Self:
-        """Return it with other common unknowns in the place of some, by the identity of these."""
-        fields = zip(self.UNKNOWNS, self.unknowns if self.UNKNOWNS else (), strict=True)
-        changes: dict[str, Any] = {name: others[id(own)] for (name, _), own in fields if id(own) in others}
-        return replace(self, **changes) if changes else self
 
     @classmethod
     def values_of(cls, observations: Sequence[Observation]) -> Floats:
@@ -217,6 +214,13 @@ class Observation:
                 f"covariance of {self.name} is not symmetric and positive definite: {matrix.tolist()}"
             )
         return matrix
+
+
+def with_unknowns(observation: Observation, others: Mapping[int, Unknown]) -> Observation:
+    """Return an observation with other common unknowns in the place of some, by the identity of these."""
+    fields = zip(observation.UNKNOWNS, observation.unknowns if observation.UNKNOWNS else (), strict=True)
+    changes: dict[str, Any] = {name: others[id(own)] for (name, _), own in fields if id(own) in others}
+    return replace(observation, **changes) if changes else observation
 
 
 def moments(observations: Sequence[Observation]) -> list[Moment]:

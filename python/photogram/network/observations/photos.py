@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.observations.observation import AXES, ROTATIONS, Observation
+from photogram.network.observations.observation import AXES, ROTATIONS, Observation, with_unknowns
 from photogram.network.trajectories import Clock, GyroBias, Trajectory
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Shift, Unknown
 
@@ -95,7 +95,7 @@ def with_epochs(observations: Sequence[Observation]) -> list[Observation]:
     for each in (one for own in observations for one in own.unknowns):
         if isinstance(each, Drift) and each.epoch is None and id(each) in epochs:
             dated[id(each)] = each.replace(epoch=epochs[id(each)])
-    return [each.with_unknowns(dated) for each in observations] if dated else list(observations)
+    return [with_unknowns(each, dated) for each in observations] if dated else list(observations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +217,7 @@ class Range(Observation):
     UNKNOWNS = (("instrument", Instrument),)
     VALUES = (("length", ()), ("lever_arm", (3,)))
     COMPONENTS = ("length",)
-    POSITIVE = True
+    _POSITIVE = True
 
     photo: str | None
     point: str
@@ -260,7 +260,7 @@ class Velocity(Observation):
     UNKNOWNS = (("lever_arm", LeverArm),)
     VALUES = (("velocity", (3,)), ("lever_arm", (3,)))
     COMPONENTS = AXES
-    PER = "/s"
+    _PER = "/s"
 
     photo: str | None
     velocity: ArrayLike
@@ -304,7 +304,7 @@ class Rate(Observation):
     UNKNOWNS = (("boresight", Boresight), ("bias", GyroBias))
     VALUES = (("rate", (3,)), ("boresight", (3, 3)))
     COMPONENTS = ROTATIONS
-    PER = "/s"
+    _PER = "/s"
 
     photo: str | None
     rate: ArrayLike

@@ -72,7 +72,7 @@ class Distance(Observation):
     UNKNOWNS = (("instrument", Instrument),)
     VALUES = (("length", ()),)
     COMPONENTS = ("length",)
-    POSITIVE = True
+    _POSITIVE = True
 
     first: str
     second: str
