@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from photogram.errors import InputError
@@ -11,7 +12,7 @@ from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.reading import read_isd
 from photogram.io.files import read_lines
 
-__all__ = ["read_list", "read_support"]
+__all__ = ["listed_lines", "read_list", "read_support"]
 
 
 def read_support(path: Path) -> Isd:
@@ -23,6 +24,14 @@ def read_support(path: Path) -> Isd:
         As :func:`read_cube` and :func:`read_isd` have it.
     """
     return read_cube(path) if is_cube(path) else read_isd(path)
+
+
+def listed_lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield numbers and texts of the lines of a list; empty ones and those that begin with # do not count."""
+    for record, line in enumerate(read_lines(path), 1):
+        text = line.strip()
+        if text and not text.startswith("#"):
+            yield record, text
 
 
 def read_list(path: Path) -> dict[str, Path]:
@@ -40,10 +49,7 @@ def read_list(path: Path) -> dict[str, Path]:
         Files that are not there; ISDs without a serial number; one that stands there twice; an empty list.
     """
     found: dict[str, Path] = {}
-    for record, line in enumerate(read_lines(path), 1):
-        text = line.strip()
-        if not text or text.startswith("#"):
-            continue
+    for record, text in listed_lines(path):
         try:
             serial, file = _of_line(text, path.parent)
         except InputError as error:
