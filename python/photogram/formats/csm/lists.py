@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.formats.csm.cube_tables import is_cube, read_label
-from photogram.formats.csm.cubes import read_cube, serial_number
+from photogram.formats.csm.cubes import is_cube, read_cube, read_label, serial_number
 from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.reading import read_isd
 from photogram.io.files import read_lines
