@@ -8,12 +8,12 @@ import numpy as np
 
 from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN, checked_rotation
 from photogram.formats.xml_stream import Element, read_stream
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
@@ -133,10 +133,8 @@ def _sensors(chunk: Element, messages: list[Message]) -> dict[str, _Sensor]:
         while name in names:
             name += "'"
         names.add(name)
-        try:
+        with at_place(each):
             found[key] = _sensor(each, name, messages)
-        except InputError as error:
-            raise (error if error.file else each.error(error.message)) from None
     if not found:
         raise chunk.error("has no sensors")
     return found

@@ -17,6 +17,7 @@ from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rotations import checked_rotation
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -108,12 +109,9 @@ def _group(found: _Found, element: Element) -> None:
         raise element.error(f"the camera orientation {orientation} is none of {', '.join(ORIENTATIONS)}")
     axes = np.array(ORIENTATIONS[orientation], dtype=float)
     pixel = _pixel(element, size)
-    try:
-        camera = _camera(
-            element, size, axes, pixel, f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
-        )
-    except InputError as error:
-        raise (error if error.file else element.error(error.message)) from None
+    name = f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
+    with at_place(element):
+        camera = _camera(element, size, axes, pixel, name)
     found.groups.append(_Group(camera, size, axes, pixel))
     srs = element.word("SRSId")
     for photo in element.all("Photo"):

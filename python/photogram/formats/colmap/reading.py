@@ -7,6 +7,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.colmap.binary import read_binary
@@ -18,7 +19,7 @@ from photogram.formats.names import NAMES, renamed
 from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rigging import FrameOf, Rig, mounted
 from photogram.formats.rotations import Y_DOWN
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.unknowns import Sensor
@@ -105,21 +106,10 @@ def _project(model: Model, path: Path) -> Project:
 
 def _camera(camera: Camera) -> HouseCamera:
     model = camera.model.lower()
-    values = camera.parameters
-    try:
-        if model == "equirectangular":
-            return HouseCamera(model, {"w": values[0], "h": values[1]}, name=str(camera.number))
-        names = HouseCamera(model, _some(model), unit="px").names
-        return HouseCamera(model, dict(zip(names, values, strict=True)), name=str(camera.number), unit="px")
-    except InputError as error:
-        raise camera.place.error(error.message) from None
-
-
-def _some(model: str) -> dict[str, float]:
-    """Return values with which a model can be made, to ask it for its names."""
-    from photogram import _photocore
-
-    return dict.fromkeys((name for name, _ in dict(_photocore.camera_models())[model][1]), 1.0)
+    names = [name for name, _ in dict(_photocore.camera_models())[model][1]]
+    values = dict(zip(names, camera.parameters, strict=True))
+    with at_place(camera.place):
+        return HouseCamera(model, values, name=str(camera.number), unit="px")
 
 
 def _check_images(model: Model, places: dict[int, int]) -> None:

@@ -19,6 +19,7 @@ from photogram.formats.csm.isd import Detector, Isd, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift
 from photogram.formats.csm.reading import from_pixels, not_zero, transformed
 from photogram.io.files import reading
+from photogram.io.places import at_place
 from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.io.tree import Tree
 from photogram.network.lens import Lens
@@ -141,10 +142,8 @@ class _Table:
 
     @property
     def times(self) -> Floats:
-        try:
+        with at_place(self):
             return increasing(_TIME, self.of([_TIME])[:, 0])
-        except InputError as error:
-            raise self.error(error.message) from None
 
     def sampled(self, columns: Sequence[str], kernel: str) -> tuple[Floats, Floats]:
         """Return (k,) times and (k, 3) values of polynomials, on records that join without loss."""
@@ -163,10 +162,8 @@ class _Table:
         if "ConstantRotation" not in self.keys:
             return np.eye(3)
         given = self.keys["ConstantRotation"].numbers(9)
-        try:
+        with at_place(self):
             return np.asarray(rotations("ConstantRotation", given.reshape(1, 3, 3), 1)[0])
-        except InputError as error:
-            raise self.error(error.message) from None
 
 
 def read_positions(label: Group, path: Path) -> Positions:

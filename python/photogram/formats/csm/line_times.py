@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.io.places import at_place
 from photogram.io.tree import Tree
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.moving_photos import Lines
@@ -38,10 +38,8 @@ def read_lines(tree: Tree, center: float) -> Lines:
     rows = np.array([row.numbers(3) for row in rates])
     if not len(rows):
         raise rates.error("is empty")
-    try:
+    with at_place(rates):
         return Lines(rows - [0.5, -center, 0.0])
-    except InputError as error:
-        raise rates.error(error.message) from None
 
 
 def read_drift(keywords: Tree, code: str | None) -> Drift | None:

@@ -9,10 +9,10 @@ from typing import Any, cast
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.formats.csm.angles import of_quaternions
 from photogram.formats.csm.isd import Detector, Framelets, Isd, Jitter, Pixels, Plane, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift, read_lines
+from photogram.io.places import at_place
 from photogram.io.tree import Tree, read_json, unknown
 from photogram.network.lens import Lens, LensModel
 from photogram.network.trajectories import increasing, rotations
@@ -124,11 +124,8 @@ def _rows(tree: Tree, width: int) -> Floats:
 def _times(tree: Tree, count: int) -> Floats:
     """Return as many times as there are records."""
     times = tree["ephemeris_times"]
-    found = times.numbers(count)
-    try:
-        return increasing("ephemeris_times", found)
-    except InputError as error:
-        raise times.error(error.message) from None
+    with at_place(times):
+        return increasing("ephemeris_times", times.numbers(count))
 
 
 def _positions(tree: Tree) -> Positions:
@@ -152,10 +149,8 @@ def _turns(tree: Tree, name: str) -> Turns:
     constant = np.eye(3)
     if "constant_rotation" in own:
         given = own["constant_rotation"]
-        try:
+        with at_place(given):
             constant = rotations("constant_rotation", given.numbers(9).reshape(1, 3, 3), 1)[0]
-        except InputError as error:
-            raise given.error(error.message) from None
     return Turns(_times(own, len(quaternions)), constant @ of_quaternions(quaternions))
 
 

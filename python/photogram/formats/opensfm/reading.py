@@ -14,7 +14,7 @@ from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.io.tree import Tree, read_json, unknown
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
@@ -118,10 +118,8 @@ def _cameras(cameras: Tree) -> tuple[list[Camera], list[Size]]:
     found, sizes = [], []
     for name, each in cameras.items():
         width, height = each["width"].whole(1), each["height"].whole(1)
-        try:
+        with at_place(each):
             found.append(_camera(name, each, width, height))
-        except InputError as error:
-            raise (error if error.file else each.error(error.message)) from None
         sizes.append((width, height))
     return found, sizes
 
