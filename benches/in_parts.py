@@ -24,11 +24,10 @@ import numpy as np
 from peak import peak_memory
 from photogram import Block, adjust, adjust_in_parts, simulate
 from photogram.distributed import Division, plan_in_parts
-from photogram.distributed.counts import FORMATION, Counts, counted_work
-from photogram.distributed.cut import Incidence, Tree
+from photogram.distributed.cut import FORMATION, Counts, Incidence, Tree, counted_work
 from photogram.distributed.division import bytes_of
-from photogram.distributed.schedule import Times, scheduled
-from photogram.distributed.workers import connected
+from photogram.distributed.executors import connected
+from photogram.distributed.plan import Times, scheduled
 from scanners import simulated
 
 BANDWIDTH = 1.25e9 / 2

@@ -25,7 +25,7 @@ from photogram import simulate
 from photogram.adjustment.adjustment import Progress
 from photogram.distributed import Division
 from photogram.distributed.division import bytes_of
-from photogram.distributed.workers import connected
+from photogram.distributed.executors import connected
 from photogram.formats import Wishes, to_files
 from photogram.formats.in_parts import adjusted_on_disk, planned_on_disk
 from photogram.formats.project import Project

@@ -26,10 +26,10 @@ from photogram import Block, Camera, adjust
 from photogram.adjustment.adjustment import core_options
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed import Division
+from photogram.distributed.adjust import opened
 from photogram.distributed.division import bytes_of
+from photogram.distributed.executors import connected
 from photogram.distributed.run import MANIFEST, partition
-from photogram.distributed.running import opened
-from photogram.distributed.workers import connected
 from photogram.formats.in_parts import OnDisk
 from photogram.memory import give_back, resident_memory
 from photogram.network.attitudes import Attitudes

@@ -21,8 +21,7 @@ from photogram import Result, adjust, formats
 from photogram.formats.csm.lists import read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
-from photogram.formats.isis.columns import measures_of, points_of
-from photogram.formats.isis.network import POINT_TYPES, ControlNetwork
+from photogram.formats.isis.network import POINT_TYPES, ControlNetwork, measures_of, points_of
 from photogram.formats.isis.writing import network_text
 from photogram.network.attitudes import Attitudes
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, geographic_to_geocentric

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling
-from photogram.adjustment.snooping import options_of
+from photogram.adjustment.adjustment import core_options
 from photogram.errors import PhotogramError
 from photogram.network.core_arrays import block_network
 from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
@@ -87,7 +87,7 @@ def test_hostile_values_are_refused(kind, name):
     for hostile, make in HOSTILE.items():
         try:
             with np.errstate(all="ignore"):
-                block_network(used(kind(**GOOD[kind] | {name: make()})), options_of("constrained"))
+                block_network(used(kind(**GOOD[kind] | {name: make()})), core_options("constrained", None))
         except PhotogramError:
             continue
         except Exception as error:

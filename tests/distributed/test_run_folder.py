@@ -18,11 +18,11 @@ import photogram
 from photogram import adjust_in_parts
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.adjust import fingerprint
+from photogram.distributed.executors import connected
 from photogram.distributed.files import alone
 from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.run import partition, read_node
 from photogram.distributed.shelf import shelf
-from photogram.distributed.workers import connected
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.in_parts import planned_on_disk

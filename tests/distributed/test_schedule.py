@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from photogram.distributed.counts import counted_work, outer_vertices
-from photogram.distributed.cut import Incidence, cut, tree_of
-from photogram.distributed.schedule import scheduled
+from photogram.distributed.cut import Incidence, counted_work, cut, outer_vertices, tree_of
+from photogram.distributed.plan import scheduled
 
 
 def grid(rows, columns):

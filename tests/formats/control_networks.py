@@ -5,8 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from photogram.formats.isis.columns import measures_of, points_of
-from photogram.formats.isis.network import ControlNetwork
+from photogram.formats.isis.network import ControlNetwork, measures_of, points_of
 from photogram.formats.isis.reading import read_network
 
 LABEL = 65536

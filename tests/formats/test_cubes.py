@@ -7,8 +7,7 @@ from support_data import START, written
 
 from photogram import InputError
 from photogram.formats.csm.angles import Polynomials, of_angles
-from photogram.formats.csm.cube_tables import read_label, read_positions, read_turns
-from photogram.formats.csm.cubes import read_cube, serial_number
+from photogram.formats.csm.cubes import read_cube, read_label, read_positions, read_turns, serial_number
 from photogram.formats.csm.lists import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage, trajectory_of
 from photogram.formats.csm.reading import read_isd

@@ -18,10 +18,10 @@ from photogram.formats import Wishes
 from photogram.formats.motion_summary import motions
 from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network.lens import Lens
+from photogram.network.motion import about
 from photogram.network.moving_photos import Timed
 from photogram.network.observations import Smoothness
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
-from photogram.network.whereabouts import about
 
 GOLDEN = ("rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair")
 

@@ -6,72 +6,22 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.network import geometry
 from photogram.network.block import Block
-from photogram.network.geometry import Spheroid
+from photogram.network.geometry import Cartesian, photo_axes
 from photogram.network.motion import on_shared, scanners
 from photogram.network.observations import Attitude, Control, Position
 from photogram.network.unknowns import Boresight, LeverArm
 
-__all__ = ["Cartesian", "Known"]
-
-
-@dataclass(frozen=True)
-class Cartesian:
-    """The cartesian axes of a block: its own when rectangular, else geocentric.
-
-    Attributes
-    ----------
-    spheroid
-        Of geographic space; None for rectangular space.
-    """
-
-    spheroid: Spheroid | None
-
-    @classmethod
-    def of(cls, block: Block) -> Cartesian:
-        """Return the axes of a block."""
-        return cls(block.spheroid)
-
-    def positions(self, positions: Floats) -> Floats:
-        """(n, 3) positions of the block in these axes; NaN where unknown."""
-        if self.spheroid is None:
-            return positions
-        return geometry.geographic_to_geocentric(positions, self.spheroid)
-
-    def from_cartesian(self, positions: Floats) -> Floats:
-        """Turn positions of these axes back into those of the block."""
-        if self.spheroid is None or not len(positions):
-            return positions
-        return geometry.geocentric_to_geographic(positions, self.spheroid)
-
-    def from_local(self, attitudes: Floats, positions: Floats) -> Floats:
-        """(n, 3, 3) attitudes in these axes, of those in the local frames at positions of the block."""
-        if self.spheroid is None:
-            return attitudes
-        turned: Floats = geometry.local_frames(positions).transpose(0, 2, 1) @ attitudes
-        return turned
-
-    def to_local(self, attitudes: Floats, positions: Floats) -> Floats:
-        """Turn attitudes of these axes back into the local frames at positions of the block."""
-        if self.spheroid is None:
-            return attitudes
-        turned: Floats = geometry.local_frames(positions) @ attitudes
-        return turned
+__all__ = ["Known"]
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of P photos and n points; NaN where nothing is.
+    """What is known of P photos and n points, in cartesian axes; NaN where nothing is.
 
-    Attributes
-    ----------
-    positions, attitudes
-        (P, 3) and (P, 3, 3), photo to object: given poses, both parts or none.
-    observed_positions, observed_attitudes
-        The same of photos without a given pose, as observed or given by halves.
-    points, point_sd
-        (n, 3) positions of control, and their standard deviations; infinite where they are not held.
+    Given poses are (P, 3) and (P, 3, 3), photo to object, both parts or none; observed ones the same of
+    photos without a given pose, as observed or given by halves. Points are (n, 3) of control, their standard
+    deviations infinite where they are not held.
     """
 
     positions: Floats
@@ -85,7 +35,9 @@ class Known:
     def of(cls, block: Block, axes: Cartesian) -> Known:
         """Return what a block knows."""
         positions = axes.positions(block.photo_positions)
-        attitudes = axes.from_local(_matrices(block, block.photo_attitudes), block.photo_positions)
+        attitudes = axes.from_local(
+            photo_axes(block.photo_attitudes, block.photo_to_ground), block.photo_positions
+        )
         given = np.asarray(np.isfinite(np.column_stack([positions, attitudes.reshape(-1, 9)])).all(axis=1))
         # No picture has the pose of a photo that is on a trajectory with others, or line by line.
         given &= ~(on_shared(block) | scanners(block))
@@ -97,7 +49,9 @@ class Known:
         turned = attitudes.copy()
         if (angles := block.photo_attitudes_observed) is not None:
             weighted = np.isfinite(block.photo_attitude_sd).all(axis=1) & np.isfinite(angles).all(axis=1)
-            turned[weighted] = axes.from_local(_matrices(block, angles), block.photo_positions)[weighted]
+            turned[weighted] = axes.from_local(
+                photo_axes(angles, block.photo_to_ground), block.photo_positions
+            )[weighted]
         _take_observations(block, axes, centres, turned)
         points, sd = _control(block, axes)
         return cls(
@@ -108,12 +62,6 @@ class Known:
             points=points,
             point_sd=sd,
         )
-
-
-def _matrices(block: Block, angles: Floats) -> Floats:
-    """(P, 3, 3) attitudes, photo to object (or to the local frame), of angles; NaN where they are."""
-    matrices = geometry.rotation_matrix(angles)
-    return matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
 
 
 def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: Floats) -> None:

@@ -10,11 +10,19 @@ from typing import Literal, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.coefficients import outside
 from photogram.adjustment.first_features import started
-from photogram.adjustment.remarks import behind, folded, harmful, rounded, too_coarse, undetermined
+from photogram.adjustment.remarks import (
+    behind,
+    check_cameras,
+    folded,
+    harmful,
+    refraction_remarks,
+    rounded,
+    too_coarse,
+    undetermined,
+)
 from photogram.adjustment.robust import Loss, loss_row, remark
-from photogram.adjustment.undetermined import one_place, undetermined_combinations
+from photogram.adjustment.undetermined import one_place, outside, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -31,7 +39,6 @@ from photogram.network.datum import (
     minimum_row,
 )
 from photogram.network.motion import refuse_datum
-from photogram.network.refracted import check_cameras, remarks
 from photogram.network.unknowns import Unknown
 from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
@@ -219,13 +226,7 @@ def core_options(
     *,
     ordering: Ordering = "auto",
 ) -> CoreOptions:
-    """Return how the core adjusts, no unknowns being chosen to be held: options of :func:`adjust`.
-
-    Raises
-    ------
-    InputError
-        An option that cannot be.
-    """
+    """Return how the core adjusts, by options of :func:`adjust`, checked; nothing is chosen to be held."""
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
     row = loss_row(loss)
     as_published = isinstance(tolerance, AsPublished)
@@ -256,15 +257,7 @@ def adjusted_from(
     threads: int | None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Result:
-    """Adjust a block whose values, those of points too, are where an adjustment of much of it has ended.
-
-    Parameters
-    ----------
-    block, options
-        The block, and how the core adjusts it.
-    threads, progress
-        As of :func:`adjust`.
-    """
+    """Adjust a block whose values, those of points too, are where an adjustment of much of it has ended."""
     options = replace(options, points_given=True)
     return _adjusted(started(block), options, core_threads(threads), progress)
 
@@ -273,24 +266,29 @@ def _adjusted(
     block: Block,
     options: CoreOptions,
     processors: int,
-    progress: Callable[[Progress], None] | None,
+    progress: Callable[[Progress], None] | None = None,
     inner: DatumRow | None = None,
     *,
     keep: bool = False,
+    start: _photocore.BlockState | None = None,
 ) -> Result:
     network = block_network(block, options)
+    tested = tested_together(block) if keep else None
     try:
         told = None if progress is None else teller(progress)
-        solution = network.adjust(
-            datum=inner, threads=processors, progress=told, keep=tested_together(block) if keep else None
-        )
+        solution = network.adjust(datum=inner, threads=processors, progress=told, start=start, keep=tested)
     except _photocore.BlockError as error:
         if error.args[0] in ("not free", "datum"):
             raise refused(block, network, None, error) from None
         raise named(block, *error.args) from None
     with turned("the adjusted block"):
-        freedom = _freedom(solution, options)
-        return _result(block, solution, options, freedom, inner)
+        datum = datum_of(block, solution, inner)
+        messages = messages_of(block, solution, options, datum)
+        freedom: float = solution.degrees_of_freedom
+        if options.unit_variance == "redundancy" and solution.redundancies is not None:
+            _, *measured = solution.redundancies
+            freedom = round(sum(measured), 6)
+        return Result.from_solution(block, solution, options, datum, messages, freedom)
 
 
 @Way
@@ -299,46 +297,14 @@ def adjusted_again(
 ) -> AdjustedNetwork:
     """Adjust a network, of which only weights have changed, from where an adjustment of it has ended.
 
-    Parameters
-    ----------
-    block
-        The block, or another network.
-    options, start
-        Those of the former result, and where it ended: its `options` and `state`.
-    threads
-        As of :func:`adjust`.
+    `options` and `start` are those of the former result, and where it ended: its `options` and `state`.
     """
     raise NotImplementedError(type(block).__name__)
 
 
 @adjusted_again.register
 def _(block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None) -> Result:
-    network = block_network(block, options)
-    try:
-        solution = network.adjust(datum=None, threads=core_threads(threads), progress=None, start=start)
-    except _photocore.BlockError as error:
-        raise named(block, *error.args) from None
-    return _result(block, solution, options, _freedom(solution, options))
-
-
-def _freedom(solution: _photocore.BlockSolution, options: CoreOptions) -> float:
-    """Return the degrees of freedom of the unit variance: counted, or the sum of redundancy numbers."""
-    if options.unit_variance != "redundancy" or solution.redundancies is None:
-        return solution.degrees_of_freedom
-    _, *measured = solution.redundancies
-    return round(sum(measured), 6)
-
-
-def _result(
-    block: Block,
-    solution: _photocore.BlockSolution,
-    options: CoreOptions,
-    freedom: float,
-    inner: DatumRow | None = None,
-) -> Result:
-    datum = datum_of(block, solution, inner)
-    messages = messages_of(block, solution, options, datum)
-    return Result.from_solution(block, solution, options, datum, messages, freedom)
+    return _adjusted(block, options, core_threads(threads), start=start)
 
 
 def messages_of(
@@ -355,13 +321,7 @@ def messages_of(
 def teller(
     progress: Callable[[Progress], None],
 ) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
-    """Return what the core calls: it tells `progress`.
-
-    Raises
-    ------
-    InputError
-        It is no function.
-    """
+    """Return what the core calls: it tells `progress`; InputError where that is no function."""
     if not callable(progress):
         raise InputError(f"progress is no function: {shown(progress)}")
 
@@ -377,13 +337,7 @@ def most_iterations(loss: tuple[str, float] | None) -> int:
 
 
 def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
-    """Refuse an iteration that cannot be.
-
-    Raises
-    ------
-    InputError
-        An ordering that there is not, no iteration, a criterion that is not positive.
-    """
+    """Refuse an iteration that cannot be."""
     one_of("ordering", ordering, get_args(Ordering))
     if whole_number("max_iterations", max_iterations) < 1:
         raise InputError("there must be one iteration at least")
@@ -392,13 +346,7 @@ def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> Non
 
 
 def core_threads(threads: int | None) -> int:
-    """Return the number of threads for the core, a few for each processor at most; 0 leaves it to the core.
-
-    Raises
-    ------
-    InputError
-        It is no number, or not positive.
-    """
+    """Return the number of threads for the core, a few for each processor; 0 leaves it to the core."""
     if threads is None:
         processors = os.cpu_count() or 1
         fit = threads_that_fit(processors)
@@ -421,7 +369,7 @@ def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message
     lost = [each.name for each in block.observations if dropped.intersection(each.points)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
-    return messages + remarks(block, solution.photo_positions)
+    return messages + refraction_remarks(block, solution.photo_positions)
 
 
 def _rises(iterations: list[Iteration]) -> list[Message]:

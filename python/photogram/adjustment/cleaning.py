@@ -141,37 +141,20 @@ def clean(
     snooped = snoop(network, level=level, threads=threads, **options)
     if not _rejected(snooped.result):
         return Cleaned(snooped, None, names, factors, 0, settled=True)
-    for rounds in range(1, MOST_ROUNDS + 1):
+    rounds, settled = 0, False
+    while rounds < MOST_ROUNDS and not settled:
+        rounds += 1
         left, own = _left(network, grouping, snooped.result)
         found = of_grouping(left, own, settings, held=held, threads=threads)
         changed = _changed(found, names, factors)
         before = _out(snooped)
         snooped = snoop(scaled(network, grouping, changed), level=level, threads=threads, **options)
         stands = bool((np.abs(changed / factors - 1) <= STANDS).all())
-        factors = changed
-        if stands and before == _out(snooped):
-            return _finished(
-                network, grouping, settings, snooped, factors, rounds, held, threads, settled=True
-            )
-    return _finished(network, grouping, settings, snooped, factors, MOST_ROUNDS, held, threads, settled=False)
-
-
-def _finished(
-    network: object,
-    grouping: Grouping,
-    settings: Settings,
-    snooped: Snooped,
-    factors: Floats,
-    rounds: int,
-    held: Sequence[str],
-    threads: int | None,
-    *,
-    settled: bool,
-) -> Cleaned:
-    """Estimate what is left once more, with its test of equality, for the report."""
+        factors, settled = changed, stands and before == _out(snooped)
+    # What is left is estimated once more, with its test of equality, for the report.
     left, own = _left(network, grouping, snooped.result)
     found = of_grouping(left, own, replace(settings, equality=True), held=held, threads=threads)
-    return Cleaned(snooped, found, grouping.groups.names, factors, rounds, settled)
+    return Cleaned(snooped, found, names, factors, rounds, settled)
 
 
 def _rejected(result: AdjustedNetwork) -> bool:

@@ -96,7 +96,11 @@ def eliminate_terms(
             for camera in result.cameras
             for names in _groups(camera, groups)
         ]
-        asked = [each for each in tests if not _waits(each, tests) and not _stays(each, own)]
+        asked = [
+            each
+            for each in tests
+            if not _waits(each, tests) and not (each.probability < own and each.effect > EFFECT)
+        ]
         if not asked:
             return Elimination(tuple(removed), tuple(tests), own, block, result)
         worst = max(asked, key=lambda each: each.probability)
@@ -110,10 +114,6 @@ def _groups(camera: AdjustedCamera, given: Sequence[Sequence[str]] | None) -> li
     estimated = {camera.names[k] for k in camera.estimated}
     groups = groups_of_terms(camera) if given is None else [tuple(names) for names in given]
     return [names for names in groups if names and set(names) <= estimated]
-
-
-def _stays(test: TermsTest, level: float) -> bool:
-    return test.probability < level and test.effect > EFFECT
 
 
 def _waits(test: TermsTest, tests: Sequence[TermsTest]) -> bool:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian, Known
+from photogram.adjustment.a_priori import Known
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.lazy_dataclasses import replace
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.cameras import rays_of_row
+from photogram.network.geometry import Cartesian
 from photogram.network.observations import Attitude, Observation
+from photogram.network.observations.observation import with_unknowns
 from photogram.network.rays import meet
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
@@ -26,22 +27,13 @@ FLAT = 1e-3
 
 
 def started(block: Block) -> Block:
-    """Return a block whose common unknowns all have values to start from.
+    """Return a block with poses whose common unknowns all have values to start from.
 
     Planes and lines follow the principal axes of their points, which stand at their given places or where
     their rays meet; plumb lines go through their middle, levels have their mean height. A boresight is the
     chordal mean of A' A_obs, a sensor the median of positions and the chordal mean of rotations in the frames
-    of its photos (the rotation nearest to the mean of matrices).
-
-    Parameters
-    ----------
-    block
-        With poses of the photos that are needed.
-
-    Raises
-    ------
-    InputError
-        An unknown whose points or photos do not give it.
+    of its photos (the rotation nearest to the mean of matrices). InputError: an unknown whose points or
+    photos do not give it.
     """
     waiting = [each for each in block.unknowns if each.is_open]
     if not waiting:
@@ -52,21 +44,9 @@ def started(block: Block) -> Block:
         own = [one for one in block.observations if any(other is each for other in one.unknowns)]
         found[id(each)] = _FINDERS[type(each)](sites, each, own)
     return block.replace(
-        observations=[_with(each, found) for each in block.observations],
+        observations=[with_unknowns(each, found) for each in block.observations],
         mounts=[_on(each, found) for each in block.mounts],
     )
-
-
-def _with(observation: Observation, found: Mapping[int, Unknown]) -> Observation:
-    """Return an observation with unknowns that have their values."""
-    if not observation.UNKNOWNS:
-        return observation
-    changes: dict[str, Any] = {
-        name: found[id(each)]
-        for (name, _), each in zip(observation.UNKNOWNS, observation.unknowns, strict=True)
-        if id(each) in found
-    }
-    return replace(observation, **changes) if changes else observation
 
 
 def _on(mount: Mount, found: Mapping[int, Unknown]) -> Mount:
@@ -79,7 +59,7 @@ class _Sites:
     """Where points and photos of a block are before its adjustment, in cartesian axes."""
 
     def __init__(self, block: Block) -> None:
-        self.block, self.axes = block, Cartesian.of(block)
+        self.block, self.axes = block, Cartesian(block.spheroid)
         self.known = Known.of(block, self.axes)
         self.points = {name: row for row, name in enumerate(block.point_ids)}
         self.photos = {name: row for row, name in enumerate(block.photo_ids)}

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.a_priori import Cartesian, Known
+from photogram.adjustment.a_priori import Known
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
@@ -22,6 +22,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block, flown_by
 from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.film_reduction import as_seen, is_scanned
+from photogram.network.geometry import Cartesian
 from photogram.network.motion import at_rest, timed_photos
 from photogram.network.observations import Distance
 from photogram.network.subset import kept_images, of_photos
@@ -148,7 +149,7 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
         return replace(found, block=found.block.replace(**{name: getattr(block, name) for name in own}))
     if flown_by(block):
         return _beside_trajectories(block, keep_all=keep_all)
-    axes = Cartesian.of(block)
+    axes = Cartesian(block.spheroid)
     known = Known.of(block, axes)
     directions = image_directions(block)
     positions, attitudes, how, points, aside, first, misfit = _found(block, known, directions)

@@ -22,6 +22,7 @@ from photogram.network.cameras import images_of
 from photogram.network.motion import on_shared, timed_photos
 from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
 from photogram.network.projecting import projected_images
+from photogram.network.subset import image_rows
 from photogram.results.result import Result
 
 __all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
@@ -118,14 +119,8 @@ def _frame_images(block: Block) -> Floats:
 def at_adjusted(result: Result) -> Block:
     """Return the block of an adjustment with adjusted for given values, ready for :func:`predict`.
 
-    Images of points that were left out are left out too.
-
-    Raises
-    ------
-    AdjustmentError
-        The adjustment has not converged.
-    InputError
-        Photos on trajectories.
+    Images of points that were left out are left out too. AdjustmentError: the adjustment has not converged;
+    InputError: photos on trajectories.
     """
     if not result.converged:
         raise AdjustmentError(f"the adjustment has {result.status}: its positions are no plan")
@@ -140,10 +135,7 @@ def at_adjusted(result: Result) -> Block:
         point_positions=np.where(
             result.used_points[:, np.newaxis], result.point_positions, block.point_positions
         ),
-        image_photos=block.image_photos[used],
-        image_points=block.image_points[used],
-        image_xy=block.image_xy[used],
-        image_sd=block.image_sd[used],
+        **image_rows(block, used),
     )
 
 
@@ -161,8 +153,7 @@ def image_depths(block: Block) -> Floats:
         points = geometry.geographic_to_geocentric(points, block.spheroid)
         photos = geometry.geographic_to_geocentric(photos, block.spheroid)
     rays = points[block.image_points] - photos[block.image_photos]
-    depths: Floats = np.einsum("mi,mi->m", rays, directions[block.image_photos])
-    return depths
+    return np.asarray(np.einsum("mi,mi->m", rays, directions[block.image_photos]))
 
 
 def _check_observations(block: Block) -> Block:

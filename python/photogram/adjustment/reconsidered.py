@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian, Known
+from photogram.adjustment.a_priori import Known
 from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.annotations import check_arguments
@@ -23,6 +23,7 @@ from photogram.errors import AdjustmentError
 from photogram.messages import Message, counted
 from photogram.network.block import Block
 from photogram.network.directions import direction_deviations, image_directions
+from photogram.network.geometry import Cartesian
 from photogram.network.motion import timed_photos
 from photogram.network.subset import kept_images
 from photogram.results.result import Result
@@ -101,7 +102,7 @@ def _judged(started: FirstValues, result: Result) -> FirstValues:
 
 def _fitting(block: Block, aside: Bools, result: Result) -> Bools:
     """Return which images of a block are near the points of an adjustment, where these have a place."""
-    axes = Cartesian.of(block)
+    axes = Cartesian(block.spheroid)
     known = Known.of(block, axes)
     photos, points = block.image_photos, block.image_points
     to = axes.positions(np.where(result.used_points[:, np.newaxis], result.point_positions, np.nan))[points]

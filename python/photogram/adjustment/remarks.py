@@ -1,35 +1,42 @@
-"""How an adjustment ended, where a reader must be careful: remarks and errors with the names concerned."""
+"""How an adjustment ended, and where a reader must be careful: remarks and errors with names."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.coefficients import named_unknowns
-from photogram.adjustment.undetermined import weak_in_words
-from photogram.errors import AdjustmentError, RankError
+from photogram.adjustment.undetermined import named_unknowns, weak_in_words
+from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
+from photogram.network.motion import on_shared
+from photogram.network.refraction import metres_per_unit
 from photogram.network.trajectories import Coefficient
 
 __all__ = [
     "behind",
+    "check_cameras",
     "folded",
     "hardly_determined",
     "harmful",
     "harmful_points",
     "hidden",
+    "refraction_remarks",
     "rounded",
     "too_coarse",
     "undetermined",
 ]
 
+
 NEAR = 1e-3
 """A point nearer to a station than this part of the median of such distances is at its place."""
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
+HIGHEST_GIANT = 9000.0
+"""Metres: the flying height up to which Appendix F of the GIANT guide holds."""
 
 
 def undetermined(
@@ -47,15 +54,7 @@ def undetermined(
 
 
 def hardly_determined(status: str, weak: str, words: str = "") -> Message:
-    """Remark on a combination of unknowns that no step could follow to its end.
-
-    Parameters
-    ----------
-    status
-        Of the adjustment.
-    weak, words
-        The unknowns that it moves, and what that is, if anybody knows.
-    """
+    """Remark on unknowns, `weak`, that no step could follow to their end, and what that is in `words`."""
     ends = "stands still, but" if status == "converged" else "creeps:"
     return Undetermined(
         f"the sum of squares {ends} the observations hardly determine a combination of"
@@ -88,12 +87,8 @@ def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
 def harmful_points(weak: Sequence[tuple[int, float, float]], point_ids: Sequence[str]) -> list[Message]:
     """Remark on points at a station's own place, and on nearly parallel rays.
 
-    Parameters
-    ----------
-    weak
-        Points, how much worse they are along their rays than across, and their distance from a station.
-    point_ids
-        The names of all points.
+    Weak are points with how much worse they are along their rays than across, and their distance from a
+    station.
     """
     near = [(point, distance) for point, _, distance in weak if distance < NEAR]
     flat = [(point, ratio) for point, ratio, distance in weak if distance >= NEAR]
@@ -152,13 +147,7 @@ def _unknowns(
 
 
 def rounded(excess: float | None) -> list[Message]:
-    """Remark on cofactors and redundancy numbers that rounding has reached.
-
-    Parameters
-    ----------
-    excess
-        Sum of all redundancy numbers minus the degrees of freedom; None where it is not known.
-    """
+    """Remark on cofactors that rounding has reached: redundancy numbers sum up to so much in excess."""
     if excess is None or abs(excess) <= NOTABLE_EXCESS:
         return []
     return [
@@ -184,13 +173,8 @@ def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Remark on images beyond where the radial terms of a lens are one-to-one: they fit two directions.
 
     Points that are known give the ray, so that camera, pose or coordinates are wrong by more than an error of
-    measurement: that is an error. Where the point itself is unknown, one image may be a mistake, which its
-    residual shows: that is a remark, and the result is there to look for it.
-
-    Raises
-    ------
-    AdjustmentError
-        The point of such an image has given coordinates.
+    measurement: that is an AdjustmentError. Where the point itself is unknown, one image may be a mistake,
+    which its residual shows: that is a remark, and the result is there to look for it.
     """
     images = np.asarray(solution.images_folded)
     if not len(images):
@@ -229,14 +213,9 @@ def _fold_of(block: Block, solution: _photocore.BlockSolution, image: int) -> st
 
 
 def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
-    """Remark on image points whose point stands behind the camera: no ray can have made them.
+    """Remark on images, so many, whose point stands behind the camera: no ray can have made them.
 
-    Parameters
-    ----------
-    images
-        How many there are; zero for no remark.
-    points, photos
-        Names of what is concerned; no photos where there is one only.
+    No photos are named where there is one only.
     """
     if not images:
         return []
@@ -253,3 +232,38 @@ def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
         " them by more than their standard deviations, or than image coordinates show: count from an origin"
         " nearby (a standard deviation of 0 fixes a value)"
     )
+
+
+def check_cameras(block: Block) -> None:
+    """Refuse photos taken from below the water."""
+    refraction = block.refraction
+    if refraction is None or refraction.water is None:
+        return
+    sunk = np.flatnonzero((block.photo_positions[:, 2] <= refraction.water_level) & ~on_shared(block))
+    if sunk.size:
+        photo = int(sunk[0])
+        height, unit = block.photo_positions[photo, 2], block.linear_unit
+        raise InputError(
+            f"photo {block.photo_ids[photo]} is not above the water: its height is {height:.3f} {unit},"
+            f" the water level {refraction.water_level:.3f} {unit}"
+        )
+
+
+def refraction_remarks(block: Block, photo_positions: NDArray[np.float64]) -> list[Message]:
+    """Say where the models in force do not quite hold, for (P, 3) adjusted stations."""
+    refraction = block.refraction
+    if refraction is None or (refraction.air is None and refraction.water is None):
+        return []
+    messages = []
+    heights = metres_per_unit(block.linear_unit) * photo_positions[:, 2]
+    high = [block.photo_ids[photo] for photo in np.flatnonzero(heights > HIGHEST_GIANT)]
+    if refraction.air == "giant" and high:
+        messages.append(
+            Message(
+                f"the air refraction of GIANT holds up to {HIGHEST_GIANT:g} m, below the photos"
+                f' {listed(high)}: the model "standard" has no such limit'
+            )
+        )
+    if not block.geographic:
+        messages.append(Message("refraction in rectangular space takes Z as the height and the vertical"))
+    return messages

@@ -47,6 +47,11 @@ REASONS = {
     "undetermined": "the observations do not determine the pose",
 }
 """What :class:`RankError` says, by the kind of failure."""
+SOLVED = (
+    *("status", "cofactors", "pose_redundancy", "point_positions", "point_cofactors", "point_redundancy"),
+    *("residuals", "redundancy", "standardized", "degrees_of_freedom", "outside_danger_cylinder"),
+)
+"""What a resection has as the core gives it."""
 DOUBTFUL = 3.0
 """A station is near the danger cylinder when it is within this multiple of its standard deviation."""
 
@@ -166,8 +171,7 @@ class Resection(Judged):
     @property
     def sd(self) -> Floats:
         """(6,) standard deviations of position and attitude, from `covariance`."""
-        deviations: Floats = np.sqrt(np.diagonal(self.covariance))
-        return deviations
+        return np.asarray(np.sqrt(np.diagonal(self.covariance)))
 
 
 def resect(
@@ -267,18 +271,10 @@ def resect(
         max_iterations=max_iterations,
     )
     return Resection(
-        status=solution.status,
+        **{name: getattr(solution, name) for name in SOLVED},
         messages=_messages(solution, spheroid),
         position=solution.pose[:3],
         attitude=solution.pose[3:],
-        cofactors=solution.cofactors,
-        pose_redundancy=solution.pose_redundancy,
-        point_positions=solution.point_positions,
-        point_cofactors=solution.point_cofactors,
-        point_redundancy=solution.point_redundancy,
-        residuals=solution.residuals,
-        redundancy=solution.redundancy,
-        standardized=solution.standardized,
         pose_standardized=standardized(
             _nearest(known - solution.pose, [*([0] if spheroid else []), 3, 4, 5]),
             known_sd,
@@ -291,11 +287,9 @@ def resect(
         ),
         point_ids=given.names,
         weighted_sum_of_squares=solution.sum_of_squares,
-        degrees_of_freedom=solution.degrees_of_freedom,
         start=Pose.of(solution.start),
         iterations=[Iteration(*row) for row in solution.iterations],
         alternatives=[Pose.of(*other) for other in solution.alternatives],
-        outside_danger_cylinder=solution.outside_danger_cylinder,
     )
 
 
@@ -327,13 +321,7 @@ class Observed:
         principal_distance: float,
         point_ids: Sequence[str] | None,
     ) -> Self:
-        """Check what a caller gave.
-
-        Raises
-        ------
-        InputError
-            Another shape, a value that is not finite, or a standard deviation that is none.
-        """
+        """Return what a caller gave; InputError of another shape, or of values that cannot be."""
         count = length("image_xy", xy)
         ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
         if len(ids) != count:
@@ -346,16 +334,12 @@ class Observed:
             principal_distance=number("principal_distance", principal_distance),
             names=ids,
         )
+        weighs = (made.xy_sd > 0) & np.isfinite(made.xy_sd)
         checks = [
             ("object_points", made.points, np.isfinite(made.points), "is not finite"),
             ("object_sd", made.point_sd, np.isfinite(made.point_sd), "is not a finite standard deviation"),
             ("image_xy", made.xy, np.isfinite(made.xy), "is not finite"),
-            (
-                "image_sd",
-                made.xy_sd,
-                (made.xy_sd > 0) & np.isfinite(made.xy_sd),
-                "is not positive and finite",
-            ),
+            ("image_sd", made.xy_sd, weighs, "is not positive and finite"),
         ]
         for name, values, good, why in checks:
             rows = np.flatnonzero(~good.all(axis=1))
@@ -381,12 +365,7 @@ def solve(
 ) -> _photocore.ResectionSolution:
     """Resect with everything the core offers: :func:`resect` and the programs on top of it call this.
 
-    Raises
-    ------
-    RankError
-        The pose is not determined; the message says why.
-    AdjustmentError
-        Any other failure.
+    RankError: the pose is not determined; the message says why. AdjustmentError: any other failure.
     """
     try:
         return _photocore.resect(

@@ -26,13 +26,7 @@ NOTABLE = 0.5
 
 
 def loss_row(loss: Loss | None) -> tuple[str, float] | None:
-    """Return a loss and its scale as the core takes them.
-
-    Raises
-    ------
-    InputError
-        A loss that there is not, a scale that is not positive.
-    """
+    """Return a loss and its scale as the core takes them; InputError where there is none such."""
     if loss is None:
         return None
     if isinstance(loss, tuple) and len(loss) == 2:

@@ -11,8 +11,16 @@ from typing import Any, get_args
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import Progress, UnitVariance, adjust, adjusted_from, core_threads
-from photogram.adjustment.consensus import started_by_consensus
+from photogram.adjustment.adjustment import (
+    Progress,
+    UnitVariance,
+    adjust,
+    adjusted_from,
+    core_options,
+    core_threads,
+)
+from photogram.adjustment.first_values import FirstValues, first_values
+from photogram.adjustment.remarks import check_cameras
 from photogram.arguments.arrays import number, one_of, truth_value, whole_number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
@@ -20,7 +28,7 @@ from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.motion import timed_photos
-from photogram.network.refracted import check_cameras
+from photogram.network.subset import image_rows
 from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.network import AdjustedNetwork
@@ -47,8 +55,11 @@ __all__ = [
     "gone",
     "snoop",
     "snooped_network",
+    "started_by_consensus",
     "used_images",
 ]
+MOST_PHOTOS = 0.2
+"""Of the photos, that may agree with no pose: with more it is the consensus that is wrong."""
 
 
 def snoop(
@@ -143,13 +154,7 @@ def snooped_network(
 def settings_of(
     level: float, fdr: float | None, unit_weight: str, robust: bool | None, max_rounds: int
 ) -> Settings:
-    """Return checked options.
-
-    Raises
-    ------
-    InputError
-        One that cannot be.
-    """
+    """Return checked options."""
     one_of("unit_weight", unit_weight, ("known", "unknown"))
     if robust is not None:
         truth_value("robust", robust)
@@ -191,11 +196,11 @@ def _snoop_block(
         if found is None:
             return None
         start, aside = found
-        trial.restart(core_trial(start, None, options_of(unit_variance), threads))
+        trial.restart(core_trial(start, None, core_options(unit_variance, None), threads))
         return aside
 
     try:
-        trial = block_trial(block, None, options_of(unit_variance), threads, parts=parts)
+        trial = block_trial(block, None, core_options(unit_variance, None), threads, parts=parts)
         outcome = snooped(trial, settings, afresh)
     except (LostSupportError, _photocore.BlockError):
         # It says by name what is not determined, or goes on where points have to leave.
@@ -203,7 +208,7 @@ def _snoop_block(
         if not first.converged and settings.robust is not False:
             first = adjusted(block, covariance=False, loss="huber")
         trial, outcome = _snooped_from(first, settings, threads, parts=parts)
-    cleaned, options = _without(block, trial, outcome.out), options_of(unit_variance)
+    cleaned, options = _without(block, trial, outcome.out), core_options(unit_variance, None)
     result = adjusted_from(cleaned, options, threads=threads, progress=progress)
     has_held = any(
         (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
@@ -229,16 +234,8 @@ def finished(
 ) -> Snooped:
     """Return what snooping gives, with what it has to say among the messages of its result.
 
-    Parameters
-    ----------
-    result
-        The adjustment without what is out.
-    trial, outcome, settings
-        What was tried, and what came of it.
-    held
-        Tests what is held in an adjustment of everything: it may explain more than what was taken out.
-    exchanged
-        Names that are exchanged.
+    The result is without what is out; `held` tests what is held in an adjustment of everything: it may
+    explain more than what was taken out.
     """
     largest = max((entry.statistic for entry in outcome.log if entry.is_out), default=math.inf)
     said = list(outcome.remarks)
@@ -292,20 +289,6 @@ def _snooped_from(
     raise AdjustmentError(f"the block cannot be tested: {reason.args[0]}") from reason
 
 
-def options_of(unit_variance: UnitVariance) -> CoreOptions:
-    """Return how the core adjusts a block that is snooped: as :func:`photogram.adjust` does by default."""
-    return CoreOptions(
-        criterion="fraction",
-        limit=1e-5,
-        max_iterations=50,
-        covariance=True,
-        loss=None,
-        ordering="auto",
-        unit_variance=unit_variance,
-        minimum=None,
-    )
-
-
 def block_trial(
     block: Block,
     state: _photocore.BlockState | None,
@@ -356,10 +339,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
         photo_attitude_sd=attitude_sd,
         point_positions=point_positions,
         point_sd=point_sd,
-        image_photos=block.image_photos[images],
-        image_points=block.image_points[images],
-        image_xy=block.image_xy[images],
-        image_sd=block.image_sd[images],
+        **image_rows(block, images),
         observations=[each for row, each in enumerate(block.observations) if row not in dropped],
     )
 
@@ -368,3 +348,61 @@ def _observed(initial: Floats, observed: Floats | None, sd: Floats) -> Floats | 
     """Return what was observed; nothing where nothing is weighted."""
     weighted = bool((np.isfinite(sd) & (sd > 0)).any())
     return initial if observed is None and weighted else observed
+
+
+def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
+    """Return a block with first values of its images alone, and what does not fit them.
+
+    The given poses of photos that are not held are not used: they may be of a block that errors have bent.
+    None where there is no consensus in the datum of the block, or nothing against it, and where photos are on
+    frames or trajectories: each is no picture with a pose of its own.
+    """
+    found = None if block.mounts or block.timed else _consensus(block)
+    if found is None:
+        return None
+    wrong = {
+        photo: found.missing[name] for photo, name in enumerate(block.photo_ids) if name in found.contradicted
+    }
+    if len(wrong) > MOST_PHOTOS * len(block.photo_ids) or not (wrong or found.set_aside.any()):
+        return None
+    return _started(block, found), Aside(tuple(np.flatnonzero(found.set_aside).tolist()), wrong)
+
+
+def _consensus(block: Block) -> FirstValues | None:
+    """Return first values in the datum of control, or where that does not do of observed positions."""
+    free = (block.photo_position_sd != 0) | (block.photo_attitude_sd != 0)
+    observed = block.photo_positions_observed
+    observed = block.photo_positions if observed is None else observed
+    weighted = np.isfinite(block.photo_position_sd) & (block.photo_position_sd > 0)
+    unknown = block.replace(
+        photo_positions=np.where(free, np.nan, block.photo_positions),
+        photo_attitudes=np.where(free, np.nan, block.photo_attitudes),
+        photo_positions_observed=None,
+        photo_attitudes_observed=None,
+        photo_position_sd=np.where(free, np.inf, block.photo_position_sd),
+        photo_attitude_sd=np.where(free, np.inf, block.photo_attitude_sd),
+    )
+    tries = [unknown]
+    if weighted.any():
+        sd = np.where(free & ~weighted, np.inf, block.photo_position_sd)
+        tries.append(unknown.replace(photo_positions_observed=observed, photo_position_sd=sd))
+    for each in tries:
+        try:
+            found = first_values(each)
+        except (AdjustmentError, InputError):
+            continue
+        if found.first_photo is None:
+            return found
+    return None
+
+
+def _started(block: Block, found: FirstValues) -> Block:
+    """Return the block with the poses that were found; what is observed of it stays."""
+    changes: dict[str, Floats] = {}
+    for name in ("position", "attitude"):
+        given, sd = getattr(block, f"photo_{name}s"), getattr(block, f"photo_{name}_sd")
+        values = getattr(found.block, f"photo_{name}s")
+        changes[f"photo_{name}s"] = np.where((sd == 0) | np.isnan(values), given, values)
+        if getattr(block, f"photo_{name}s_observed") is None and np.isfinite(sd).any():
+            changes[f"photo_{name}s_observed"] = given
+    return block.replace(**changes)

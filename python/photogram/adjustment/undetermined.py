@@ -1,4 +1,4 @@
-"""Combinations of unknowns that the observations leave undetermined, in words."""
+"""Combinations of unknowns that the observations leave undetermined, in words; names of common unknowns."""
 
 from __future__ import annotations
 
@@ -7,19 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.adjustment.coefficients import named_unknowns, of_motion
 from photogram.errors import RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.network.block import Block, flown_by
-from photogram.network.geometry import rotation_matrix, viewing_directions
+from photogram.network.geometry import photo_axes, viewing_directions
 from photogram.network.motion import on_shared, scanners
+from photogram.network.observations import moments
+from photogram.network.trajectories import Coefficient, Spline, Trajectory
 from photogram.network.unknowns import Unknown
 
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = ["Setting", "in_words", "undetermined_combinations", "weak_in_words"]
+__all__ = [
+    "Setting",
+    "in_words",
+    "named_unknowns",
+    "of_motion",
+    "outside",
+    "undetermined_combinations",
+    "weak_in_words",
+]
+
 
 _Combination = tuple[
     tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...], tuple[str, ...]
@@ -58,20 +68,9 @@ _ON_LINE = 1e-3
 class Setting:
     """How the photos of a block stand, as far as their words depend on it.
 
-    Attributes
-    ----------
-    photos
-        How many there are.
-    parallel
-        Whether all look in about the same direction.
-    upright
-        Whether none is turned about its axis: the x axes, or the y axes, of all are across one direction.
-    control
-        Whether something is known of points.
-    heights
-        Whether a height of a point or photo is known.
-    on_line
-        Whether all places that are known, of points and photos, are on one straight line.
+    They are `parallel` where all look in about the same direction, `upright` where none is turned about its
+    axis: the x axes, or the y axes, of all are across one direction. `control` is known of points, `heights`
+    of a point or photo; `on_line` are all known places, of points and photos, on one straight line.
     """
 
     photos: int = 0
@@ -89,8 +88,7 @@ def setting_of(block: Block) -> Setting:
     moving = on_shared(block) | scanners(block)
     if photos < 2 or block.geographic or moving.any() or not np.isfinite(block.photo_attitudes).all():
         return Setting(photos, control=control)
-    axes = rotation_matrix(block.photo_attitudes)
-    axes = axes.transpose(0, 2, 1) if block.photo_to_ground else axes
+    axes = photo_axes(block.photo_attitudes, block.photo_to_ground).transpose(0, 2, 1)
     across = [float(np.linalg.svd(axes[:, k], compute_uv=False)[-1]) for k in (0, 1)]
     known = np.concatenate(
         [
@@ -269,18 +267,8 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
 def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> str:
     """Return what parameters of cameras and parts of poses cannot be told apart, and what would help.
 
-    Parameters
-    ----------
-    names
-        The parameters.
-    poses
-        `along`, `across`, `tilt`, `swing`.
-    setting
-        How the photos stand; None where that is not known.
-
-    Returns
-    -------
-    Nothing for what has no name.
+    Parts are `along`, `across`, `tilt`, `swing`; None stands for a setting that is not known. Nothing for
+    what has no name.
     """
     at = setting or Setting()
     radial = {name for name in names if name[0] in "KkA" and name[1:].isdigit()}
@@ -338,3 +326,84 @@ def _of_setting(names: set[str], at: Setting) -> str:
             " height (weaker), or distances along and across the axis"
         )
     return ""
+
+
+def named_unknowns(block: Block, unknowns: Sequence[Unknown]) -> list[str]:
+    """Name common unknowns, each once; coefficients by their trajectories and, of splines, times."""
+    found = list(dict.fromkeys(each.title for each in unknowns if not isinstance(each, Coefficient)))
+    wanted = {id(each) for each in unknowns if isinstance(each, Coefficient)}
+    if not wanted:
+        return found
+    every = block.all_trajectories
+    for part, what in enumerate(("positions", "rotations")):
+        names = [name for each in every if (name := _named(each, part, wanted))]
+        found += [f"{what} of {listed(names)}"] if names else []
+    known = {id(each) for own in every for each in (*own.coefficients[0], *own.coefficients[1])}
+    others = [each.title for each in unknowns if isinstance(each, Coefficient) and id(each) not in known]
+    return [*found, *dict.fromkeys(others)]
+
+
+def _named(trajectory: Trajectory, part: int, wanted: set[int]) -> str:
+    """Return the name of a trajectory, with the times that its coefficients are of; nothing of others."""
+    own = [k for k, each in enumerate(trajectory.coefficients[part]) if id(each) in wanted]
+    basis = (trajectory.position, trajectory.rotation)[part]
+    if not own:
+        return ""
+    if not isinstance(basis, Spline):
+        return trajectory.name
+    knots = np.asarray(basis.knots, dtype=float)
+    first, last = trajectory.table.span
+    begin, end = max(knots[own[0]], first), min(knots[own[-1] + basis.degree + 1], last)
+    return f"{trajectory.name} between {begin:.10g} and {end:.10g} s"
+
+
+def outside(block: Block, photo: int, points: Sequence[int], seconds: Sequence[float]) -> str:
+    """Say what is at a time that its trajectory does not reach.
+
+    Records on trajectories stand behind the photos; `points` has the point of the image, none where it is the
+    photo itself, or a record. `seconds` are that time, and the first and the last that the trajectory
+    reaches, from its origin.
+    """
+    count = len(block.photo_ids)
+    if photo < count:
+        what = f"the photo {block.photo_ids[photo]}"
+        if points:
+            what = f"the image of point {block.point_ids[points[0]]} on {what}"
+        trajectories = zip(block.timed, block.trajectories, strict=True)
+        trajectory = next(on for own, on in trajectories if own.photo == block.photo_ids[photo])
+    else:
+        record = moments(block.observations)[photo - count]
+        trajectory = record.trajectory
+        what = f"what was observed of {record.name}"
+    time, first, last = (trajectory.origin + each for each in seconds)
+    return (
+        f"{what} is at {time:.12g} s, beyond the trajectory {trajectory.name}, which reaches from {first!r}"
+        f" to {last!r} s: half a record beyond its table, within its knots"
+    )
+
+
+def of_motion(kinds: set[str], *, placed: bool) -> str:
+    """Say what unknowns of motion of such kinds cannot be told apart, and what would help; else nothing.
+
+    `placed`: there is control, or anything beside images, so that it may not be the datum that is open.
+    """
+    coefficients = kinds & {"position coefficient", "rotation coefficient"}
+    if "readout" in kinds and coefficients:
+        return (
+            "readout time and motion of the photos, of which only the products are seen: the readout time"
+            " given or weighted, velocities of GNSS, rates that are weighted, or a trajectory that several"
+            " exposures share"
+        )
+    if "clock" in kinds and coefficients:
+        return (
+            "clock offset and position along the track: strips in opposite directions, control, or an offset"
+            " that is given or weighted"
+        )
+    if not placed or not coefficients or coefficients != kinds:
+        return ""
+    if len(coefficients) == 2:
+        return (
+            "position and attitude of the trajectory: along the track and pitch, or across and roll: weights,"
+            " a second line that looks elsewhere, or control"
+        )
+    return "nothing there tells them: weights or smoothness of coefficients, a lower degree, or fewer knots"

@@ -106,8 +106,13 @@ def variance_function(
         raise InputError("the values are all zero, or there are no redundancy numbers")
     share = np.repeat((values / largest) ** 2, 2)
     terms = np.stack([np.ones(2 * images), share], axis=1)
-    grouping = _each(
-        seen.point_observed.shape, seen.photo_observed.shape, len(seen.given.observations), images
+    # A group for each image coordinate, and nothing else.
+    grouping = Grouping(
+        groups=GroupsOf(("",) * (2 * images)),
+        images=np.arange(2 * images).reshape(-1, 2),
+        points=np.full(seen.point_observed.shape, -1),
+        photos=np.full(seen.photo_observed.shape, -1),
+        observations=np.full(len(seen.given.observations), -1),
     )
     first = True
 
@@ -133,17 +138,6 @@ def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) 
     if not ((values >= 0) & np.isfinite(values)).all():
         raise InputError("values that a variance is a function of are finite and not negative")
     return np.asarray(values)
-
-
-def _each(points: tuple[int, ...], photos: tuple[int, ...], observations: int, images: int) -> Grouping:
-    """Return a group for each image coordinate, and nothing else."""
-    return Grouping(
-        groups=GroupsOf(("",) * (2 * images)),
-        images=np.arange(2 * images).reshape(-1, 2),
-        points=np.full(points, -1),
-        photos=np.full(photos, -1),
-        observations=np.full(observations, -1),
-    )
 
 
 def _bins(

@@ -174,8 +174,8 @@ def _true_motion(truth: Block) -> dict[str, object]:
     """Return readout times, motions and trajectories of a simulated block; nothing where nothing moves."""
     import numpy as np
 
+    from photogram.network.motion import given_poses
     from photogram.network.trajectories import Readout
-    from photogram.network.whereabouts import given_poses
 
     if not truth.timed:
         return {}

@@ -19,8 +19,7 @@ from photogram.adjustment.adjustment import (
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.collection.collection import Collection
-from photogram.collection.core_arrays import collection_network
-from photogram.collection.failures import named
+from photogram.collection.core_arrays import collection_network, named
 from photogram.collection.result import AdjustedCollection
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.core_arrays import CoreOptions
@@ -96,32 +95,18 @@ def adjust(
     if tolerance is None:
         tolerance = 1e-8 if loss is None else 1e-6
     check_iteration(ordering, max_iterations, tolerance)
-    options = options_of(
-        tolerance, max_iterations, covariance=covariance, loss=loss_row(loss), ordering=ordering
-    )
-    return adjusted(collection, options, threads=threads, progress=progress)
-
-
-def options_of(
-    decrease: float,
-    max_iterations: int = 200,
-    *,
-    covariance: bool = True,
-    loss: tuple[str, float] | None = None,
-    ordering: str = "auto",
-) -> CoreOptions:
-    """Return how the core adjusts a collection: until a step lowers what is minimised by a small part."""
-    return CoreOptions(
+    options = CoreOptions(
         criterion="decrease",
-        limit=decrease,
+        limit=tolerance,
         max_iterations=max_iterations,
         covariance=covariance,
-        loss=loss,
+        loss=loss_row(loss),
         ordering=ordering,
         unit_variance="constrained",
         minimum=None,
         points_given=True,
     )
+    return adjusted(collection, options, threads=threads, progress=progress)
 
 
 def adjusted(

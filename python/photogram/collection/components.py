@@ -6,13 +6,11 @@ import numpy as np
 
 from photogram.adjustment.components import first_adjusted, scaled
 from photogram.arguments.types import Floats
-from photogram.collection.adjust import adjusted, options_of
+from photogram.collection.adjust import adjust
 from photogram.collection.collection import Collection
 from photogram.collection.result import AdjustedCollection
 from photogram.results.group_sums import observables
 from photogram.results.grouping import Grouping, Observables
-
-__all__: list[str] = []
 
 DECREASE = 1e-12
 """Part of the sum of squares by which steps still lower it: components want adjustments that are sharp."""
@@ -50,4 +48,4 @@ def scaled_collection(collection: Collection, grouping: Grouping, factors: Float
 @first_adjusted.register
 def _(network: Collection, *, tolerance: float, threads: int | None) -> AdjustedCollection:
     del tolerance
-    return adjusted(network, options_of(DECREASE), threads=threads)
+    return adjust(network, tolerance=DECREASE, threads=threads)

@@ -1,13 +1,24 @@
-"""A collection as the core takes it."""
+"""A collection as the core takes it and tests ask it, and what the core has refused of it, in words."""
 
 from __future__ import annotations
 
-from photogram import _photocore
-from photogram.collection.collection import Collection
-from photogram.memory import available_memory
-from photogram.network.core_arrays import CoreOptions, core_network
+from collections.abc import Sequence
 
-__all__ = ["collection_network"]
+import numpy as np
+
+from photogram import _photocore
+from photogram.adjustment.remarks import too_coarse
+from photogram.arguments.types import Indices
+from photogram.collection.collection import POSE, Collection
+from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
+from photogram.memory import available_memory
+from photogram.messages import listed
+from photogram.network.core_arrays import CoreOptions, core_network
+from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
+
+__all__ = ["collection_network", "collection_trial", "named"]
+ROUGH, EXACT = 1e-7, 1e-12
+"""A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
 
 
 @core_network.register
@@ -30,3 +41,69 @@ def collection_network(given: Collection, options: CoreOptions) -> _photocore.Co
         ordering=options.ordering,
         memory=available_memory(),
     )
+
+
+def named(
+    kind: str,
+    message: str,
+    combinations: list[_photocore.CombinationRow],
+    points: list[int],
+    _seconds: list[float],
+) -> AdjustmentError | InputError:
+    """Put a failure of the core into words; photos and points have no names but their numbers, from 0."""
+    if kind == "undetermined points":
+        names = [str(point) for point in points]
+        return RankError(f"their rays do not determine {len(names)} points: {listed(names)}", [], names)
+    if kind == "undetermined photos":
+        names = [str(photo) for photo in sorted({photo for each in combinations for photo in each[0]})]
+        text = (
+            f"the observations leave {len(combinations)} combinations of unknowns undetermined, moving photos"
+        )
+        return RankError(f"{text} {listed(names)}", names, [])
+    if kind == "coarse":
+        return too_coarse([str(photo) for photo in combinations[0][0]], [str(point) for point in points])
+    if kind == "left out":
+        return InputError(f"the point {points[0]} was left out of the adjustment")
+    if kind == "memory":
+        return OutOfMemoryError(message)
+    return AdjustmentError(message)
+
+
+def collection_trial(
+    collection: Collection, core: _photocore.NetworkTrial, *, parts: bool = True
+) -> NetworkTrial:
+    """Return a collection as tests ask it."""
+    return NetworkTrial(
+        core=core,
+        suspects=_Named(collection, core.suspects, parts).suspects(),
+        supported=np.asarray(np.isfinite(collection.photo_sd).all(axis=1)),
+        rough=ROUGH,
+        exact=EXACT,
+    )
+
+
+class _Named(NamedSuspects):
+    def __init__(self, collection: Collection, core: _photocore.NetworkSuspects, parts: bool) -> None:
+        components = ("XYZ", POSE[3:], POSE[:3])
+        super().__init__(collection, core, apart=parts, components=components, lengths=("",) * 3)
+        self.parameters = collection.parameters[len(POSE) :]
+
+    def parts(self, group: int) -> Sequence[Sequence[int]] | None:
+        """Return the rows that may go alone: of control single ones or all, of a station single ones."""
+        size = int(self.starts[group + 1] - self.starts[group])
+        if not self.apart or int(self.kinds[group]) == IMAGE or size < 2:
+            return None
+        single = [(row,) for row in range(size)]
+        return [*single, tuple(range(size))] if int(self.kinds[group]) == CONTROL else single
+
+    def other_loads(self, kind: int, subject: int) -> Indices:
+        """Return the photo whose camera it is."""
+        return np.array([subject])
+
+    def other_name(self, kind: int, subject: int) -> str:
+        """Return what the camera of a photo is called."""
+        return f"{KINDS[kind]} of {self.photo_name(subject)}"
+
+    def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
+        """Return a parameter of a camera."""
+        return self.parameters[component], ""

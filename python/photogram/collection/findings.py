@@ -1,4 +1,4 @@
-"""What the verdict on an adjusted collection rests on."""
+"""What the verdict on an adjusted collection rests on; what is held is tested by scores, as of blocks."""
 
 from __future__ import annotations
 
@@ -6,19 +6,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.collection.fixed_tests import collection_held
+from photogram import _photocore
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.collection.collection import POSE
 from photogram.collection.result import AdjustedCollection
 from photogram.results.findings import network_findings
+from photogram.results.fixed_tests import SUSPECTED, Held, held_tests
 from photogram.results.patterns import CameraImages, patterns
 from photogram.show.methods import findings_of
-from photogram.statistics.findings import Findings
+from photogram.statistics.findings import Findings, Tested
 
-__all__ = ["collection_findings"]
+__all__ = ["collection_findings", "collection_held"]
+
 
 NO_DATUM = (
     "Nothing gives the network a datum: shapes and relative precision can be used, absolute positions and the"
     " scale mean nothing."
 )
+FIRST_OF_TRANSLATION = 3
+STEP = 1e-6
+"""Of a parameter, in its own size or one."""
+POINTS = 3
+"""Coordinates of a point, whose partials stand behind those of the photos."""
 
 
 @findings_of.register(AdjustedCollection)
@@ -35,3 +44,70 @@ def collection_findings(result: AdjustedCollection) -> Findings:
         " or `cauchy` lowers their weights.",
         if_usable=[NO_DATUM] if result.datum else [],
     )
+
+
+def collection_held(result: AdjustedCollection) -> list[Tested]:
+    """Return tests of the held parameters and points with the worst images, where residuals are too large."""
+    return held_tests(result, lambda of_images: _suspected(result, of_images), lambda: _partials(result))
+
+
+def _suspected(result: AdjustedCollection, of_images: Floats) -> list[Held]:
+    """Return what is held and has the worst images, the worst first."""
+    collection, used = result.collection, result.used_images
+    rows: list[tuple[float, Held]] = []
+
+    def add(name: str, own: Indices, which: int, partials: Indices) -> None:
+        images = np.flatnonzero(used & (own == which))
+        if len(images):
+            worst = float(of_images[images].mean())
+            rows.append((worst, Held(f"{name}, which is held", images, partials)))
+
+    for photo in _worst(collection.image_photos, of_images, (collection.photo_sd == 0).any(axis=1)):
+        held = np.flatnonzero(collection.photo_sd[photo] == 0)
+        for what, part in (
+            ("rotation", held[held < FIRST_OF_TRANSLATION]),
+            ("translation", held[(held >= FIRST_OF_TRANSLATION) & (held < len(POSE))]),
+            ("camera", held[held >= len(POSE)]),
+        ):
+            if len(part):
+                add(f"{what} of photo {photo}", collection.image_photos, photo, part)
+    width = collection.photo_parameters.shape[1]
+    for point in _worst(collection.image_points, of_images, (collection.point_sd == 0).all(axis=1)):
+        add(f"control point {point}", collection.image_points, point, width + np.arange(POINTS))
+    rows.sort(key=lambda row: -row[0])
+    return [each for _, each in rows[: 3 * SUSPECTED]]
+
+
+def _worst(own: Indices, of_images: Floats, held: Bools) -> list[int]:
+    """Return the photos or points that are held and have the worst images, the worst first."""
+    counts = np.bincount(own, minlength=len(held))
+    mean = np.bincount(own, of_images, len(held)) / np.maximum(counts, 1)
+    rows = np.flatnonzero(held & (counts > 0))
+    return [int(row) for row in rows[np.argsort(-mean[rows], kind="stable")][:SUSPECTED]]
+
+
+def _partials(result: AdjustedCollection) -> Floats:
+    """(k + 3, m, 2) partials of the images by the parameters of their photos and by the coordinates."""
+    collection = result.collection
+    photos = result.photo_parameters[collection.image_photos]
+    points = result.point_positions[collection.image_points]
+    found = np.full((photos.shape[1] + POINTS, len(photos), 2), np.nan)
+    seen = np.flatnonzero(result.used_images)
+    photos, points = photos[seen], points[seen]
+
+    def images(photos: Floats, points: Floats) -> Floats:
+        return _photocore.collection_images(collection.camera, photos, points)
+
+    size = float(np.median(np.abs(points)))
+    for k in range(len(found)):
+        of_photo = k < photos.shape[1]
+        values = photos[:, k] if of_photo else np.full(len(points), size)
+        step = STEP * np.maximum(np.abs(values), 1.0 if of_photo else size)
+        ends = []
+        for sign in (1, -1):
+            moved = [photos.copy(), points.copy()]
+            column = k if of_photo else k - photos.shape[1]
+            moved[0 if of_photo else 1][:, column] += sign * step
+            ends.append(images(*moved))
+        found[k, seen] = (ends[0] - ends[1]) / (2 * step[:, np.newaxis])
+    return found

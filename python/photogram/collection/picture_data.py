@@ -26,13 +26,7 @@ SHOWN = 60
 
 
 class PicturedCollection(PicturedNetwork):
-    """What is drawn of an adjusted collection, whose photos have cameras of their own.
-
-    Parameters
-    ----------
-    result
-        The adjusted collection.
-    """
+    """What is drawn of an adjusted collection, whose photos have cameras of their own."""
 
     result: AdjustedCollection
 

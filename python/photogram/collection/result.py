@@ -8,9 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.collection.core_arrays import collection_network
-from photogram.collection.failures import named
-from photogram.collection.suspects import collection_trial
+from photogram.collection.core_arrays import collection_network, collection_trial, named
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.covariance import Failure
 from photogram.results.network import AdjustedNetwork

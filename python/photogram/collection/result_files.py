@@ -59,13 +59,7 @@ def collection_files(result: AdjustedCollection) -> dict[str, Content]:
 
 
 def read_collection_result(folder: Path, document: Mapping[str, Any]) -> AdjustedCollection:
-    """Return the result of a collection that a folder keeps.
-
-    Raises
-    ------
-    InputError
-        Files that are missing, damaged or contradict each other.
-    """
+    """Return the result of a collection that a folder keeps; InputError of files that do not hold one."""
     saved = read_saved(folder, (CoreOptions, Iteration, Message), document)
     given = saved.members("collection", Collection)
     images = saved.sheets["images"]

@@ -17,20 +17,18 @@ from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
-from photogram.collection.core_arrays import collection_network
-from photogram.collection.fixed_tests import collection_held
+from photogram.collection.core_arrays import collection_network, collection_trial
+from photogram.collection.findings import collection_held
 from photogram.collection.result import POSE, AdjustedCollection
-from photogram.collection.suspects import collection_trial
 from photogram.errors import AdjustmentError
 from photogram.network.core_arrays import CoreOptions
+from photogram.network.subset import image_rows
 from photogram.results.exchanged_names import exchanged_names
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooping_result import Snooped
 from photogram.statistics.snooping.factors import MEDIAN_OF_TWO
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
-
-__all__: list[str] = []
 
 LOSSES: tuple[LossName, ...] = ("huber", "cauchy")
 FAR = 5.0
@@ -144,8 +142,5 @@ def _without(first: AdjustedCollection, trial: NetworkTrial, out: Out) -> Collec
         point_positions=np.where(np.isinf(point_sd), points, given.point_positions),
         photo_sd=photo_sd,
         point_sd=point_sd,
-        image_photos=given.image_photos[images],
-        image_points=given.image_points[images],
-        image_xy=given.image_xy[images],
-        image_sd=given.image_sd[images],
+        **image_rows(given, images),
     )

@@ -13,10 +13,10 @@ from photogram.diagnosis.hypotheses import Change, Hypothesis, quaternion_readin
 from photogram.diagnosis.time_bases import differences
 from photogram.diagnosis.trajectory_images import flown_predictions
 from photogram.network.block import Block
+from photogram.network.motion import timed_images
 from photogram.network.moving_photos import Lines, Timed
 from photogram.network.observations import Position
 from photogram.network.trajectories import Table, Trajectory
-from photogram.network.trajectory_arrays import timed_images
 
 __all__ = ["flown_hypotheses", "shifted_records", "shifts"]
 

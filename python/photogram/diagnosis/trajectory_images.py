@@ -16,12 +16,10 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.directions import image_directions
 from photogram.network.geometry import geographic_to_geocentric
-from photogram.network.motion import timed_photos
+from photogram.network.motion import given_poses, timed_images, timed_photos
 from photogram.network.projecting import camera_of, projected
 from photogram.network.rays import meet
 from photogram.network.subset import kept_images
-from photogram.network.trajectory_arrays import timed_images
-from photogram.network.whereabouts import given_poses
 
 __all__ = ["flown_misfits", "flown_predictions", "flown_view"]
 

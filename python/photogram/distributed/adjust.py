@@ -1,4 +1,4 @@
-"""Blocks that are in memory, adjusted in parts: on a cluster, or one part after the other."""
+"""Adjustment in parts: blocks in memory, and runs, on a cluster or one part after the other."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import orjson
 
+from photogram import _photocore
 from photogram.adjustment.adjustment import (
     AsPublished,
     Progress,
@@ -22,19 +23,27 @@ from photogram.adjustment.adjustment import (
     with_datum,
 )
 from photogram.adjustment.first_features import started
+from photogram.adjustment.remarks import check_cameras
 from photogram.adjustment.robust import Loss
 from photogram.arguments.annotations import check_arguments
-from photogram.distributed.counts import UNKNOWNS, Counts, counted_work
+from photogram.distributed.cut import UNKNOWNS, Counts, counted_work
+from photogram.distributed.datum import Mover
 from photogram.distributed.division import Division
+from photogram.distributed.driver import Driver, Outcome, Stop
+from photogram.distributed.executors import Executor, Serial, Workers, check_workers, connected
 from photogram.distributed.files import alone
 from photogram.distributed.graph import alone_of, incidence_of, vertices_of
 from photogram.distributed.merging import merged
+from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.parts import IN_TABLES
-from photogram.distributed.plan import PartsPlan
-from photogram.distributed.run import partition, places_of
-from photogram.distributed.running import Run, opened
+from photogram.distributed.plan import SHARE, PartsPlan, measured_rates
+from photogram.distributed.run import MANIFEST, Manifest, partition, places_of, read_manifest
+from photogram.distributed.shelf import shelf
+from photogram.distributed.tasks import Job, predicted
 from photogram.errors import InputError
 from photogram.io.structure import Encoder
+from photogram.lazy_dataclasses import dataclass
+from photogram.memory import resident_memory
 from photogram.network.block import Block, checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.datum import (
@@ -44,14 +53,17 @@ from photogram.network.datum import (
     check_datum,
 )
 from photogram.network.films import Scan
-from photogram.network.refracted import check_cameras
-from photogram.results.block_files import STANDS
 from photogram.results.result import Result
 
-__all__ = ["adjust_in_parts", "fingerprint", "plan_in_parts"]
+__all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
+
 
 WHOLE = 950.0
 """Bytes of an image point, with its share of its point and of the result, of a block adjusted as a whole."""
+PARTS_A_WORKER = 4
+"""So that a slow worker does not hold the rest."""
+LEAST_PHOTOS = 20
+"""Of a part: smaller ones are all border."""
 
 
 def adjust_in_parts(
@@ -220,3 +232,126 @@ def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None)
 
 
 check_arguments(globals(), ["adjust_in_parts", "plan_in_parts"])
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run whose parts lie in its folder: planned, or carried out.
+
+    Attributes
+    ----------
+    folder
+        Of the run.
+    manifest
+        What all nodes have in common.
+    executor
+        Does the tasks.
+    job
+        What tasks are told.
+    workers
+        How many do them.
+    memory
+        Bytes of each; None for any number.
+    held
+        Bytes that a worker holds before it begins.
+    """
+
+    folder: Path
+    manifest: Manifest
+    executor: Executor
+    job: Job
+    workers: int
+    memory: int | None
+    held: int
+
+    def plan(self, *, measured: bool = True) -> PartsPlan:
+        """Return the plan; `measured` has one part formed here, for the time that all will take."""
+        nodes = range(len(self.manifest.tree))
+        handles = [self.executor.submit(predicted, self.job, node) for node in nodes]
+        predictions = [self.executor.value(each) for each in handles]
+        self.executor.forget(handles)
+        rates = None
+        if measured:
+            leaves = [node for node in nodes if not self.manifest.tree.children[node]]
+            largest = max(leaves, key=lambda node: predictions[node]["images"])
+            rates = measured_rates(self.job.engine.node(self.folder, largest))
+        photos, tree = self.manifest.photos, self.manifest.tree
+        return PartsPlan(tree, predictions, photos, self.workers, self.memory, rates, self.held)
+
+    def adjust(
+        self, progress: Callable[[Progress], None] | None = None, block: Block | None = None
+    ) -> Outcome:
+        """Adjust, or go on where a run that died has ended; as :func:`photogram.adjust` raises.
+
+        `block` is what was divided: it is needed where it is to be taken to a datum.
+        """
+        self.plan(measured=False).check()
+        options = self.manifest.options
+        stop = Stop(
+            options.limit,
+            options.max_iterations,
+            options.covariance,
+            options.unit_variance,
+            options.loss is not None,
+            options.criterion == "percent",
+        )
+        found, mover = self.manifest, None
+        if block is not None and found.datum is not None:
+            mover = Mover(block, options, found.datum, found.held, found.middle)
+        return Driver(self.job, found.tree, self.executor, stop, progress, mover).run(resume=True)
+
+
+@contextmanager
+def opened(
+    folder: Path,
+    source: str,
+    photos: int,
+    counted: Callable[[int], Counts],
+    divided: Callable[[int], Manifest],
+    division: Division,
+    threads: int | None,
+) -> Iterator[Run]:
+    """Open a run: connect to workers, and divide the block unless its parts lie there already.
+
+    `counted` counts the work of a number of parts, `divided` writes them into the folder; the folder of the
+    division is not looked at. InputError: options that cannot be, workers that cannot work together, a folder
+    of another run.
+    """
+    memory = division.memory_bytes
+    with ExitStack() as stack:
+        executor: Executor
+        if division.cluster is None:
+            # The memory is for the adjustment: what else this process holds is its own affair.
+            workers, executor, held, others = 1, Serial(folder), 0, resident_memory() or 0
+        else:
+            client = stack.enter_context(connected(division.cluster, division.workers, memory))
+            workers, limit, held = check_workers(client, folder)
+            executor, memory, others = Workers(client), memory or limit, 0
+            threads = threads or 1
+        stack.callback(executor.stop)
+        stack.callback(shelf.clear)
+        if (folder / MANIFEST).exists():
+            manifest = read_manifest(folder)
+            if manifest.source != source:
+                raise InputError(
+                    "is the folder of a run of another block, or with other options: give another one",
+                    file=folder,
+                )
+        else:
+            room = None if memory is None else int(SHARE * memory) - held
+            manifest = divided(division.parts_of(photos) or _parts_for(counted, photos, workers, room))
+        most = None if memory is None else int(SHARE * memory) + others
+        columns = 0 if manifest.datum is None else len(manifest.held)
+        job = Job(folder, CoreEngine(), _photocore.__version__, threads or 0, most, source, columns)
+        yield Run(folder, manifest, executor, job, workers, memory, held)
+
+
+def _parts_for(counted: Callable[[int], Counts], photos: int, workers: int, room: int | None) -> int:
+    """Return how many parts a block is cut into: some for each worker, whose bytes for nodes are `room`."""
+    most = max(photos // LEAST_PHOTOS, 1)
+    parts = min(PARTS_A_WORKER * workers if workers > 1 else 2, most)
+    while room is not None and 2 * parts <= most:
+        if counted(parts).memory_bytes.max() <= room:
+            break
+        parts *= 2
+    return parts

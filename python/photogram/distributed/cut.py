@@ -1,10 +1,14 @@
-"""Nested dissection of the photos of a block by place: parts, and a tree of separators above them.
+"""Nested dissection of the photos of a block by place, and the work of each node of the tree, counted.
 
 Photos, and whatever else stays in the normal equations, are the vertices of a graph; points and observations
 are its edges: an edge holds all vertices that it touches. The photos are halved by place again and again. Of
 the edges that reach across a cut the photos on its smaller side become the separator, so that what is left of
 every edge lies on one side: all its photos are in one part, or in separators on the way from there to the
 root (George 1973; Lipton, Rose and Tarjan 1979).
+
+For counting, before anything is formed, a part is cut further until its pieces are as small as the fronts of
+the factorisation, whose multiply-adds, numbers and contributions are then those of dense panels: multifrontal
+elimination on the whole tree.
 """
 
 from __future__ import annotations
@@ -17,19 +21,36 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Cut", "Incidence", "Tree", "cut", "homes", "joined", "tree_of"]
+__all__ = [
+    "UNKNOWNS",
+    "Counts",
+    "Cut",
+    "Incidence",
+    "Tree",
+    "counted_work",
+    "cut",
+    "homes",
+    "joined",
+    "outer_vertices",
+    "tree_of",
+]
+UNKNOWNS = 6
+"""Of the pose of a photo."""
+SMALLEST = 8
+"""Photos of a piece that is a front of its own."""
+FORMATION, PAIR = 200.0, 108.0
+"""Multiply-adds for an image point, and for every two photos that share a point."""
+WORD = 8.0
+"""Bytes of a number."""
+IMAGE_BYTES = 1300.0
+"""Of an image point with its share of its point, as it is read, formed and handed back."""
 
 
 @dataclass(frozen=True)
 class Incidence:
-    """Which vertices some edges touch, in no order; an edge stands in one incidence alone.
+    """Which (k,) vertices (k,) edges touch, in no order; an edge stands in one incidence alone.
 
-    Attributes
-    ----------
-    vertices, edges
-        (k,) each vertex of each edge; edges are counted from 0 here.
-    count
-        How many edges there are.
+    Edges are counted from 0 here; `count` is how many there are.
     """
 
     vertices: Indices
@@ -41,14 +62,9 @@ class Incidence:
 class Tree(Valued):
     """A binary tree over parts; its nodes are numbered so that children come before their parent.
 
-    Attributes
-    ----------
-    parents
-        (N,) the root, which is the last node, has -1.
-    children
-        Of each node, in the fixed order in which their contributions are added; parts have none.
-    spans
-        (N, 2) the first part below a node and the one after the last.
+    Of N `parents` the root, the last node, has -1. Children of a node are in the fixed order in which their
+    contributions are added; parts have none. `spans` are (N, 2) the first part below a node and the one after
+    the last.
     """
 
     parents: Indices
@@ -81,15 +97,7 @@ class Tree(Valued):
 
 @dataclass(frozen=True)
 class Cut:
-    """Photos in the nodes of a tree.
-
-    Attributes
-    ----------
-    tree
-        The tree.
-    owners
-        (V,) the node of each vertex.
-    """
+    """Photos in the nodes of a tree: `owners` are (V,) the node of each vertex."""
 
     tree: Tree
     owners: Indices
@@ -117,18 +125,10 @@ def tree_of(parts: int) -> Tree:
 
 
 def cut(positions: Floats, weights: Floats, incidences: Callable[[], Iterable[Incidence]], parts: int) -> Cut:
-    """Cut photos into parts with separators.
+    """Cut photos at (V, 3) positions, in one unit of length, with (V,) weights, into parts with separators.
 
-    Parameters
-    ----------
-    positions
-        (V, 3) in one unit of length.
-    weights
-        (V,) what a photo weighs: its image points.
-    incidences
-        Gives all edges, some at a time; called once for each level of the tree.
-    parts
-        How many.
+    `incidences` gives all edges, some at a time; it is called once for each level of the tree. A photo weighs
+    its image points.
     """
     tree = tree_of(parts)
     owners = np.full(len(positions), -1, dtype=np.int64)
@@ -225,3 +225,122 @@ def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:
 
     split(tree.root, np.arange(len(positions), dtype=np.int64))
     return part
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Counted work of each of N nodes.
+
+    Photos are eliminated there, image points at home there, `outer` unknowns are of nodes above that it
+    touches. Multiply-adds are of one formation with the reduction of points, one factorisation, one
+    inversion; bytes of the factor, and at the most while the node is worked on.
+    """
+
+    photos: Indices
+    images: Indices
+    outer: Indices
+    formation: Floats
+    factor: Floats
+    inverse: Floats
+    factor_bytes: Floats
+    memory_bytes: Floats
+
+    @property
+    def contribution_bytes(self) -> Floats:
+        """(N,) bytes that go up in an iteration: U, u and the diagonal."""
+        return np.asarray(WORD * (self.outer * (self.outer + 1) / 2 + 2 * self.outer))
+
+    @property
+    def cofactor_bytes(self) -> Floats:
+        """(N,) bytes that come down in the inversion."""
+        return np.asarray(WORD * self.outer * (self.outer + 1) / 2)
+
+    @property
+    def step_bytes(self) -> Floats:
+        """(N,) bytes that come down in an iteration."""
+        return np.asarray(WORD * self.outer)
+
+
+def counted_work(
+    positions: Floats,
+    images: Floats,
+    incidences: Callable[[], Iterable[Incidence]],
+    parts: int,
+    unknowns: float = UNKNOWNS,
+) -> tuple[Tree, Counts]:
+    """Count the work of a block in parts, with (P, 3) positions and (P,) image points of its photos.
+
+    `incidences` are what points tie, in a thinned block perhaps; `unknowns` are of a photo, its pose and
+    film.
+    """
+    pieces = 1
+    while len(positions) / (parts * pieces * 2) >= SMALLEST:
+        pieces *= 2
+    deep = cut(positions, images, incidences, parts * pieces)
+    tree = tree_of(parts)
+    node_of = _nodes_above(deep.tree, tree, pieces)
+    outer = outer_vertices(deep.tree, deep.owners, list(incidences()))
+    inner: Floats = unknowns * np.bincount(deep.owners, minlength=len(deep.tree)).astype(np.float64)
+    above = unknowns * np.array([len(each) for each in outer], dtype=float)
+    # Symmetric, dense: I^3 / 6 for the pivot, I^2 S / 2 for the panel, I S^2 / 2 for what is left.
+    factor = inner**3 / 6 + inner**2 * above / 2 + inner * above**2 / 2
+    numbers = inner**2 / 2 + inner * above
+    contribution = above * (above + 1) / 2
+    at_home = np.zeros(len(deep.tree))
+    pairs = np.zeros(len(deep.tree))
+    total = max(float(sum(len(each.vertices) for each in incidences())), 1.0)
+    thinned = images.sum() / total
+    for each in incidences():
+        home = homes(deep.owners, each, deep.tree.root)
+        rays = np.bincount(each.edges, minlength=each.count).astype(float)
+        np.add.at(at_home, home, thinned * rays)
+        np.add.at(pairs, home, thinned * rays * (rays + 1) / 2)
+
+    def summed(values: Floats) -> Floats:
+        return np.bincount(node_of, weights=values, minlength=len(tree)).astype(np.float64)
+
+    tops = np.zeros(len(tree), dtype=np.int64)
+    np.maximum.at(tops, node_of, np.arange(len(deep.tree)))
+    factor_bytes = WORD * summed(numbers)
+    received = WORD * np.array([sum(contribution[tops[child]] for child in below) for below in tree.children])
+    counts = Counts(
+        photos=(summed(inner) / unknowns).round().astype(np.int64),
+        images=summed(at_home).round().astype(np.int64),
+        outer=above[tops].astype(np.int64),
+        formation=FORMATION * summed(at_home) + PAIR * summed(pairs),
+        factor=summed(factor),
+        # The selected inverse takes the products of the factorisation once more, both ways.
+        inverse=2 * summed(factor),
+        factor_bytes=factor_bytes,
+        memory_bytes=factor_bytes + WORD * contribution[tops] + received + IMAGE_BYTES * summed(at_home),
+    )
+    return tree, counts
+
+
+def outer_vertices(tree: Tree, owners: Indices, incidences: list[Incidence]) -> list[Indices]:
+    """Return the vertices above each node that its own edges, or those below it, touch."""
+    own: list[list[Indices]] = [[] for _ in range(len(tree))]
+    for each in incidences:
+        home = homes(owners, each, tree.root)[each.edges]
+        away = owners[each.vertices] != home
+        pairs = np.unique(home[away] * len(owners) + each.vertices[away])
+        nodes, starts = np.unique(pairs // len(owners), return_index=True)
+        parts = np.split(pairs % len(owners), starts[1:])
+        for node, part in zip(nodes.tolist(), parts, strict=False):
+            own[node].append(part)
+    found: list[Indices] = []
+    for node, children in enumerate(tree.children):
+        below = [*own[node], *(found[child] for child in children)]
+        touched = np.unique(np.concatenate(below)) if below else np.zeros(0, dtype=np.int64)
+        found.append(touched[owners[touched] != node])
+    return found
+
+
+def _nodes_above(deep: Tree, tree: Tree, pieces: int) -> Indices:
+    """Return the node of the coarse tree that each node of a finer one is part of."""
+    of_span = {tuple(span): node for node, span in enumerate((tree.spans * pieces).tolist())}
+    found = np.empty(len(deep), dtype=np.int64)
+    for node in range(deep.root, -1, -1):
+        span = tuple(deep.spans[node].tolist())
+        found[node] = of_span[span] if span in of_span else found[deep.parents[node]]
+    return found

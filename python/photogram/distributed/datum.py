@@ -24,12 +24,8 @@ LANES = 8
 class InDatum:
     """What nodes are told that are inverted where the block was moved to its datum.
 
-    Attributes
-    ----------
-    common
-        (d, d) the sum B^T Q B of the whole.
-    last
-        The states before and after the last step, which was taken before the block was moved.
+    `common` is (d, d) the sum B^T Q B of the whole; `last` the states before and after the last step, which
+    was taken before the block was moved.
     """
 
     common: Floats
@@ -38,18 +34,9 @@ class InDatum:
 
 @dataclass(frozen=True)
 class Mover:
-    """Takes a block, as its nodes have adjusted it, to a datum.
+    """Takes a block, as its nodes have adjusted it, to the inner constraints of a row.
 
-    Attributes
-    ----------
-    block, options
-        The block, and how the core adjusts it.
-    row
-        The datum, inner constraints.
-    held
-        Photos with the numbers of their unknowns that are held.
-    middle
-        That all nodes are given.
+    `held` are photos with the numbers of their unknowns that are held; `middle` is what all nodes are given.
     """
 
     block: Block
@@ -59,24 +46,11 @@ class Mover:
     middle: tuple[float, float, float]
 
     def __call__(self, nodes: Sequence[tuple[Indices, Floats]]) -> list[dict[str, np.ndarray]]:
-        """Move it.
+        """Move it, from (N, 3) names of the unknowns of each node in the whole block, and (N,) their values.
 
-        Parameters
-        ----------
-        nodes
-            Of each node (N, 3) what its unknowns belong to in the whole block, and (N,) their values.
-
-        Returns
-        -------
-        Of each node its `values` there, (N,), the columns `b` and `t`, (d, N), and what tells of rounding:
-        the `condition`. `staying` are the unknowns that do not move in the datum.
-
-        Raises
-        ------
-        InputError
-            The points and photos of the datum do not carry it.
-        AdjustmentError, OutOfMemoryError
-            As of :func:`photogram.adjust`.
+        Returns of each node its `values` there, (N,), the columns `b` and `t`, (d, N), the `condition`, which
+        tells of rounding, and the unknowns `staying` in the datum. InputError: its points and photos do not
+        carry it; else as of :func:`photogram.adjust`.
         """
         names, values = (np.concatenate(each) for each in zip(*nodes, strict=True))
         network = block_network(self.block, self.options)
@@ -100,14 +74,7 @@ class Mover:
 def rights_of(b: Floats, outer: Indices, children: Sequence[Indices], left: Sequence[Floats]) -> Floats:
     """Return (d, N) right-hand sides of a node: B of what is at home there, and what its children have left.
 
-    Parameters
-    ----------
-    b
-        (d, N) of all unknowns.
-    outer, children
-        Where outer unknowns stand, and those of each child.
-    left
-        (d, S) of each child.
+    `outer` and `children` say where outer unknowns stand, and those of each child, which has left (d, S).
     """
     rights = b.copy()
     rights[:, outer] = 0.0
@@ -117,16 +84,9 @@ def rights_of(b: Floats, outer: Indices, children: Sequence[Indices], left: Sequ
 
 
 def with_columns(prediction: Mapping[str, float], size: int, outer: int, columns: int) -> dict[str, float]:
-    """Return what work and memory a node takes that also has columns for a datum.
+    """Return what work and memory a node takes that also has so many columns for a datum.
 
-    Parameters
-    ----------
-    prediction
-        What it takes without.
-    size, outer
-        Unknowns of a state, and outer ones.
-    columns
-        How many; none where there is no datum to choose.
+    `size` and `outer` are the unknowns of a state, and the outer ones.
     """
     if not columns:
         return dict(prediction)

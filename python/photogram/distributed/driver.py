@@ -18,7 +18,7 @@ from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
 from photogram.distributed.datum import InDatum, Mover
 from photogram.distributed.executors import Executor, Handle
-from photogram.distributed.progress import Course
+from photogram.distributed.run import Course
 from photogram.distributed.tasks import (
     Chord,
     Job,
@@ -62,24 +62,12 @@ class Stop:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an adjustment in parts has come to.
+    """What an adjustment in parts has come to: `converged`, `not converged` or `diverged`.
 
-    Attributes
-    ----------
-    status
-        `converged`, `not converged` or `diverged`.
-    initial_sum_of_squares, iterations
-        The history.
-    sums_of_squares
-        Weighted, of camera, ground, plates and observations beside images.
-    counts
-        Observations, weighted unknowns, unknowns.
-    degrees_of_freedom, variance_of_unit_weight
-        Of the chosen unit variance; None without degrees of freedom.
-    state, before
-        The last state of the nodes, and the one before the last step.
-    formations
-        How often the normal equations were formed.
+    Sums of squares are weighted, of camera, ground, plates and observations beside images; `counts` are
+    observations, weighted unknowns, unknowns. Degrees of freedom and variance are those of the chosen unit
+    variance, None without degrees of freedom. `state` is the last of the nodes, `before` the one before the
+    last step; `formations` says how often the normal equations were formed.
     """
 
     status: str
@@ -95,17 +83,7 @@ class Outcome:
 
 
 class Driver:
-    """Adjusts in parts.
-
-    Parameters
-    ----------
-    job, tree, executor, progress
-        As of :class:`photogram.distributed.walks.Walks`.
-    stop
-        When to stop.
-    mover
-        Takes the block to a datum when it is adjusted.
-    """
+    """Adjusts in parts; `mover` takes the block to a datum when it is adjusted."""
 
     def __init__(
         self,
@@ -122,16 +100,12 @@ class Driver:
     def run(self, *, resume: bool = False) -> Outcome:
         """Adjust; with `resume` from the last complete iteration that the folder of the run has.
 
-        Raises
-        ------
-        RankError
-            The observations do not determine all unknowns.
-        AdjustmentError
-            The initial values give no finite sum of squares; a disk is full, a worker was lost too often: the
-            state of the last complete iteration stays.
+        RankError: the observations do not determine all unknowns. AdjustmentError: the initial values give no
+        finite sum of squares; a disk is full, a worker was lost too often: the state of the last complete
+        iteration stays.
         """
         if resume:
-            self._course = Course.read(self.job)
+            self._course = Course.read(self.job.folder, self.job.source)
         try:
             return self._run()
         except BaseException:
@@ -204,9 +178,7 @@ class Driver:
     def _take(self, up: Up, change: float, *, chord: bool) -> tuple[Up, bool]:
         """Take a step, and a chord after it where that pays, or take it back and go on with more damping.
 
-        Returns
-        -------
-        What is formed next, and whether the sum of squares has stood still there.
+        Returns what is formed next, and whether the sum of squares has stood still there.
         """
         course, damping = self._course, up.at.damping
         after, course.chord = self._step(up), None
@@ -249,7 +221,7 @@ class Driver:
         course.damping, course.curved = at.damping, at.curved
         course.near = self.stop.reweighted and iteration.largest_change <= RULES["near"]
         course.iterations.append(iteration)
-        course.write(self.job)
+        course.write(self.job.folder, self.job.source)
         if old not in (course.before, course.state):
             self._walks.remove(old)
         self._walks.tell("iteration", iteration.number, 0, iteration)
@@ -270,7 +242,7 @@ class Driver:
                 return self._finish(up)
             self._accept(last, Point(after))
         course.ending = status, course.state, course.state
-        course.write(self.job)
+        course.write(self.job.folder, self.job.source)
         if up.at == Point(course.state):
             return self._finish(up)
         self._walks.forget(up)
@@ -344,9 +316,7 @@ class Driver:
     def _settled(self, sums: tuple[float, float, float, float]) -> tuple[float, float | None]:
         """Have the nodes scale what they have found by q / r, of all but photos (docs/weights.md).
 
-        Returns
-        -------
-        The sum of redundancy numbers r and the variance of unit weight; None without redundancy.
+        Returns the sum of redundancy numbers r and the variance of unit weight; None without redundancy.
         """
         found = self._walks.all(redundancies, phase="invert")
         freedom = math.fsum(own for _, *measured in found for own in measured)

@@ -1,20 +1,46 @@
-"""Where tasks are done: one after the other in this process, or by whatever follows the same protocol."""
+"""Where tasks are done: one after the other in this process, or on the workers of a Dask cluster.
+
+Scheduling, transport and retries on a cluster are those of `distributed`.
+"""
 
 from __future__ import annotations
 
+import logging
 import pickle
+import re
 import shutil
 import tempfile
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from photogram.errors import AdjustmentError
+from photogram import _photocore
+from photogram.arguments.arrays import shown
+from photogram.distributed.shelf import shelf
+from photogram.errors import AdjustmentError, InputError
+from photogram.memory import resident_memory
 
-__all__ = ["Executor", "Handle", "Serial"]
+__all__ = ["Executor", "Handle", "Serial", "Workers", "check_workers", "connected"]
+
 
 Handle = Any
 """Stands for what a task will give."""
+Client = Any
+Future = Any
+"""Of `distributed`, an extra that takes long to import."""
+SETTINGS = {
+    # A factor stays with its worker; what it takes is planned, and must not make the worker pause.
+    "distributed.worker.memory.pause": False,
+    # A stolen task would have to form its factor again.
+    "distributed.scheduler.work-stealing": False,
+    # Arrow's own pool keeps what tables have taken.
+    "distributed.nanny.environ.ARROW_DEFAULT_MEMORY_POOL": "system",
+}
+"""Of clusters that are started here."""
+LOOPBACK = "127.0.0.1"
+ADDRESS = re.compile(r"(?:[a-z]+://)?[\w.\-\[\]:]+:\d{1,5}", re.ASCII)
+"""Of a scheduler. Dask looks for other things in what is no address (scheduler files, plug-ins)."""
 
 
 class Executor(Protocol):
@@ -23,16 +49,10 @@ class Executor(Protocol):
     def submit(
         self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
     ) -> Handle:
-        """Have a task done, where possible on a certain worker.
+        """Have a task done; handles among the arguments, and in lists among these, are replaced.
 
-        Parameters
-        ----------
-        function, arguments
-            The task; handles among the arguments, and in lists among these, are replaced.
-        near
-            Where another one was done; empty for anywhere.
-        cost
-            The higher, the earlier it is done of those that wait.
+        `near` is where another one was done, empty for anywhere; the higher its `cost`, the earlier it is
+        done of those that wait.
         """
 
     def places(self) -> list[str]:
@@ -52,13 +72,7 @@ class Executor(Protocol):
 
 
 class Serial:
-    """Does every task at once, in this process; what tasks give is kept on disk.
-
-    Parameters
-    ----------
-    directory
-        Where temporary files go; None for the one of the system.
-    """
+    """Does every task at once, in this process; what tasks give is kept on disk, in the `directory`."""
 
     def __init__(self, directory: Path | None = None) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="photogram-", dir=directory))
@@ -126,3 +140,173 @@ class Serial:
 
 class _Handle(int):
     """The number of a task."""
+
+
+class Workers:
+    """Has tasks done by the workers of a cluster, by a client that is connected to its scheduler.
+
+    Lost results are computed again by Dask itself: tasks are functions of what they are given. Where a task
+    asks for a factor that was lost with a worker, the driver has it formed again.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._futures: set[Future] = set()
+        self._count = 0
+
+    def submit(
+        self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0
+    ) -> Future:
+        """Have a task done."""
+        self._count += 1
+        found = self._client.submit(
+            function,
+            *arguments,
+            key=f"photogram-{function.__name__}-{id(self):x}-{self._count}",
+            pure=False,
+            priority=cost,
+            workers=[near] if near else None,
+            allow_other_workers=bool(near),
+        )
+        self._futures.add(found)
+        return found
+
+    def places(self) -> list[str]:
+        """Return the addresses of the workers."""
+        return sorted(self._client.nthreads())
+
+    def first(self, handles: Collection[Future]) -> Future:
+        """Wait until one of some tasks is done."""
+        return next(iter(_library().wait(list(handles), return_when="FIRST_COMPLETED").done))
+
+    def value(self, handle: Future) -> Any:
+        """Return what a task has given."""
+        from distributed.client import FutureCancelledError
+
+        from distributed import KilledWorker
+
+        try:
+            return handle.result()
+        except KilledWorker as error:
+            raise AdjustmentError(
+                f"workers died again and again at one task, mostly for want of memory ({error}); the run can"
+                " be taken up again, with more parts or larger workers"
+            ) from None
+        except (FutureCancelledError, OSError) as error:
+            raise AdjustmentError(f"the scheduler is lost ({error}); the run can be taken up again") from None
+
+    def forget(self, handles: Collection[Future]) -> None:
+        """Let go of what tasks have given."""
+        for each in handles:
+            each.release()
+            self._futures.discard(each)
+
+    def stop(self) -> None:
+        """Give up all tasks."""
+        futures, self._futures = list(self._futures), set()
+        if futures and self._client.status == "running":
+            self._client.cancel(futures, force=True)
+
+
+@contextmanager
+def connected(cluster: Any, workers: int | None, memory: int | None) -> Iterator[Client]:
+    """Connect to a scheduler, or start a cluster on this machine of so many workers and bytes of each.
+
+    `cluster` is a client, which is left as it is, `local`, or an address. InputError: nobody answers there.
+    ModuleNotFoundError: dask.distributed is not installed.
+    """
+    import dask
+
+    library = _library()
+
+    if isinstance(cluster, library.Client):
+        yield cluster
+    elif isinstance(cluster, str) and cluster == "local":
+        with (
+            dask.config.set(SETTINGS),
+            library.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                memory_limit=memory or "auto",
+                # Whoever reaches a scheduler or worker has it run what he likes: this machine alone.
+                host=LOOPBACK,
+                dashboard_address=None,
+                # Any free port: the usual one may be another cluster's.
+                scheduler_kwargs={"dashboard_address": f"{LOOPBACK}:0"},
+                # Nodes and factors are memory that Dask does not manage: it warns of them.
+                silence_logs=logging.ERROR,
+            ) as own,
+            library.Client(own) as client,
+        ):
+            yield client
+    elif isinstance(cluster, str) and ADDRESS.fullmatch(cluster):
+        try:
+            client = library.Client(cluster, timeout="10s")
+        except (OSError, ValueError) as error:
+            raise InputError(f"no scheduler answers at {cluster}: {error}") from None
+        with client:
+            yield client
+    else:
+        raise InputError(
+            "cluster is a client of dask.distributed, an address such as 'tcp://host:8786' or 'local', not"
+            f" {shown(cluster)}"
+        )
+
+
+def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
+    """Count the workers, and refuse what cannot work together: versions that differ, a folder not seen.
+
+    Returns how many there are; the least memory of one, None where nothing bounds it; the most that one holds
+    before it begins, all that it needs being loaded.
+    """
+    versions: dict[str, str] = client.run(_version)
+    if not versions:
+        raise InputError("the cluster has no workers")
+    own = _photocore.__version__
+    others = sorted({f"{address} has {each or 'none'}" for address, each in versions.items() if each != own})
+    if others:
+        raise InputError(f"all workers must have photogram {own}, as here: {'; '.join(others)}")
+    blind = [address for address, seen in client.run(_sees, str(folder)).items() if not seen]
+    if blind:
+        raise InputError(
+            f"the workers at {', '.join(sorted(blind))} do not see {folder}: parts and results lie on a disk"
+            " that all workers share"
+        )
+    limits = [each for each in client.run(_limit).values() if each]
+    held = max(client.run(_held).values())
+    return len(versions), min(limits, default=None), held
+
+
+def _library() -> Any:
+    import distributed
+
+    return distributed
+
+
+def _version() -> str:
+    try:
+        from photogram import _photocore
+    except ImportError:
+        return ""
+    return _photocore.__version__
+
+
+def _limit(dask_worker: Any = None) -> int | None:
+    """Return the bytes that Dask lets a worker take; Dask hands it over by this name."""
+    limit: int | None = dask_worker.memory_manager.memory_limit
+    return limit
+
+
+def _held() -> int:
+    """Return the bytes that a worker holds which has loaded what tasks use, and has no earlier run."""
+    # What is imported here is what takes memory; nothing is called.
+    import pyarrow.parquet  # noqa: F401
+
+    import photogram.distributed.nodes  # noqa: F401
+
+    shelf.clear_unless_used()
+    return resident_memory() or 0
+
+
+def _sees(folder: str) -> bool:
+    return Path(folder).is_dir()

@@ -30,11 +30,7 @@ def alone(folder: Path) -> Iterator[None]:
     """Hold the folder of a run, which is made, as long as this process works in it.
 
     The lock goes with the process, however that ends. Where the file system knows none, nothing is held.
-
-    Raises
-    ------
-    InputError
-        Another process works there.
+    InputError: another process works there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / LOCK
@@ -55,22 +51,10 @@ def alone(folder: Path) -> Iterator[None]:
 
 
 def write_file(path: Path, content: Callable[[BinaryIO], Any]) -> None:
-    """Write a file whole or not at all.
+    """Write a file whole or not at all; AdjustmentError where the disk is full or not to be written to.
 
     Two workers may write the same file at once, where a task was given to a second one: it has the same
     bytes, and each writes under a name of its own.
-
-    Parameters
-    ----------
-    path
-        Where it goes.
-    content
-        Writes to the open file.
-
-    Raises
-    ------
-    AdjustmentError
-        The disk is full, or the place cannot be written to.
     """
     under = path.with_name(f".{path.name}.{os.getpid()}")
     try:
@@ -99,13 +83,7 @@ def write_json(path: Path, document: Mapping[str, Any]) -> str:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a document that :func:`write_json` has written, without its seal.
-
-    Raises
-    ------
-    InputError
-        It is missing, damaged or was changed.
-    """
+    """Read what :func:`write_json` has written, without its seal; InputError of what is changed."""
     try:
         document = orjson.loads(path.read_bytes())
     except (OSError, orjson.JSONDecodeError) as error:
@@ -123,13 +101,7 @@ def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Read arrays that :func:`write_arrays` has written.
-
-    Raises
-    ------
-    InputError
-        The file is missing or damaged.
-    """
+    """Read what :func:`write_arrays` has written; InputError where the file is missing or damaged."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             return {name: found[name] for name in found.files}

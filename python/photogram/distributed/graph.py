@@ -27,14 +27,9 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Homes:
-    """The nodes where points, images and other observations are at home.
+    """The nodes where points, images and other observations are at home, and (P,) the `owners` of photos.
 
-    Attributes
-    ----------
-    owners
-        (P,) of photos; one on a frame or trajectory belongs to the node of the photo that stands for it.
-    points, images, observations
-        (n,), (m,) and of each other observation.
+    A photo on a frame or trajectory belongs to the node of the photo that stands for it.
     """
 
     owners: Indices
@@ -133,14 +128,8 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
 def homes_of(block: Block, owners: Indices, root: int) -> Homes:
     """Return the nodes where everything is at home.
 
-    Parameters
-    ----------
-    block
-        The block.
-    owners
-        (P,) the nodes of photos; of those for which others stand they do not count.
-    root
-        The root of the tree, to which observations of common unknowns alone belong.
+    `owners` are (P,) the nodes of photos, which do not count of those for which others stand; observations of
+    common unknowns alone belong to the `root`.
     """
     incidence, edges, of_observations = incidence_of(block)
     found = homes(owners, incidence, root)

@@ -76,19 +76,7 @@ class InParts(Result):
 def merged(run: Path, manifest: Manifest, block: Block, outcome: Outcome) -> InParts:
     """Return the result of a block, in the order of its photos, points and images.
 
-    Parameters
-    ----------
-    run, manifest
-        The folder of the run, and what all nodes have in common.
-    block
-        The block.
-    outcome
-        What the driver has come to.
-
-    Raises
-    ------
-    InputError
-        What a node has written is missing or damaged.
+    InputError: what a node has written is missing or damaged.
     """
     counts = len(block.photo_ids), len(block.point_ids), len(block.image_xy)
     found: dict[str, np.ndarray] = {}

@@ -11,7 +11,6 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Indices
 from photogram.distributed.datum import local_row
-from photogram.distributed.engine import Node
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.parts import Names, Part
 from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
@@ -35,15 +34,7 @@ class CoreEngine:
     """Nodes of the core."""
 
     def node(self, run: Path, number: int) -> _photocore.Node:
-        """Return a node.
-
-        Raises
-        ------
-        InputError
-            Its part is missing or damaged.
-        RankError, AdjustmentError, OutOfMemoryError
-            It cannot be adjusted; names the photos and points concerned.
-        """
+        """Return a node; InputError of a damaged part, else as :func:`photogram.adjust` raises."""
         manifest = read_manifest(run)
         part = read_node(run, manifest, number)
         own = len(part.block.unknowns)
@@ -89,7 +80,7 @@ class CoreEngine:
         # The last of its files: with it the node is done.
         write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
 
-    def unknowns(self, run: Path, number: int, node: Node) -> Indices:
+    def unknowns(self, run: Path, number: int, node: _photocore.Node) -> Indices:
         """Return (N, 3) what the unknowns of a node belong to, rows being those of the whole block."""
         part, names = read_node(run, read_manifest(run), number), node.unknown_names
         cameras = np.arange(len(part.block.cameras))
@@ -124,13 +115,7 @@ def _write(folder: Path, result: Result) -> None:
 
 
 def read_outcome(folder: Path) -> dict[str, Any]:
-    """Return what the tables of a node have no place for.
-
-    Raises
-    ------
-    InputError
-        It is missing or damaged.
-    """
+    """Return what the tables of a node have no place for; InputError where it is missing or damaged."""
     path = folder / OUTCOME
     found: dict[str, Any] = Decoder([], path).value(read_json(path))
     return found

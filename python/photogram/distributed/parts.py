@@ -54,24 +54,12 @@ IN_TABLES = ("photo_ids", "point_ids", *(name for each in TABLES.values() for na
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What a node has of a block.
+    """What a node has of a block: a block of its own, and which things of the whole block these are.
 
-    Attributes
-    ----------
-    node
-        Its number in the tree.
-    block
-        Its photos, which are its own and those of nodes above that its observations or those of nodes below
-        touch, and the points, images and other observations that are at home here. Its cameras are all of the
-        whole block.
-    owners
-        (P,) the node that each photo belongs to: this one or one above it.
-    photos, points, images, observations
-        Which photo, point, image and observation of the whole block each one is.
-    unknowns
-        Which common unknowns of the whole block are known here.
-    common
-        These themselves.
+    Its photos are its own and those of nodes above that its observations or those of nodes below touch;
+    points, images and other observations are at home here; its cameras are all of the whole block. `owners`
+    are (P,) the node that each photo belongs to: this one or one above it. Rows of common unknowns that are
+    known here stand in `unknowns`, these themselves in `common`.
     """
 
     node: int
@@ -105,24 +93,10 @@ class Names:
 
 @dataclass(frozen=True, eq=False)
 class AtHome:
-    """The n points, m images and other observations that are at home in a node.
+    """The n points, m images and other observations of the whole block that are at home in a node, by rows.
 
-    Attributes
-    ----------
-    points
-        (n,) which points of the whole block they are.
-    names, point_positions, point_sd
-        Of the points, as of a block.
-    images
-        (m,) which images of the whole block they are.
-    image_photos
-        (m,) photos of the whole block.
-    image_points
-        (m,) points of these.
-    image_xy, image_sd
-        (m, 2) as of a block.
-    observations
-        Which of the other observations.
+    Names, positions and sd of points, and coordinates and sd of images, are as of a block; `image_photos` are
+    photos of the whole block, `image_points` points of these.
     """
 
     points: Indices
@@ -138,17 +112,7 @@ class AtHome:
 
 
 def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
-    """Return what a node has of a block.
-
-    Parameters
-    ----------
-    block, homes
-        The block, and where everything is at home.
-    node
-        The node.
-    below
-        What nodes below hand up.
-    """
+    """Return what a node has of a block; nodes below hand up `below`."""
     images = np.flatnonzero(homes.images == node)
     points = np.flatnonzero(homes.points == node)
     new_points = np.full(len(homes.points), -1, dtype=np.int64)
@@ -169,18 +133,9 @@ def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
 
 
 def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, below: Names) -> Part:
-    """Return what a node has, from what is at home there.
+    """Return what a node has, from what is at home there and what nodes below hand up.
 
-    Parameters
-    ----------
-    block
-        The whole block, or all of it but points and images.
-    owners
-        (P,) the node of each photo of it.
-    node, at_home
-        The node, and what is at home there.
-    below
-        What nodes below hand up.
+    The block may be without points and images; `owners` are (P,) the nodes of all its photos.
     """
     own = [block.observations[row] for row in at_home.observations.tolist()]
     touched = owners == node
@@ -240,18 +195,9 @@ def names_above(
 ) -> Names:
     """Return what a part hands up: photos of nodes above with what they alone have, and what is of the root.
 
-    Parameters
-    ----------
-    part, below
-        The part, and what nodes below it hand up.
-    shared
-        The cameras that have unknown parameters and several photos in the whole block.
-    of_unknowns
-        Of the whole block (:func:`photos_of_unknowns`): these unknowns are handed up with their photos.
-    alone
-        Of the whole block (:func:`alone_of`): these unknowns are at home where their photos are.
-    root
-        Whether it is the root, which hands nothing up.
+    Of the whole block: `shared` are the cameras that have unknown parameters and several photos,
+    `of_unknowns` is from :func:`photos_of_unknowns`, `alone` from :func:`alone_of`. The root hands nothing
+    up.
     """
     if root:
         return Names()
@@ -282,13 +228,7 @@ def _touch(block: Block, touched: Bools, observations: list[Observation]) -> Non
 
 
 def write_part(folder: Path, part: Part) -> str:
-    """Write the tables of a node into a folder, its settings last; return their seal, which is that of all.
-
-    Raises
-    ------
-    AdjustmentError
-        The folder cannot be written to.
-    """
+    """Write the tables of a node into a folder, its settings last; return their seal, that of all."""
     block, seals = part.block, Seals()
     for table, fields in TABLES.items():
         columns = []
@@ -317,13 +257,7 @@ def write_part(folder: Path, part: Part) -> str:
 
 
 def read_part(folder: Path, sealed: str) -> Part:
-    """Read what :func:`write_part` has written, and sealed by what it has returned.
-
-    Raises
-    ------
-    InputError
-        A table is missing, damaged or of another part.
-    """
+    """Read what :func:`write_part` has written and sealed; InputError of another part, or damage."""
     document = read_json(folder / SETTINGS)
     if seal(document) != sealed:
         raise InputError("is not what was written of this node of this run", file=folder / SETTINGS)

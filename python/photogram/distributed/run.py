@@ -1,8 +1,9 @@
-"""The folder of a run: the tree and who hands up what, the parts, the states and what was found."""
+"""The folder of a run: the tree and who hands up what, the parts, and how far the iterations have come."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.cut import Tree, cut, tree_of
 from photogram.distributed.files import read_json, write_json
-from photogram.distributed.flights import with_flights
 from photogram.distributed.graph import (
     alone_of,
     homes_of,
@@ -24,14 +24,20 @@ from photogram.distributed.graph import (
 )
 from photogram.distributed.parts import Names, Part, names_above, part_of, read_part, write_part
 from photogram.errors import AdjustmentError, InputError
-from photogram.lazy_dataclasses import asdict, dataclass
-from photogram.network.block import Block
+from photogram.lazy_dataclasses import asdict, dataclass, field, replace
+from photogram.network.block import Block, flown_by
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow
-from photogram.network.observations.position import with_epochs
+from photogram.network.motion import timed_images, timed_photos
+from photogram.network.observations import Observation
+from photogram.network.observations.photos import with_epochs
+from photogram.network.trajectories import Spline, Trajectory
 from photogram.network.unknowns import Unknown
+from photogram.results.block_files import KeptTrajectory
+from photogram.results.iteration import Iteration
 
 __all__ = [
+    "Course",
     "Manifest",
     "divided",
     "part_folder",
@@ -40,39 +46,25 @@ __all__ = [
     "read_manifest",
     "read_node",
     "result_folder",
+    "with_flights",
 ]
 
+
 MANIFEST = "run.json"
+_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held", "datum")
+PROGRESS = "progress.json"
 
 
 @dataclass(frozen=True)
 class Manifest:
     """What all nodes of a run have in common.
 
-    Attributes
-    ----------
-    version
-        Of the package that made it.
-    source
-        What tells the block from others.
-    tree
-        The tree.
-    outer
-        What each node hands up.
-    middle
-        (3,) the median of the positions of all photos.
-    options
-        How the core adjusts.
-    weighted
-        Weighted unknowns of photos, cameras and common unknowns that are at home in each node.
-    photos, points, images
-        How many each node has at home.
-    seals
-        Of the parts of the nodes.
-    held
-        What is held where nothing gives a datum: photos, each with the number of one of its six unknowns.
-    datum
-        The datum that the block is taken to when it is adjusted; None for what is held, or observed.
+    `version` is that of the package that made it, `source` tells the block from others, `outer` what each
+    node hands up, `middle` (3,) the median of the positions of all photos. `weighted` counts weighted
+    unknowns of photos, cameras and common unknowns at home in each node; so do `photos`, `points` and
+    `images`; `seals` are those of the parts. Where nothing gives a datum photos are `held`, each with the
+    number of one of its six unknowns; `datum` is what the block is taken to when it is adjusted, None for
+    what is held, or observed.
     """
 
     version: str
@@ -117,23 +109,9 @@ def partition(
     source: str,
     datum: DatumRow | None = None,
 ) -> Manifest:
-    """Cut a block that is in memory into parts on disk.
+    """Cut a block with all poses and common unknowns into parts on disk, in a folder that is made.
 
-    Parameters
-    ----------
-    block
-        With poses of all photos and values of common unknowns.
-    run
-        The folder, which is made.
-    parts
-        How many.
-    options, source, datum
-        As in :class:`Manifest`.
-
-    Raises
-    ------
-    AdjustmentError
-        The folder cannot be written to; a datum is asked for, and the block is not free.
+    AdjustmentError: the folder cannot be written to; a datum is asked for, and the block is not free.
     """
     held = held_for_datum(block, options)
     if datum is not None and not held:
@@ -160,10 +138,7 @@ def partition(
 def held_for_datum(block: Block, options: CoreOptions) -> list[tuple[int, int]]:
     """Return what an adjustment of a whole block would hold, nothing else giving a datum.
 
-    Raises
-    ------
-    RankError, AdjustmentError
-        As of :func:`photogram.adjust`, before its first iteration.
+    RankError, AdjustmentError: as of :func:`photogram.adjust`, before its first iteration.
     """
     if np.isfinite(block.point_sd[np.unique(block.image_points)]).any():
         return []
@@ -183,25 +158,9 @@ def divided(
     held: list[tuple[int, int]],
     datum: DatumRow | None = None,
 ) -> Manifest:
-    """Write the parts of a block, one after the other.
+    """Write the parts of a block, one after the other: `part_at` is told what nodes below hand up.
 
-    Parameters
-    ----------
-    block
-        The block, or all of it but points and images.
-    run, options, source
-        As of :func:`partition`.
-    held, datum
-        As in :class:`Manifest`.
-    tree
-        The tree.
-    part_at
-        Gives the part of a node, told what nodes below hand up.
-
-    Raises
-    ------
-    AdjustmentError
-        The folder cannot be written to.
+    The block may be without points and images. AdjustmentError: the folder cannot be written to.
     """
     shared, of_unknowns, alone = shared_cameras(block), photos_of_unknowns(block), alone_of(block)
     outer: list[Names] = []
@@ -274,17 +233,8 @@ def write_manifest(run: Path, manifest: Manifest) -> None:
     write_json(run / MANIFEST, document)
 
 
-_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held", "datum")
-
-
 def read_manifest(run: Path) -> Manifest:
-    """Read what :func:`write_manifest` has written.
-
-    Raises
-    ------
-    InputError
-        It is missing, damaged or of another version.
-    """
+    """Read what :func:`write_manifest` has written; InputError of another version, or of damage."""
     document = read_json(run / MANIFEST)
     if document.get("version") != _photocore.__version__:
         raise InputError(
@@ -312,11 +262,92 @@ def _as_tuple(value: Any) -> Any:
 
 
 def read_node(run: Path, manifest: Manifest, number: int) -> Part:
-    """Read the part of a node.
-
-    Raises
-    ------
-    InputError
-        It is missing, damaged, or that of another node or run.
-    """
+    """Read the part of a node; InputError where it is missing, damaged, of another node or run."""
     return read_part(part_folder(run, number), manifest.seals[number])
+
+
+def with_flights(block: Block) -> Block:
+    """Return a block whose photos are on the same trajectories, at the same times, whatever it is without.
+
+    A photo that moves by itself is on a trajectory that is given; a scanner has a time, the middle of all its
+    images; coefficients are smooth by observations alone, each of which is at home in one node.
+    """
+    if not flown_by(block):
+        return block
+    told = {id(each): _unsmoothed(each) for each in block.all_trajectories}
+    timed = [
+        replace(own, trajectory=told[id(trajectory)], time=own.images(block.image_xy[rows])[0])
+        for own, trajectory, _, rows in timed_images(block)
+    ]
+    on_trajectories = timed_photos(block)[:, np.newaxis]
+    return block.replace(
+        timed=timed,
+        observations=[_told(each, told) for each in block.observations],
+        photo_position_sd=np.where(on_trajectories, np.inf, block.photo_position_sd),
+        photo_attitude_sd=np.where(on_trajectories, np.inf, block.photo_attitude_sd),
+    )
+
+
+def _told(observation: Observation, trajectories: dict[int, Trajectory]) -> Observation:
+    moment = observation.moment
+    if moment is None or trajectories[id(moment.trajectory)] is moment.trajectory:
+        return observation
+    changes: dict[str, Any] = {"trajectory": trajectories[id(moment.trajectory)]}
+    return replace(observation, **changes)
+
+
+def _unsmoothed(trajectory: Trajectory) -> Trajectory:
+    """Return a trajectory with the same coefficients, of which it says nothing together."""
+    changes: dict[str, Any] = {
+        name: replace(basis, smooth=None, correlation=None)
+        for name in ("position", "rotation")
+        if isinstance(basis := getattr(trajectory, name), Spline) and basis.smoothed
+    }
+    return replace(KeptTrajectory.of(trajectory), **changes).original() if changes else trajectory
+
+
+@dataclass
+class Course:
+    """How far the iterations have come.
+
+    `curved`: whether the second-order term of a loss is taken in at the state; `near`: whether from there on.
+    `chord`: the length of the chord that followed the last step, where one did. `ending`, when they are over:
+    the status, the state whose equations give cofactors, and the state reached.
+    """
+
+    state: str = "0"
+    before: str = "0"
+    damping: float = 0.0
+    curved: bool = False
+    near: bool = False
+    best: float = math.nan
+    initial: float = math.nan
+    refused: float | None = None
+    chord: float | None = None
+    ending: tuple[str, str, str] | None = None
+    trials: int = 0
+    formations: int = 0
+    iterations: list[Iteration] = field(default_factory=list)
+
+    def write(self, run: Path, source: str) -> None:
+        """Write it into the folder of the run of that source."""
+        document = {name: each for name, each in vars(self).items() if name != "iterations"}
+        document["iterations"] = [asdict(each) for each in self.iterations]
+        document["source"] = source
+        write_json(run / PROGRESS, document)
+
+    @classmethod
+    def read(cls, run: Path, source: str) -> Course:
+        """Return what the folder of the run has; the beginning where it has nothing.
+
+        InputError: it is damaged, or the progress of another run.
+        """
+        if not (run / PROGRESS).is_file():
+            return cls()
+        document = read_json(run / PROGRESS)
+        if document.pop("source", None) != source:
+            raise InputError("is the progress of another run", file=run / PROGRESS)
+        rows: Iterable[dict[str, Any]] = document.pop("iterations")
+        ending = document.pop("ending")
+        iterations = [Iteration(**row) for row in rows]
+        return cls(**document, ending=None if ending is None else tuple(ending), iterations=iterations)

@@ -36,18 +36,10 @@ class Shelf:
         return self._kept.pop(key, (None, 0.0))[0]
 
     def make_room(self, needed: float, memory: int | None, spared: tuple[Any, ...]) -> None:
-        """Give up so much that a process which may hold so many bytes can take more.
+        """Give up so much that a process which may hold `memory` bytes can take `needed` more.
 
-        What the process holds is asked of the system: messages and what Dask keeps are in it.
-
-        Parameters
-        ----------
-        needed
-            Bytes that it will take.
-        memory
-            Bytes that it may hold; None for any number.
-        spared
-            Run and node that the room is for.
+        What the process holds is asked of the system: messages and what Dask keeps are in it. `spared` are
+        run and node that the room is for.
         """
         if memory is None:
             return

@@ -9,22 +9,24 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.datum import InDatum, rights_of, with_columns
-from photogram.distributed.engine import ContributionRow, Engine, FormedNode, Node
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.shelf import shelf
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import give_back
+
+if TYPE_CHECKING:
+    from photogram._photocore import ContributionRow, FormedNode, Node
+    from photogram.distributed.nodes import CoreEngine
 
 __all__ = [
     "Chord",
@@ -59,14 +61,9 @@ GIVEN = "0"
 
 @dataclass(frozen=True)
 class Lost:
-    """What a task gives whose node has lost its factor: it has to be formed again.
+    """What a task gives whose node, of this number, has lost its factor: it has to be formed again.
 
     No error, which Dask would log as a failure.
-
-    Attributes
-    ----------
-    number
-        The node.
     """
 
     number: int
@@ -76,26 +73,14 @@ class Lost:
 class Job:
     """What all tasks of a run are told.
 
-    Attributes
-    ----------
-    folder
-        Of the run, on a disk that all workers see.
-    engine
-        Makes the nodes.
-    version
-        Of the package on the machine that drives; every worker must have it.
-    threads
-        Of each task; 0 for all processors.
-    memory
-        Bytes that a process may hold; None for any number.
-    source
-        What tells the block and its options from others.
-    columns
-        How many right-hand sides the datum takes that the block is moved to at the end; 0 without one.
+    Its folder is on a disk that all workers see; every worker has the version of the package on the machine
+    that drives. `threads` are of each task, 0 for all processors, `memory` the bytes that a process may hold,
+    None for any number; `source` tells the block and its options from others; `columns` are how many
+    right-hand sides the datum takes that the block is moved to at the end, 0 without one.
     """
 
     folder: Path
-    engine: Engine
+    engine: CoreEngine
     version: str
     threads: int = 0
     memory: int | None = None
@@ -116,10 +101,8 @@ class Point:
 class Formed:
     """What the driver wants to know of a node that was formed."""
 
-    number: int
     sum_of_squares: float
     decrease: float
-    seconds: float
     place: str
     products: Floats | None = None
     """(d, d) its share in B^T Q B, where there is a datum to go to."""
@@ -161,15 +144,9 @@ def state_path(folder: Path, number: int, state: str) -> Path:
 def formed(job: Job, number: int, at: Point, contributions: Sequence[Contribution]) -> Contribution:
     """Form a node at a state and eliminate what is at home there; its factor stays on the shelf.
 
-    Raises
-    ------
-    RankError
-        Its observations leave something undetermined.
-    AdjustmentError, InputError, OutOfMemoryError
-        As the engine.
+    RankError: its observations leave something undetermined.
     """
     with shelf.lock:
-        start = time.perf_counter()
         node = _node(job, number)
         prediction = _prediction(job, node)
         # A factor at another state is of no use any more.
@@ -196,8 +173,7 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
             columns = columns.reshape(len(rights), -1)
             # A node may have nothing to eliminate.
             products = products.reshape(len(rights), -1) if rights.size else np.zeros((len(rights),) * 2)
-        seconds = time.perf_counter() - start
-        told = Formed(number, found.sum_of_squares, found.decrease, seconds, _place(), products)
+        told = Formed(found.sum_of_squares, found.decrease, _place(), products)
         shelf.put(_factor_key(job, number, at), found, prediction["factor_bytes"])
         return Contribution(row, told, columns)
 
@@ -210,9 +186,7 @@ def about(contribution: Contribution) -> Formed:
 def solved(job: Job, number: int, at: Point, after: str, outer: Floats) -> list[Floats] | Lost:
     """Solve a node for its step, given that of the outer unknowns, and write the state after it.
 
-    Returns
-    -------
-    The steps of what each child is over; or that its factor is lost.
+    Returns the steps of what each child is over; or that its factor is lost.
     """
     with shelf.lock:
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
@@ -227,18 +201,8 @@ def reduced_chord(
 ) -> Chord | None:
     """Reduce the right-hand side that the equations of a node have after a step; its factor is of before.
 
-    Parameters
-    ----------
-    job, number, at
-        As in :func:`formed`.
-    after
-        The state after the step.
-    below
-        What the children have left.
-
-    Returns
-    -------
-    What is left; None where a factor is lost, or has not kept what this takes: no chord is worth another one.
+    `after` is the state after the step, `below` what the children have left. None where a factor is lost, or
+    has not kept what this takes: no chord is worth another one.
     """
     left = [each.left for each in below if each is not None]
     with shelf.lock:
@@ -261,16 +225,7 @@ def solved_chord(
 ) -> list[Floats] | Lost:
     """Solve a node for a chord, given that of the outer unknowns, and write the state `further` after it.
 
-    Parameters
-    ----------
-    job, number, at, after, below
-        As in :func:`reduced_chord`.
-    outer, further
-        As `outer` and `after` in :func:`solved`.
-
-    Returns
-    -------
-    The chords of what each child is over; or that its factor is lost.
+    Returns the chords of what each child is over; or that its factor is lost. Else as :func:`reduced_chord`.
     """
     with shelf.lock:
         factor: FormedNode | None = shelf.get(_factor_key(job, number, at))
@@ -320,18 +275,9 @@ def inverted(
 ) -> Inverted | Lost:
     """Invert a node, and write what has become of its observations and unknowns; or say which factor is lost.
 
-    Parameters
-    ----------
-    job, number, at
-        As in :func:`formed`; the factor is used up.
-    after
-        The state reached.
-    variance
-        The variance of unit weight of the whole.
-    above, place
-        What the parent has handed down, and which of its children this one is; None for the root.
-    datum
-        Where the block was moved to a datum, what takes cofactors there.
+    The factor at a point is used up. `after` is the state reached, `variance` that of unit weight of the
+    whole, `above` what the parent has handed down, None for the root, `place` which of its children this is.
+    Where the block was moved to a datum, `datum` takes cofactors there.
     """
     if isinstance(above, Lost):
         return above
@@ -388,8 +334,6 @@ def settled(job: Job, number: int, variance: float | None) -> None:
 def counted(job: Job, number: int) -> tuple[int, int, int, int, int, int]:
     """Return how many observations and unknowns are at home in a node.
 
-    Returns
-    -------
     Observations, weighted unknowns, unknowns that are not fixed; weighted unknowns of photos and cameras;
     unknowns, fixed ones too; 1 where its last steps may fall slowly, so that a chord pays.
     """

@@ -5,6 +5,7 @@ What a walk adds up it adds in the order of the numbers of the nodes, whoever ha
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -15,13 +16,13 @@ from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
 from photogram.distributed.datum import InDatum
 from photogram.distributed.executors import Executor, Handle
-from photogram.distributed.reforming import Reforming
 from photogram.distributed.tasks import Formed, Job, Lost, Point, about, formed, inverted, lost, state_path
 from photogram.errors import AdjustmentError, PhotogramError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 
-__all__ = ["LostFactorError", "Up", "Walks"]
+__all__ = ["LostFactorError", "Reforming", "Up", "Walks"]
+
 
 ATTEMPTS = 20
 """So often is a node formed again that a worker has taken with it."""
@@ -40,13 +41,7 @@ class Up:
 
 
 class LostFactorError(PhotogramError):
-    """The factor of a node is lost: it has to be formed again.
-
-    Parameters
-    ----------
-    number
-        The node.
-    """
+    """The factor of a node is lost: it has to be formed again."""
 
     def __init__(self, number: int) -> None:
         super().__init__(f"the factor of node {number} is lost")
@@ -54,19 +49,7 @@ class LostFactorError(PhotogramError):
 
 
 class Walks:
-    """Walks over the tree.
-
-    Parameters
-    ----------
-    job
-        What tasks are told.
-    tree
-        The tree of the nodes.
-    executor
-        Does the tasks.
-    progress
-        Told of parts done.
-    """
+    """Walks over the tree of the nodes: `job` is what tasks are told, `progress` is told of parts done."""
 
     def __init__(
         self,
@@ -262,3 +245,36 @@ class Walks:
 def _added(products: list[Floats]) -> Floats | None:
     """Return a sum in the order of the nodes; None of nothing."""
     return np.sum(products, axis=0) if products else None
+
+
+class Reforming:
+    """Nodes that are formed again, one at a time on each worker.
+
+    A factor that waits for its task is the first that a worker gives up for another: the next one is formed
+    there when the task is over. `form` has a node formed, and returns the handle of what tells that it is;
+    `place` gives the worker of a node.
+    """
+
+    def __init__(self, form: Callable[[int], Handle], place: Callable[[int], str]) -> None:
+        self._form, self._place = form, place
+        self._queues: defaultdict[str, deque[int]] = defaultdict(deque)
+        self._busy: dict[int, str] = {}
+        self.handles: dict[Handle, int] = {}
+
+    def begin(self, node: int) -> None:
+        """Have a node formed, at once where its worker forms no other one."""
+        place = self._place(node)
+        if place in self._busy.values():
+            self._queues[place].append(node)
+        else:
+            self._start(node, place)
+
+    def over(self, node: int) -> None:
+        """Have the next one formed where the task of a node, which was formed again perhaps, is over."""
+        place = self._busy.pop(node, None)
+        if place is not None and self._queues[place]:
+            self._start(self._queues[place].popleft(), place)
+
+    def _start(self, node: int, place: str) -> None:
+        self._busy[node] = place
+        self.handles[self._form(node)] = node

@@ -13,7 +13,7 @@ from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.film_form import Affine, affine_form
+from photogram.network.film_reduction import Affine, affine_form
 from photogram.network.films import (
     Film,
     FilmBend,

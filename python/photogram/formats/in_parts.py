@@ -8,12 +8,12 @@ from pathlib import Path
 
 from photogram.adjustment.adjustment import Progress, UnitVariance, core_options
 from photogram.adjustment.robust import Loss
+from photogram.distributed.adjust import Run, opened
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone
 from photogram.distributed.plan import PartsPlan
 from photogram.distributed.run import Manifest, result_folder
-from photogram.distributed.running import Run, opened
 from photogram.formats.format import Wishes
 from photogram.formats.plain.batches import Streamed
 from photogram.formats.project import Project

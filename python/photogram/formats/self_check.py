@@ -14,10 +14,9 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.film_reduction import camera_images, camera_unit
-from photogram.network.motion import on_shared
+from photogram.network.motion import given_poses, on_shared
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
-from photogram.network.whereabouts import given_poses
 
 __all__ = ["Agreement", "agreement", "doubts"]
 

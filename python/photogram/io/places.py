@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -10,7 +12,7 @@ from photogram.errors import InputError
 from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
 from photogram.messages import Message
 
-__all__ = ["Failing", "Place"]
+__all__ = ["Failing", "Place", "at_place"]
 
 
 class Failing(Protocol):
@@ -18,6 +20,15 @@ class Failing(Protocol):
 
     def error(self, message: str, /) -> InputError:
         """Return an error that names the place."""
+
+
+@contextmanager
+def at_place(place: Failing) -> Iterator[None]:
+    """Have errors name a place that name no file yet."""
+    try:
+        yield
+    except InputError as error:
+        raise (error if error.file else place.error(error.message)) from None
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,7 +132,8 @@ class Attitudes:
         """
         one_of("representation", representation, get_args(Representation))
         if representation.startswith("matrix"):
-            return cls(_from_matrices(representation, values), _given(covariances))
+            matrices = _from_matrices(representation, values)
+            return cls(matrices, None if covariances is None else numbers("covariances", covariances))
         found, rates = _from_numbers(representation, values, _boresight(mounting))
         if covariances is None:
             return cls(found)
@@ -172,28 +173,24 @@ class Attitudes:
         if representation.startswith("matrix"):
             return own
         partials = _photocore.numbers_of_attitudes(representation, self.matrices, _boresight(mounting))[1]
-        found: Floats = partials @ own @ partials.transpose(0, 2, 1)
-        return found
+        return np.asarray(partials @ own @ partials.transpose(0, 2, 1))
 
     def standard_deviations(
         self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
     ) -> Floats:
         """Roots of the diagonals of :meth:`covariances`, (n, k)."""
         covariances = self.covariances(representation, mounting=mounting)
-        found: Floats = np.sqrt(np.einsum("nii->ni", covariances))
-        return found
+        return np.asarray(np.sqrt(np.einsum("nii->ni", covariances)))
 
     def translations(self, positions: ArrayLike) -> Floats:
         """Return t = -R C, (n, 3), of projection centres C: with R = F A' the pose of COLMAP and OpenCV."""
         centres = shaped("positions", positions, (len(self), 3))
-        found: Floats = -np.einsum("nij,nj->ni", self.values("matrix_to_vision"), centres)
-        return found
+        return np.asarray(-np.einsum("nij,nj->ni", self.values("matrix_to_vision"), centres))
 
     def positions(self, translations: ArrayLike) -> Floats:
         """Projection centres C = -R' t, (n, 3), the inverse of :meth:`translations`."""
         shifts = shaped("translations", translations, (len(self), 3))
-        found: Floats = -np.einsum("nji,nj->ni", self.values("matrix_to_vision"), shifts)
-        return found
+        return np.asarray(-np.einsum("nji,nj->ni", self.values("matrix_to_vision"), shifts))
 
 
 def _from_numbers(representation: str, values: ArrayLike, boresight: Floats) -> _Numbers:
@@ -226,8 +223,7 @@ def _from_matrices(representation: str, values: ArrayLike) -> Floats:
 
 def _to_matrices(representation: str, attitudes: Floats) -> Floats:
     if representation == "matrix_to_vision":
-        found: Floats = _TO_VISION @ attitudes.transpose(0, 2, 1)
-        return found
+        return np.asarray(_TO_VISION @ attitudes.transpose(0, 2, 1))
     return _FROM[representation](attitudes)
 
 
@@ -244,10 +240,6 @@ def _check_orthonormal(matrices: Floats) -> None:
             f"the matrix of row {mirrored[0]} is mirrored (its determinant is -1): it belongs to axes that "
             "are left-handed, such as x right, y up, z forward"
         )
-
-
-def _given(covariances: ArrayLike | None) -> Floats | None:
-    return None if covariances is None else numbers("covariances", covariances)
 
 
 def _boresight(mounting: Mounting | ArrayLike) -> Floats:

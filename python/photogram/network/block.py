@@ -33,11 +33,9 @@ from photogram.network.observations import (
     observation_rows,
     of_records,
 )
-from photogram.network.observations.knots import with_knots
 from photogram.network.observations.observation import Group
-from photogram.network.observations.smoothness import with_smoothness
+from photogram.network.observations.unknowns import with_knots, with_smoothness
 from photogram.network.passages import Figure, Passage, checked_passages
-from photogram.network.photo_cameras import checked_cameras, photo_indices
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
 from photogram.network.tables import (
@@ -45,8 +43,10 @@ from photogram.network.tables import (
     GEOGRAPHIC_COLUMNS,
     RECTANGULAR_COLUMNS,
     Table,
+    checked_cameras,
     different,
     numbered,
+    photo_indices,
     table_arguments,
 )
 from photogram.network.trajectories import Trajectory
@@ -695,13 +695,7 @@ def flown_by(block: Block) -> str:
 
 
 def of_images_alone(block: Block, what: str) -> Block:
-    """Return a block that has nothing but images; refuse others for what would leave the rest out.
-
-    Raises
-    ------
-    InputError
-        Observations beside images, photos on frames or trajectories.
-    """
+    """Return a block that has nothing but images; refuse others for what would leave the rest out."""
     refuse_trajectories(block, what)
     refuse_passages(block, what)
     if block.observations:
@@ -712,37 +706,19 @@ def of_images_alone(block: Block, what: str) -> Block:
 
 
 def refuse_trajectories(block: Block, what: str, why: str = "which is not taken there") -> None:
-    """Refuse a block with photos or observations on trajectories.
-
-    Raises
-    ------
-    InputError
-        `what` does not take the photo, or the trajectory, that is named.
-    """
+    """Refuse a block with photos or observations on trajectories for what does not take them."""
     if flown := flown_by(block):
         raise InputError(f"{what}: {flown}, {why}")
 
 
 def refuse_passages(block: Block, what: str, *, but: type[Passage] | tuple[()] = ()) -> None:
-    """Refuse a block whose images pass something beside pose, point and camera, `but` what is of a kind.
-
-    Raises
-    ------
-    InputError
-        `what` does not take what is named.
-    """
+    """Refuse a block whose images pass something beside pose, point and camera, `but` what is of a kind."""
     if passed := [each for each in block.all_passages if not isinstance(each, but)]:
         raise InputError(f"{what}: images of the block pass a {passed[0].KIND}, which is not taken there")
 
 
 def checked(block: Block) -> Block:
-    """Return a block whose photos have positions and attitudes; refuse all else.
-
-    Raises
-    ------
-    InputError
-        What is no block, or photos without a pose, named.
-    """
+    """Return a block whose photos have positions and attitudes; refuse all else, by name."""
     if not isinstance(block, Block):
         raise InputError(f"block is not a Block but of the type {type(block).__name__}")
     unknown = np.isnan(block.photo_positions).any(axis=1) | np.isnan(block.photo_attitudes).any(axis=1)

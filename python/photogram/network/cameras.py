@@ -26,9 +26,9 @@ Weights = Literal["corrected", "measured"]
 """Of a backward camera: what the standard deviations of images are those of."""
 
 _MEASURED = "_measured"
+"""What the core calls backward cameras whose residuals lie in the measured image."""
 _SQUARED = math.sqrt(sys.float_info.max)
 """Standard deviations beyond have no variance."""
-"""What the core calls backward cameras whose residuals lie in the measured image."""
 
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""
@@ -400,17 +400,7 @@ class Camera(Valued, Brief):
 
 
 def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> Floats:
-    """Return (m, 2) the images of directions, each by its camera.
-
-    Parameters
-    ----------
-    cameras
-        The cameras.
-    which
-        (m,) the index of each direction's camera.
-    directions
-        (m, 3) as for :meth:`Camera.project`.
-    """
+    """Return (m, 2) images of (m, 3) directions, as for :meth:`Camera.project`, each by its camera's row."""
     images = np.full((len(directions), 2), np.nan)
     for row, camera in enumerate(cameras):
         own = which == row

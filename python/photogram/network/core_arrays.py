@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,15 +12,20 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import available_memory
 from photogram.network.block import Block
+from photogram.network.motion import timed_images
+from photogram.network.moving_photos import Moment
+from photogram.network.observations import moments
 from photogram.network.passages import passage_rows
 from photogram.network.rigs import mount_rows
-from photogram.network.trajectory_arrays import flown
 from photogram.network.unknowns import Unknown
 from photogram.show.methods import Way
 
 __all__ = ["CoreNetwork", "CoreOptions", "block_network", "core_network"]
 
 CoreNetwork = _photocore.BlockNetwork | _photocore.CollectionNetwork
+
+TimedRow = tuple[int, int, float, int | None, int | None]
+"""Indices of a photo and a trajectory, the time there, indices of rate and offset among the unknowns."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +54,7 @@ def core_network(given: object, options: CoreOptions) -> CoreNetwork:
     raise NotImplementedError(type(given).__name__)
 
 
-@core_network.register
-def _(given: Block, options: CoreOptions) -> CoreNetwork:
-    return block_network(given, options)
-
-
+@core_network.register(Block)
 def block_network(
     block: Block, options: CoreOptions, further: Sequence[Unknown] = ()
 ) -> _photocore.BlockNetwork:
@@ -62,18 +64,18 @@ def block_network(
     they stand behind its own.
     """
     unknowns = [*block.unknowns, *further]
-    own = flown(block, unknowns)
+    flown, image_xy, records = _flown(block, unknowns)
     cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
-    known = np.zeros_like(own.positions)
-    if own.records:
+    known = np.zeros_like(records)
+    if len(records):
         # They have a camera of their own, and are known but for their trajectory.
         cameras = [*cameras, ("perspective", [-1.0], [0.0], None, None)]
-        photo_cameras = np.append(photo_cameras, np.full(own.records, len(cameras) - 1))
+        photo_cameras = np.append(photo_cameras, np.full(len(records), len(cameras) - 1))
     return _photocore.block_network(
-        _and(block.photo_positions, own.positions),
+        _and(block.photo_positions, records),
         _and(block.photo_attitudes, known),
-        _and(block.photo_positions if positions is None else positions, own.positions),
+        _and(block.photo_positions if positions is None else positions, records),
         _and(block.photo_attitudes if attitudes is None else attitudes, known),
         _and(block.photo_position_sd, known),
         _and(block.photo_attitude_sd, known),
@@ -83,30 +85,55 @@ def block_network(
         block.point_sd,
         block.image_photos,
         block.image_points,
-        own.image_xy,
+        image_xy,
         block.image_sd,
         observation_groups=[group for _, group in block.observation_groups],
         unknowns=[each.row() for each in unknowns],
         mounts=mount_rows(block.mounts, block.timed, block.photo_ids, unknowns),
-        trajectories=own.trajectories,
-        timed=own.timed,
-        image_times=own.image_times,
+        **flown,
         passages=passage_rows(block.all_passages, block.point_ids, block.photo_ids, unknowns),
-        records=own.records,
+        records=len(records),
         spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
         photo_to_ground=block.photo_to_ground,
         refraction=block.refraction.row(block.linear_unit) if block.refraction else None,
-        criterion=options.criterion,
-        limit=options.limit,
-        max_iterations=options.max_iterations,
-        covariance=options.covariance,
-        loss=options.loss,
-        ordering=options.ordering,
-        unit_variance=options.unit_variance,
-        minimum=options.minimum,
-        points_given=options.points_given,
+        **vars(options),
         memory=None if fits_anywhere(block) else available_memory(),
     )
+
+
+def _flown(block: Block, unknowns: Sequence[Unknown]) -> tuple[dict[str, Any], Floats, Floats]:
+    """Return what the core is given of the trajectories of a block, whose common unknowns are these.
+
+    Its arguments; (m, 2) image coordinates in the focal plane; (r, 3) where records are about. These follow
+    the photos of the block.
+    """
+    records = moments(block.observations)
+    if not block.timed and not records:
+        return {"trajectories": [], "timed": [], "image_times": np.zeros(0)}, block.image_xy, np.zeros((0, 3))
+    places = {id(each): row for row, each in enumerate(unknowns)}
+    trajectories = block.all_trajectories
+    numbers = {id(each): number for number, each in enumerate(trajectories)}
+    image_xy, image_times = block.image_xy.copy(), np.zeros(len(block.image_xy))
+    timed: list[TimedRow] = []
+    for own, trajectory, photo, rows in timed_images(block):
+        time, image_times[rows], image_xy[rows] = own.images(block.image_xy[rows])
+        rate, offset = (None if each is None else places[id(each)] for each in (own.readout, own.offset))
+        timed.append((photo, numbers[id(trajectory)], time - trajectory.origin, rate, offset))
+    for row, moment in enumerate(records):
+        clock = None if moment.clock is None else places[id(moment.clock)]
+        time = moment.time - moment.trajectory.origin
+        timed.append((len(block.photo_ids) + row, numbers[id(moment.trajectory)], time, None, clock))
+    shared = [each.row(places) for each in trajectories]
+    near = np.array([_about(block, each) for each in records]).reshape(-1, 3)
+    return {"trajectories": shared, "timed": timed, "image_times": image_times}, image_xy, near
+
+
+def _about(block: Block, moment: Moment) -> Floats:
+    """Return where a record is about, in the object space: the core asks for no more than a place."""
+    if block.geographic:
+        return np.nanmean(block.photo_positions, axis=0) if len(block.photo_ids) else np.zeros(3)
+    table = moment.trajectory.table
+    return np.asarray(table.positions[np.argmin(np.abs(table.times - moment.time))])
 
 
 def _and(photos: Floats, records: Floats) -> Floats:

@@ -101,41 +101,22 @@ class MinimumConstraints:
 
 
 def check_datum(datum: object) -> None:
-    """Refuse what is no datum to choose.
-
-    Raises
-    ------
-    InputError
-        It is none.
-    """
+    """Refuse what is no datum to choose."""
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise InputError(f"datum is InnerConstraints, MinimumConstraints or None, not {shown(datum)}")
 
 
 def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
-    """Return inner constraints as the core knows them.
-
-    Raises
-    ------
-    InputError
-        Points or photos that are not in the block.
-    """
-
-    def rows(kind: str, wanted: Sequence[str] | None) -> list[int]:
-        ids = block.photo_ids if kind == "photo" else block.point_ids
-        return list(range(len(ids))) if wanted is None else _indices(block, kind, wanted)
-
-    points, photos = rows("point", datum.points), rows("photo", datum.photos)
-    return "inner", points, photos, datum.scale, rows("photo", datum.attitudes), datum.radius
+    """Return inner constraints as the core knows them; InputError of what is not in the block."""
+    points, photos = _indices(block, "point", datum.points), _indices(block, "photo", datum.photos)
+    attitudes = _indices(block, "photo", datum.attitudes)
+    return "inner", points, photos, datum.scale, attitudes, datum.radius
 
 
 def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int, int] | None] | None:
     """Return what is to be held as the core knows it; None where it is left to the core.
 
-    Raises
-    ------
-    InputError
-        A photo or coordinate that is not there.
+    InputError: a photo or coordinate that is not there.
     """
     if datum.photo is None:
         return None
@@ -149,8 +130,11 @@ def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int
     return photo, (_indices(block, "photo", [other])[0], axes.index(axis))
 
 
-def _indices(block: Block, kind: str, wanted: Sequence[str]) -> list[int]:
+def _indices(block: Block, kind: str, wanted: Sequence[str] | None) -> list[int]:
+    """Return the rows of photos or points, of all where none are named."""
     ids = block.photo_ids if kind == "photo" else block.point_ids
+    if wanted is None:
+        return list(range(len(ids)))
     index = {name: i for i, name in enumerate(ids)}
     if missing := [name for name in wanted if name not in index]:
         raise InputError(f"the datum names the {kind} {missing[0]!r}, which is not in the block")

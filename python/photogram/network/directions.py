@@ -9,7 +9,7 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.cameras import rays_of_row
 from photogram.network.motion import focal_images, scanners
-from photogram.network.subset import kept_images
+from photogram.network.subset import image_rows, kept_images
 
 __all__ = ["direction_deviations", "image_directions", "seen_without_lenses", "without_lenses"]
 
@@ -64,10 +64,7 @@ def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
         cameras=(),
         photo_cameras=None,
         principal_distances=-scales,
-        image_photos=block.image_photos[seen],
-        image_points=block.image_points[seen],
-        image_xy=(scales[block.image_photos, np.newaxis] * tangents)[seen],
-        image_sd=block.image_sd[seen],
+        **image_rows(block, seen) | {"image_xy": (scales[block.image_photos, np.newaxis] * tangents)[seen]},
     )
     return plain, seen
 

@@ -1,21 +1,29 @@
-"""Scanned films as their cameras saw them: readings brought back to the frame of the camera."""
+"""Scanned films: readings brought back to the frame of the camera, and the form of six numbers."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.network.films import FilmNumbers, Scan
+from photogram.network.films import Film, FilmNumbers, Scan
 from photogram.network.observations import Fiducial
 
-__all__ = ["as_seen", "camera_images", "camera_unit", "is_scanned"]
+__all__ = ["Affine", "affine_form", "as_seen", "camera_images", "camera_unit", "is_scanned"]
+
 
 FEWEST = 4
 """Marks of an affine fit that has something to be judged by."""
 FIT = 5e-4
 """Parts of their extent to which marks fit: 0.1 mm of a film of 23 cm; others are wrong."""
+_PLACES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+"""Readings of these say what an affine map is."""
+_DIFFERENCES = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
 
 
 def is_scanned(block: Block) -> bool:
@@ -92,3 +100,83 @@ def as_seen(block: Block) -> Block:
             if not any(isinstance(own, FilmNumbers) for own in each.unknowns)
         ],
     )
+
+
+@dataclass(frozen=True)
+class Affine:
+    """The form of six numbers: reading = a0 + a1 x + a2 y, x and y in the camera's frame.
+
+    Attributes
+    ----------
+    matrix
+        (2, 3) a0, a1, a2 of both coordinates of readings.
+    scale_x, scale_y
+        mm of the reading in a mm of the camera along each axis.
+    between_axes
+        The angle between the images of the axes, less a right angle (radians).
+    rotation
+        The angle of the image of the x axis (radians).
+    sd
+        (4,) standard deviations of the last four.
+    matrix_sd
+        (2, 3) standard deviations of `matrix`, the scanner as errorless.
+    """
+
+    matrix: Floats
+    scale_x: float
+    scale_y: float
+    between_axes: float
+    rotation: float
+    sd: Floats
+    matrix_sd: Floats
+
+
+def affine_form(film: Film, vectors: Sequence[Floats], cofactors: Floats) -> Affine:
+    """Return what is affine in a film as a form of six numbers; bends, patterns and curves are left out.
+
+    `vectors` are (3,) the numbers of each of its unknowns, in their order; `cofactors` (6, 6) of t1, t2,
+    theta, m, b1, b2, m being that of the photo with its roll's.
+    """
+    own = dict(zip(map(id, film.unknowns), vectors, strict=True))
+    parts = [film.placement, film.size, *([] if film.roll is None else [film.roll]), film.scanner]
+    plain = Film(
+        film.placement, film.size, film.scanner, film.readings, roll=film.roll, mirrored=film.mirrored
+    )
+    numbers = np.array([own[id(each)] for each in parts])
+    readings, partials = _photocore.film_readings(plain.numbers(), numbers, _PLACES)
+    by_film = np.einsum("ij,jkl->kil", _DIFFERENCES, partials[:, :, 2:8])
+    values = np.concatenate([own[id(film.placement)], own[id(film.size)]])
+    if film.roll is not None:
+        values[3] += own[id(film.roll)][0]
+    found, said = _said(values, mirrored=film.mirrored)
+    with np.errstate(invalid="ignore"):
+        sd = np.sqrt(np.einsum("ik,kl,il->i", said, cofactors, said))
+        matrix_sd = np.sqrt(np.einsum("aik,kl,ail->ai", by_film, cofactors, by_film))
+    scale_x, scale_y, between, rotation = found.tolist()
+    matrix = (_DIFFERENCES @ readings).T
+    return Affine(frozen(matrix), scale_x, scale_y, between, rotation, frozen(sd), frozen(matrix_sd))
+
+
+def _said(values: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
+    """Return scales, angle between axes and rotation, and their partials by the six of the film.
+
+    The columns of R J (I + S) are the images of the axes.
+    """
+    theta, m, b1, b2 = values[2:6]
+    side = -1.0 if mirrored else 1.0
+    straight = np.array([[side * (1 + m + b1), side * b2], [b2, 1 + m - b1]])
+    x, y = straight[:, 0], straight[:, 1]
+    # By m, b1, b2.
+    by_x = np.array([[side, side, 0.0], [0.0, 0.0, 1.0]])
+    by_y = np.array([[0.0, 0.0, side], [1.0, -1.0, 0.0]])
+    lengths = np.hypot(*x), np.hypot(*y)
+    turns = np.arctan2(x[1], x[0]), np.arctan2(y[1], y[0])
+    of_x = np.array([-x[1], x[0]]) @ by_x / lengths[0] ** 2
+    of_y = np.array([-y[1], y[0]]) @ by_y / lengths[1] ** 2
+    partials = np.zeros((4, 6))
+    partials[0, 3:], partials[1, 3:] = x @ by_x / lengths[0], y @ by_y / lengths[1]
+    partials[2, 3:] = side * (of_y - of_x)
+    partials[3, 3:], partials[3, 2] = of_x, 1.0
+    between = side * (turns[1] - turns[0]) - np.pi / 2
+    between = (between + np.pi) % (2 * np.pi) - np.pi
+    return np.array([*lengths, between, turns[0] + theta]), partials

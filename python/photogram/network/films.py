@@ -229,8 +229,7 @@ class Reseau(Pattern):
         found = np.zeros((2 * rows * columns,) * 2)
         for k, sd in enumerate(np.asarray(self.sd).tolist()):
             found[k::2, k::2] = np.linalg.inv(np.eye(rows * columns) / sd**2 + stiff)
-        symmetric: Floats = (found + found.T) / 2
-        return symmetric
+        return np.asarray((found + found.T) / 2)
 
 
 def _nodes(photo: str, shifts: Floats, sd: float) -> list[Weights]:
@@ -359,14 +358,7 @@ def check_scans(
     photo_cameras: Indices | None,
     image_photos: Indices,
 ) -> None:
-    """Refuse scans of photos whose camera has no frame of marks, and two of one photo.
-
-    Raises
-    ------
-    InputError
-        A camera in pixels, of a comparator of its own, or with residuals where readings are corrected; images
-        in pixels of scans beside such in mm.
-    """
+    """Refuse scans of photos whose camera has no frame of marks, two of one photo, and two units."""
     scans = [each for each in passages if isinstance(each, Scan)]
     rows = {name: row for row, name in enumerate(photos)} if scans else {}
     seen: set[str] = set()

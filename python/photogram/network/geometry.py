@@ -112,6 +112,37 @@ def geocentric_to_geographic(xyz: ArrayLike, spheroid: Spheroid) -> Floats:
     return _photocore.geocentric_to_geographic(_floats(xyz), spheroid.a, spheroid.b)
 
 
+@dataclass(frozen=True)
+class Cartesian:
+    """The cartesian axes of a block: its own when rectangular, `spheroid` being None, else geocentric."""
+
+    spheroid: Spheroid | None
+
+    def positions(self, positions: Floats) -> Floats:
+        """(n, 3) positions of the block in these axes; NaN where unknown."""
+        if self.spheroid is None:
+            return positions
+        return geographic_to_geocentric(positions, self.spheroid)
+
+    def from_cartesian(self, positions: Floats) -> Floats:
+        """Turn positions of these axes back into those of the block."""
+        if self.spheroid is None or not len(positions):
+            return positions
+        return geocentric_to_geographic(positions, self.spheroid)
+
+    def from_local(self, attitudes: Floats, positions: Floats) -> Floats:
+        """(n, 3, 3) attitudes in these axes, of those in the local frames at positions of the block."""
+        if self.spheroid is None:
+            return attitudes
+        return np.asarray(local_frames(positions).transpose(0, 2, 1) @ attitudes)
+
+    def to_local(self, attitudes: Floats, positions: Floats) -> Floats:
+        """Turn attitudes of these axes back into the local frames at positions of the block."""
+        if self.spheroid is None:
+            return attitudes
+        return np.asarray(local_frames(positions) @ attitudes)
+
+
 def lengths_of_units(positions: ArrayLike, spheroid: Spheroid | None) -> Floats:
     """Lengths of the units of the coordinates at (n, 3) positions, (n, 3), in the linear unit.
 
@@ -143,6 +174,12 @@ def local_frames(positions: ArrayLike) -> Floats:
     return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
 
 
+def photo_axes(attitudes: ArrayLike, photo_to_ground: bool) -> Floats:
+    """Axes of photos, as columns, (n, 3, 3), of (n, 3) omega, phi, kappa; with a spheroid in local frames."""
+    rotations = rotation_matrix(attitudes)
+    return rotations if photo_to_ground else rotations.transpose(0, 2, 1)
+
+
 def viewing_directions(
     positions: ArrayLike,
     attitudes: ArrayLike,
@@ -154,12 +191,10 @@ def viewing_directions(
 
     Arguments are those of :func:`project`; with a spheroid the directions are geocentric.
     """
-    rotations = rotation_matrix(attitudes)
-    directions = -(rotations[:, :, 2] if photo_to_ground else rotations[:, 2, :])
+    directions = -photo_axes(attitudes, photo_to_ground)[:, :, 2]
     if spheroid is None:
         return directions
-    turned: Floats = np.einsum("nij,ni->nj", local_frames(positions), directions)
-    return turned
+    return np.asarray(np.einsum("nij,ni->nj", local_frames(positions), directions))
 
 
 def project(

@@ -81,15 +81,7 @@ class Knots(Passage):
 
 
 def knot_unknowns(camera: str, knots: Floats | None, sd: Floats | None) -> tuple[Knot, ...]:
-    """Return the knots of a camera as unknowns, row by row; none where all are held.
-
-    Parameters
-    ----------
-    camera
-        Its name.
-    knots, sd
-        (ny, nx, 2) as of :class:`photogram.Camera`; None of a model without them.
-    """
+    """Return knots of a camera, (ny, nx, 2) with sd, as unknowns, row by row; none where all are held."""
     if knots is None or sd is None or not sd.any():
         return ()
     rows, columns, _ = knots.shape
@@ -118,11 +110,8 @@ def checked_knots(
 ) -> Floats | None:
     """Return (ny, nx, 2) knots; None of a model without them.
 
-    Raises
-    ------
-    InputError
-        Constants that are none of a spline, knots of a model without them, another shape, values that are
-        not finite.
+    InputError: constants that are none of a spline, knots of a model without them, another shape, values that
+    are not finite.
     """
     if model != KNOTTED:
         if knots is not None:
@@ -148,12 +137,9 @@ def checked_knots(
 
 
 def checked_knot_sd(title: str, knots: Floats | None, given: ArrayLike) -> Floats | None:
-    """Return (ny, nx, 2) standard deviations of knots, radial and tangential; None of a model without them.
+    """Return (ny, nx, 2) sd of knots, radial and tangential; None of a model without them.
 
-    Raises
-    ------
-    InputError
-        Standard deviations of what is not there, of another shape, or negative.
+    InputError: standard deviations of what is not there, of another shape, or negative.
     """
     what = f"knot_sd of the camera {title}"
     found = numbers(what, given)
@@ -181,15 +167,7 @@ def knot_names(knots: Floats | None) -> tuple[str, ...]:
 
 
 def beyond_knots(parameters: Mapping[str, float], u: Floats) -> Bools:
-    """Return (n,) whether directions lie beyond the knots, where the polynomials at the edge go on.
-
-    Parameters
-    ----------
-    parameters
-        Of the splined camera.
-    u
-        (n, 3) in the axes of the photo.
-    """
+    """Return whether (n, 3) directions lie beyond the knots, where the polynomials at the edge go on."""
     order = parameters["order"]
     places = 2 * u[:, :2] * [1, -1] / (np.linalg.norm(u, axis=1) - u[:, 2])[:, np.newaxis]
     per_place = (parameters["nx"] - order) / (4 * math.tan(math.radians(parameters["fov_x_deg"]) / 4))

@@ -1,4 +1,4 @@
-"""What is asked of blocks with photos on trajectories: which these are, where images are in the focal plane.
+"""Photos and records on trajectories: which these are, where and when their images are, also for the core.
 
 A frame, and a photo with a rolling shutter, has nearly the pose that is its own at all of its images. A
 scanner has another at each line, and samples and lines for coordinates: of what takes photos for pictures
@@ -7,35 +7,39 @@ with one pose nothing holds for it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.block import Block, flown_by, refuse_trajectories
 from photogram.network.film_reduction import camera_images
+from photogram.network.moving_photos import Timed
 from photogram.network.observations import Smoothness
 from photogram.network.subset import kept_images, of_photos
-from photogram.network.trajectory_arrays import timed_images
+from photogram.network.trajectories import Trajectory
 from photogram.network.unadjusted import Given
 
+if TYPE_CHECKING:
+    pass
+
 __all__ = [
+    "about",
     "at_rest",
     "focal_images",
+    "given_poses",
     "of_pictures",
     "on_shared",
     "refuse_datum",
     "scanners",
+    "timed_images",
     "timed_photos",
 ]
 
 
 def refuse_datum(block: Block, what: str) -> None:
-    """Refuse to choose a datum for trajectories: what moves one as a whole is not worked out.
-
-    Raises
-    ------
-    InputError
-        A photo, or observations, on a trajectory, named.
-    """
+    """Refuse to choose a datum for trajectories: what moves one as a whole is not worked out."""
     refuse_trajectories(block, what, "and the datum of trajectories is that of the observations")
 
 
@@ -91,3 +95,33 @@ def at_rest(block: Block) -> Block:
     ]
     timed = timed_photos(block)
     return of_photos(block.replace(timed=(), observations=observations), ~timed)
+
+
+def timed_images(block: Block) -> Iterator[tuple[Timed, Trajectory, int, Indices]]:
+    """Return the timed photos of a block: each with its trajectory, its index, and those of its images."""
+    if not block.timed:
+        return
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    order = np.argsort(block.image_photos, kind="stable")
+    ends = np.searchsorted(block.image_photos[order], np.arange(len(rows)), side="right")
+    starts = np.append(0, ends)
+    for own, trajectory in zip(block.timed, block.trajectories, strict=True):
+        row = rows[own.photo]
+        yield own, trajectory, row, order[starts[row] : ends[row]]
+
+
+def about(trajectory: Trajectory, time: float) -> tuple[Floats, Floats]:
+    """Return the pose of a trajectory at a time by what is given of its corrections.
+
+    Beyond what it reaches the pose is that of its end: (3,) X, Y, Z, geocentric where the object space is
+    geographic, and (3, 3) the axes of the photo in these.
+    """
+    places, matrices = given_poses(trajectory, np.clip([time], *trajectory.reach))
+    return places[0], matrices[0]
+
+
+def given_poses(trajectory: Trajectory, times: Floats) -> tuple[Floats, Floats]:
+    """Return (n, 3) places and (n, 3, 3) axes at (n,) times that the trajectory reaches, as :func:`about`."""
+    position, rotation = (np.array([each.position for each in own]) for own in trajectory.coefficients)
+    places, matrices, *_ = trajectory.flown(times, position, rotation)
+    return places, matrices.reshape(-1, 3, 3)

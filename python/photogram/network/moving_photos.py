@@ -329,13 +329,7 @@ class Timed:
 
 
 def checked_timed(timed: object, photos: Sequence[str]) -> tuple[Timed, ...]:
-    """Return what says which photos are on trajectories, checked against the photos of a block.
-
-    Raises
-    ------
-    InputError
-        What is no Timed, a photo that is not there or twice, trajectories of one name.
-    """
+    """Return what says which photos are on trajectories; InputError of a photo that is not there or twice."""
     if not isinstance(timed, Sequence):
         raise InputError(f"timed is no list: {shown(timed)}")
     known, seen = set(photos), set()

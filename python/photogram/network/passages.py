@@ -105,13 +105,7 @@ class Figure(Passage):
 
 
 def checked_passages(passages: object, points: Sequence[str], photos: Sequence[str]) -> tuple[Passage, ...]:
-    """Return what images of a block pass.
-
-    Raises
-    ------
-    InputError
-        What is no passage, or is of points or photos that are not there.
-    """
+    """Return what images of a block pass; InputError of what is none, or of points that are not there."""
     if not isinstance(passages, Sequence):
         raise InputError(f"passages is no list: {shown(passages)}")
     for row, each in enumerate(passages):

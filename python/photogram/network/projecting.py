@@ -13,9 +13,9 @@ from photogram.errors import InputError
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.geometry import geographic_to_geocentric
+from photogram.network.motion import timed_images
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
-from photogram.network.trajectory_arrays import timed_images
 from photogram.network.unknowns import Unknown
 
 __all__ = ["camera_of", "projected", "projected_images", "standing"]
@@ -44,25 +44,10 @@ def projected(
     image of the point is on the line of sensors, between the ends of what the trajectory reaches (regula
     falsi, Illinois).
 
-    Parameters
-    ----------
-    own, trajectory
-        The photo, and the trajectory that it is on.
-    camera
-        Its camera; of scanners in mm.
-    points
-        (n, 3) X, Y, Z in the axes of the trajectory; geocentric where the object space is geographic.
-    values
-        What common unknowns are: as they are given, or adjusted.
-
-    Returns
-    -------
-    (n, 2) image coordinates, of scanners samples and lines; NaN for points that are never seen.
-
-    Raises
-    ------
-    InputError
-        A scanner on a trajectory that has one record, or with a factor of line rates and no time.
+    Points are (n, 3) in the axes of the trajectory, geocentric where the object space is geographic; `values`
+    say what common unknowns are: as given, or adjusted. Images are (n, 2), of scanners samples and lines; NaN
+    of points that are never seen. InputError: a scanner on a trajectory that has one record, or with a factor
+    of line rates and no time.
     """
     places = shaped("points", points, (len(np.asarray(points)), 3))
 
@@ -119,12 +104,9 @@ def standing(
 
 
 def projected_images(block: Block) -> Floats:
-    """Return (m, 2) the images of a block, all of whose photos are on trajectories, by what is given in it.
+    """Return (m, 2) images of a block, all of whose photos are on trajectories, by what is given in it.
 
-    Raises
-    ------
-    InputError
-        Refraction, by which images on trajectories are not projected; as :func:`projected`.
+    InputError: refraction, by which images on trajectories are not projected; as :func:`projected`.
     """
     if block.refraction is not None:
         raise InputError("images of photos on trajectories are computed without refraction, which is given")

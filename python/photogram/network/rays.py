@@ -6,8 +6,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.geometry import Cartesian, local_frames, photo_axes
 from photogram.network.motion import on_shared
 
 __all__ = ["Intersection", "LocalAxes", "Rays", "frame_radius", "local_axes", "meet"]
@@ -29,41 +29,34 @@ class LocalAxes:
     origin: Floats
     frame: Floats
 
+    @property
+    def cartesian(self) -> Cartesian:
+        """The axes of the block, geocentric where its space is geographic."""
+        return Cartesian(self.block.spheroid)
+
     def positions(self, positions: Floats) -> Floats:
         """(n, 3) positions of the block in these axes; what is unknown stays NaN."""
-        return (self._cartesian(positions) - self.origin) @ self.frame.T
+        return (self.cartesian.positions(positions) - self.origin) @ self.frame.T
 
     def from_local(self, local: Floats) -> Floats:
         """(n, 3) positions of the block's own kind for positions in these axes."""
-        cartesian = local @ self.frame + self.origin
-        if self.block.spheroid is None:
-            return cartesian
-        return geometry.geocentric_to_geographic(cartesian, self.block.spheroid)
+        return self.cartesian.from_cartesian(local @ self.frame + self.origin)
 
     def cameras(self) -> Floats:
         """(P, 3, 3) rotations from the axes of the photos to these axes."""
-        matrices = geometry.rotation_matrix(self.block.photo_attitudes)
-        to_ground = matrices if self.block.photo_to_ground else matrices.transpose(0, 2, 1)
-        if self.block.spheroid is None:
-            return to_ground
-        vertical = geometry.local_frames(self.block.photo_positions)
-        rotations: Floats = self.frame @ vertical.transpose(0, 2, 1) @ to_ground
-        return rotations
-
-    def _cartesian(self, positions: Floats) -> Floats:
-        if self.block.spheroid is None:
-            return positions
-        return geometry.geographic_to_geocentric(positions, self.block.spheroid)
+        block = self.block
+        turned = photo_axes(block.photo_attitudes, block.photo_to_ground)
+        if block.spheroid is None:
+            return turned
+        vertical = local_frames(block.photo_positions).transpose(0, 2, 1)
+        return np.asarray(self.frame @ vertical @ turned)
 
 
 def local_axes(block: Block) -> LocalAxes:
     """Return the metric axes of a block."""
-    stations = _stations(block)
-    if block.spheroid is None:
-        return LocalAxes(block, np.median(stations, axis=0) * [1.0, 1.0, 0.0], np.eye(3))
-    middle = np.median(stations, axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
-    origin = geometry.geographic_to_geocentric(middle, block.spheroid)[0]
-    return LocalAxes(block, origin, geometry.local_frames(middle)[0])
+    middle = np.median(_stations(block), axis=0)[np.newaxis] * [1.0, 1.0, 0.0]
+    frame = np.eye(3) if block.spheroid is None else local_frames(middle)[0]
+    return LocalAxes(block, Cartesian(block.spheroid).positions(middle)[0], frame)
 
 
 def _stations(block: Block) -> Floats:
@@ -85,14 +78,8 @@ def frame_radius(block: Block) -> float:
 class Intersection:
     """Every point where its rays meet, whichever side of the cameras that is.
 
-    Attributes
-    ----------
-    positions
-        (n, 3) in the metric axes; NaN with fewer than two rays, or parallel ones.
-    residuals
-        (m, 2) observed minus computed, millimetres; NaN where the point is.
-    in_front
-        (m,) whether the point lies in front of the camera.
+    Positions are (n, 3) in the metric axes, NaN with fewer than two rays, or parallel ones; residuals (m, 2)
+    observed minus computed, millimetres; `in_front` (m,) whether the point lies in front of the camera.
     """
 
     positions: Floats
@@ -102,28 +89,15 @@ class Intersection:
     @property
     def sizes(self) -> Floats:
         """(m,) lengths of the residuals."""
-        sizes: Floats = np.hypot(self.residuals[:, 0], self.residuals[:, 1])
-        return sizes
+        return np.asarray(np.hypot(self.residuals[:, 0], self.residuals[:, 1]))
 
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """The rays of a block: from the projection centres through the image points.
+    """The rays of a block: from the projection centres through the image points that are `used`, (m,).
 
-    Attributes
-    ----------
-    block
-        The block.
-    axes
-        Its metric axes.
-    centres
-        (P, 3) projection centres in the metric axes.
-    cameras
-        (P, 3, 3) rotations from the photos to the metric axes.
-    used
-        (m,) the images that count.
-    unit
-        What the image coordinates of the block are called in reports.
+    In its metric axes: (P, 3) projection centres, (P, 3, 3) rotations from the photos. `unit` is what the
+    image coordinates of the block are called in reports.
     """
 
     block: Block
@@ -150,8 +124,7 @@ class Rays:
         distances = block.known_distances("checks")[block.image_photos]
         inner = np.column_stack([block.image_xy, distances]) * -np.sign(distances)[:, np.newaxis]
         outer = np.einsum("mij,mj->mi", self.cameras[block.image_photos], inner)
-        unit: Floats = outer / np.linalg.norm(outer, axis=1, keepdims=True)
-        return unit
+        return np.asarray(outer / np.linalg.norm(outer, axis=1, keepdims=True))
 
     def equations(self) -> tuple[Floats, Floats]:
         """Return I - d d^T and (I - d d^T) O of each ray, (m, 3, 3) and (m, 3)."""
@@ -208,8 +181,7 @@ class Rays:
         across = np.zeros((len(rows), 2, 3))
         across[:, 0, 0] = across[:, 1, 1] = 1
         across[:, :, 2] = -inner[:, :2] / inner[:, 2:]
-        partials: Floats = scale[:, np.newaxis, np.newaxis] * across @ turned
-        return partials
+        return np.asarray(scale[:, np.newaxis, np.newaxis] * across @ turned)
 
 
 def meet(normal: Floats, constant: Floats, rays: Floats) -> Floats:

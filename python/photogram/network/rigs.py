@@ -44,13 +44,7 @@ class Mount:
 
 
 def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
-    """Return mounts that agree with each other and with the photos of a block.
-
-    Raises
-    ------
-    InputError
-        What is no mount, a photo that is not there, one that is mounted twice or has others mounted on it.
-    """
+    """Return mounts that agree with each other and with the photos of a block; InputError of others."""
     if not isinstance(mounts, Sequence):
         raise InputError(f"mounts is no list: {shown(mounts)}")
     known, frames, seen = set(photos), set(), set()

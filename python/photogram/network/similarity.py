@@ -15,10 +15,8 @@ LINE = 1e-9
 def turn_and_scale(model: Floats, targets: Floats) -> tuple[float, Floats, Floats]:
     """Return the scale and rotation that bring points closest to others about their means, unweighted.
 
-    Returns
-    -------
-    The scale, the rotation, and the singular values of the sum of products: of points on a line the second is
-    about zero, and the rotation is one of many. All are zero where the points are too large to be multiplied.
+    And the singular values of the sum of products: of points on a line the second is about zero, and the
+    rotation is one of many. All are zero where the points are too large to be multiplied.
     """
     a, b = model - model.mean(axis=0), targets - targets.mean(axis=0)
     with np.errstate(over="ignore", invalid="ignore"):

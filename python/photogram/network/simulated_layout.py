@@ -84,10 +84,7 @@ def laid_out(
 ) -> Layout:
     """Lay out strips: lengths in metres, `footprint` the side of a frame on the mean terrain.
 
-    Raises
-    ------
-    InputError
-        Many more image points than were asked for, or than there is memory for.
+    InputError: many more image points than were asked for, or than there is memory for.
     """
     base, separation = (1 - forward_overlap) * footprint, (1 - side_overlap) * footprint
     # Points on one photo are left out: where one photo of one strip sees, the images are lost.

@@ -26,7 +26,7 @@ from photogram.network.projecting import camera_of, projected_images
 from photogram.network.simulated_layout import Layout
 from photogram.network.trajectories import Polynomial, Readout, Spline
 
-__all__ = ["LineScanner", "RollingShutter", "photo_angles", "photo_axes", "rolled", "rotations_of"]
+__all__ = ["LineScanner", "RollingShutter", "photo_angles", "rolled", "rotations_of"]
 
 _GUSTS = 0.03
 """Standard deviation of a component of a velocity, as part of the speed."""
@@ -151,12 +151,6 @@ def _check_numbers(
             raise InputError(f"{name} must not be negative")
 
 
-def photo_axes(block: Block) -> Floats:
-    """Return (P, 3, 3) the axes of the photos, as columns, in X, Y, Z or in east, north, up there."""
-    matrices = geometry.rotation_matrix(block.photo_attitudes)
-    return matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
-
-
 def photo_angles(axes: Floats, photo_to_ground: bool) -> Floats:
     """Return (P, 3) omega, phi, kappa of photos with (P, 3, 3) axes as columns."""
     return geometry.rotation_angles(axes if photo_to_ground else axes.transpose(0, 2, 1))
@@ -175,22 +169,11 @@ def rolled(
     frame: float,
     random: np.random.Generator,
 ) -> tuple[Block, Block]:
-    """Let the photos of a simulated block be read row by row while they move.
+    """Let the photos of a simulated block be read row by row while they move; return truth and block.
 
-    Parameters
-    ----------
-    truth, block
-        The block without errors and the one with them, in rectangular space.
-    shutter
-        How they are read, and how they move.
-    layout
-        The strips, which are flown in opposite directions.
-    frame
-        Its side, in principal distances.
-
-    Returns
-    -------
-    The two blocks with photos that have motions of their own: in the first the true ones are given.
+    Both are in rectangular space, with strips that are flown in opposite directions; `frame` is the side of
+    the frame in principal distances. Photos get motions of their own: in the first block the true ones are
+    given.
     """
     count = len(truth.photo_ids)
     strip, along = np.divmod(np.arange(count), layout.photos_per_strip)
@@ -231,7 +214,7 @@ def _with_attitudes(block: Block, truth: Block, draw: Floats) -> Block:
     sd = truth.photo_attitude_sd
     if not ((sd > 0) & np.isfinite(sd)).any():
         return block
-    observed = photo_axes(truth) @ rotations_of(sd * draw)
+    observed = geometry.photo_axes(truth.photo_attitudes, truth.photo_to_ground) @ rotations_of(sd * draw)
     return block.replace(
         photo_attitude_sd=np.inf,
         photo_attitudes_observed=None,

@@ -19,9 +19,10 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.geometry import Cartesian, photo_axes
 from photogram.network.observations import Attitude, Distance, Observation, Position
 from photogram.network.rigs import Mount
-from photogram.network.simulated_motion import photo_angles, photo_axes, rotations_of
+from photogram.network.simulated_motion import photo_angles, rotations_of
 from photogram.network.simulation import Simulation
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Sensor, Shift
 
@@ -72,8 +73,7 @@ def with_gnss(
     arm = shaped("lever_arm", lever_arm, (3,))
     given = arm + (lever_arm_sd if math.isfinite(lever_arm_sd) else 1.0) * random.standard_normal(3)
     arms = LeverArm("antenna", arm, 0.0), LeverArm("antenna", given, lever_arm_sd)
-    centres, turned, frames = _geocentric(truth)
-    middle = _middle(truth)
+    axes, (centres, turned) = Cartesian(truth.spheroid), _poses(truth)
     strips = _strips(truth)
     times = seconds * np.arange(len(strips))
     shifts, drifts = (
@@ -83,14 +83,15 @@ def with_gnss(
     parts: list[list[Observation]] = [[], []]
     since = times - (np.bincount(strips, times) / np.bincount(strips))[strips]
     moved = shifts[strips] + since[:, np.newaxis] * drifts[strips]
-    antennas = centres + turned @ arm + moved @ middle
+    middle = np.median(truth.photo_positions, axis=0)[np.newaxis]
+    antennas = centres + turned @ arm + axes.from_local(moved[:, :, np.newaxis], middle)[..., 0]
     own = [
         _of_strips(Shift, shifts) if shift_sd else None,
         _of_strips(Drift, drifts) if drift_sd else None,
     ]
     for which, noise in enumerate((np.zeros_like(errors), errors)):
-        places = antennas + np.einsum("pki,pk->pi", frames, noise)
-        observed = _coordinates(truth, places)
+        along = axes.from_local(noise[:, :, np.newaxis], truth.photo_positions)[..., 0]
+        observed = axes.from_cartesian(antennas + along)
         for photo, strip in enumerate(strips.tolist()):
             shift, drift = (None if each is None else each[which][strip] for each in own)
             parts[which].append(
@@ -136,7 +137,7 @@ def with_inertial(
     _positive(sd=sd)
     random, truth = np.random.default_rng(seed), simulation.truth
     turn = rotations_of(shaped("boresight", boresight, (3,))[np.newaxis])[0]
-    local = photo_axes(truth) @ turn
+    local = photo_axes(truth.photo_attitudes, truth.photo_to_ground) @ turn
     errors = rotations_of(sd * random.standard_normal((len(local), 3)))
     known, unknown = Boresight("inertial unit", turn, 0.0), Boresight("inertial unit")
     exact, noisy = (
@@ -189,7 +190,7 @@ def with_distances(
         raise InputError("scale and constant are 1 and 0 where they are not unknown")
     random = np.random.default_rng(seed)
     first, second = random.permutation(len(truth.point_ids))[: 2 * count].reshape(2, -1)
-    places = _cartesian(truth, truth.point_positions)
+    places = Cartesian(truth.spheroid).positions(truth.point_positions)
     lengths = scale * np.linalg.norm(places[second] - places[first], axis=1) + constant
     names = [(truth.point_ids[p], truth.point_ids[q]) for p, q in zip(first, second, strict=True)]
     known = Instrument("rangefinder", scale, constant, 0.0), Instrument("rangefinder")
@@ -247,62 +248,57 @@ def with_rig(
     turns = np.atleast_2d(np.asarray(rotations, dtype=np.float64))
     if offsets.shape != turns.shape or offsets.shape[1] != 3:
         raise InputError("positions and rotations of a rig have three numbers for each sensor")
-    centres, turned, _ = _geocentric(truth)
-    ids = list(truth.photo_ids)
+    axes, (centres, turned) = Cartesian(truth.spheroid), _poses(truth)
     mounts: tuple[list[Mount], list[Mount]] = ([], [])
-    added: dict[str, list[Any]] = {"positions": [], "attitudes": [], "photos": [], "points": [], "xy": []}
+    added: list[tuple[Floats, Floats, Indices, Indices, Floats]] = []
     for k, (offset, turn) in enumerate(zip(offsets, rotations_of(turns), strict=True)):
         start = rotations_of(rotation_error * random.standard_normal((1, 3)))[0]
         sensors = (
             Sensor(f"sensor {k + 2}", offset, turn, 0.0),
             Sensor(f"sensor {k + 2}", offset + position_error * random.standard_normal(3), turn @ start),
         )
-        own = _coordinates(truth, centres + turned @ offset)
-        angles = _angles(truth, own, turned @ turn)
+        own = axes.from_cartesian(centres + turned @ offset)
+        angles = photo_angles(axes.to_local(turned @ turn, own), truth.photo_to_ground)
         photos, points, xy = _seen(truth, own, angles, distances, frame_size)
         names = [f"{name} {k + 2}" for name in truth.photo_ids]
         for parts, sensor in zip(mounts, sensors, strict=True):
-            parts.extend(Mount(name, frame, sensor) for name, frame in zip(names, ids, strict=False))
-        added["positions"].append(own)
-        added["attitudes"].append(angles)
-        added["photos"].append(photos + len(truth.photo_ids) * (k + 1))
-        added["points"].append(points)
-        added["xy"].append(xy)
-    names = [mount.photo for mount in mounts[0]]
-    stacked = {name: np.concatenate(parts) for name, parts in added.items()}
-    sd = np.broadcast_to(truth.image_sd[:1], stacked["xy"].shape)
-    noise = sd * random.standard_normal(sd.shape)
-    times = len(offsets)
-
-    def grown(block: Block, own: Sequence[Mount], xy: Floats) -> Block:
-        free = np.full((len(names), 3), np.inf)
-        observed = {
-            name: None if given is None else np.concatenate([given, extra])
-            for name, given, extra in (
-                ("photo_positions_observed", block.photo_positions_observed, stacked["positions"]),
-                ("photo_attitudes_observed", block.photo_attitudes_observed, stacked["attitudes"]),
+            parts.extend(
+                Mount(name, frame, sensor) for name, frame in zip(names, truth.photo_ids, strict=True)
             )
-        }
+        added.append((own, angles, photos + len(truth.photo_ids) * (k + 1), points, xy))
+    names = [mount.photo for mount in mounts[0]]
+    own, angles, photos, points, xy = (np.concatenate(parts) for parts in zip(*added, strict=True))
+    sd = np.broadcast_to(truth.image_sd[:1], xy.shape)
+    noise = sd * random.standard_normal(sd.shape)
+    free = np.full((len(names), 3), np.inf)
+    further = {
+        "photo_positions": own,
+        "photo_positions_observed": own,
+        "photo_position_sd": free,
+        "photo_attitudes": angles,
+        "photo_attitudes_observed": angles,
+        "photo_attitude_sd": free,
+        "image_photos": photos,
+        "image_points": points,
+        "image_xy": xy,
+        "image_sd": sd,
+    }
+
+    def grown(block: Block, own: Sequence[Mount], errors: Floats | float) -> Block:
+        rows = further | {"image_xy": xy + errors}
         return block.replace(
             photo_ids=[*block.photo_ids, *names],
-            photo_positions=np.concatenate([block.photo_positions, stacked["positions"]]),
-            photo_attitudes=np.concatenate([block.photo_attitudes, stacked["attitudes"]]),
-            photo_position_sd=np.concatenate([block.photo_position_sd, free]),
-            photo_attitude_sd=np.concatenate([block.photo_attitude_sd, free]),
-            principal_distances=np.tile(distances, times + 1),
-            image_photos=np.concatenate([block.image_photos, stacked["photos"]]),
-            image_points=np.concatenate([block.image_points, stacked["points"]]),
-            image_xy=np.concatenate([block.image_xy, xy]),
-            image_sd=np.concatenate([block.image_sd, sd]),
+            principal_distances=np.tile(distances, len(offsets) + 1),
             mounts=[*block.mounts, *own],
-            **observed,
+            **{
+                name: np.concatenate([given, extra])
+                for name, extra in rows.items()
+                if (given := getattr(block, name)) is not None
+            },
         )
 
-    return replace(
-        simulation,
-        truth=grown(truth, mounts[0], stacked["xy"]),
-        block=grown(simulation.block, mounts[1], stacked["xy"] + noise),
-    )
+    block = grown(simulation.block, mounts[1], noise)
+    return replace(simulation, truth=grown(truth, mounts[0], 0.0), block=block)
 
 
 def _positive(**values: float) -> None:
@@ -342,41 +338,10 @@ def _strips(block: Block) -> Indices:
     return np.array([places[name] for name in names], dtype=np.int64)
 
 
-def _cartesian(block: Block, coordinates: Floats) -> Floats:
-    if block.spheroid is None:
-        return coordinates
-    return geometry.geographic_to_geocentric(coordinates, block.spheroid)
-
-
-def _coordinates(block: Block, places: Floats) -> Floats:
-    if block.spheroid is None:
-        return places
-    return geometry.geocentric_to_geographic(places, block.spheroid)
-
-
-def _frames(block: Block, positions: Floats) -> Floats:
-    """Return (P, 3, 3) the local axes at positions, as rows."""
-    if block.spheroid is None:
-        return np.broadcast_to(np.eye(3), (len(positions), 3, 3))
-    return geometry.local_frames(positions)
-
-
-def _middle(block: Block) -> Floats:
-    """Return the axes, as rows, that shifts and drifts are told in."""
-    return np.asarray(_frames(block, np.median(block.photo_positions, axis=0)[np.newaxis])[0])
-
-
-def _geocentric(block: Block) -> tuple[Floats, Floats, Floats]:
-    """Return the cartesian positions of the photos, their axes there as columns, and local axes as rows."""
-    frames = _frames(block, block.photo_positions)
-    turned = frames.transpose(0, 2, 1) @ photo_axes(block)
-    return _cartesian(block, block.photo_positions), turned, frames
-
-
-def _angles(block: Block, positions: Floats, turned: Floats) -> Floats:
-    """Return the angles of photos with given axes in cartesian space."""
-    local = _frames(block, positions) @ turned
-    return photo_angles(local, block.photo_to_ground)
+def _poses(block: Block) -> tuple[Floats, Floats]:
+    """Return the cartesian positions of the photos, and their axes there as columns."""
+    axes, turned = Cartesian(block.spheroid), photo_axes(block.photo_attitudes, block.photo_to_ground)
+    return axes.positions(block.photo_positions), axes.from_local(turned, block.photo_positions)
 
 
 def _seen(
@@ -385,8 +350,8 @@ def _seen(
     """Return photos, points and image coordinates of what lies in the frames, in front."""
     photos, points, images = [], [], []
     everything = np.arange(len(block.point_ids))
-    axes = _geocentric(block.replace(photo_positions=positions, photo_attitudes=angles))
-    places = _cartesian(block, block.point_positions)
+    centres, axes = _poses(block.replace(photo_positions=positions, photo_attitudes=angles))
+    places = Cartesian(block.spheroid).positions(block.point_positions)
     for photo in range(len(positions)):
         repeated = np.full(len(everything), photo)
         xy = geometry.project(
@@ -397,7 +362,7 @@ def _seen(
             spheroid=block.spheroid,
             photo_to_ground=block.photo_to_ground,
         )
-        depth = (places - axes[0][photo]) @ axes[1][photo][:, 2]
+        depth = (places - centres[photo]) @ axes[photo][:, 2]
         inside = (depth < 0) & (np.abs(xy).max(axis=1) < frame_size / 2)
         photos.append(repeated[inside])
         points.append(everything[inside])

@@ -10,14 +10,14 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
+from photogram.network.motion import about, given_poses
 from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.observations import Attitude, Observation, Position
 from photogram.network.projecting import projected, standing
-from photogram.network.simulated_frames import Taken
+from photogram.network.simulated_images import Taken
 from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_ids, window
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
-from photogram.network.whereabouts import about, given_poses
 
 __all__ = ["Flown", "scanned"]
 
@@ -35,23 +35,11 @@ line, an error in the focal plane is one of many lines.
 
 @dataclass(frozen=True)
 class Flown:
-    """How a scanner is flown.
+    """How a scanner is flown; lengths of the plan in metres, of the camera in millimetres, angles in radians.
 
-    Attributes
-    ----------
-    scanner, principal_distance, frame_size
-        The camera: its lines of sensors are as long as the frame; millimetres.
-    height, crab, tilt
-        Above the mean terrain, metres; largest deviations from the heading and from the vertical, radians.
-    image_sd
-        Of measurements in the focal plane, millimetres.
-    errors, sd
-        Standard deviations of the coefficients of positions and rotations, and of their observations, in
-        metres and radians.
-    origin
-        (3,) of the plan in the object space.
-    photo_to_ground
-        The sense of the attitude angles.
+    The lines of sensors are as long as the frame; `crab` and `tilt` are the largest deviations from heading
+    and vertical. `image_sd` is of measurements in the focal plane; `errors` and `sd` of the coefficients of
+    positions and rotations, and of their observations; `origin` (3,) of the plan in the object space.
     """
 
     scanner: LineScanner
@@ -105,19 +93,7 @@ class _Pass:
 
 
 def scanned(layout: Layout, flown: Flown, ground: Floats, random: np.random.Generator) -> Taken:
-    """Let a line scanner take the points of a layout.
-
-    Parameters
-    ----------
-    layout
-        The strips, or the scenes.
-    flown
-        How they are flown.
-    ground
-        (n, 3) the points of its grid, in the object space.
-    random
-        What is drawn is drawn from it.
-    """
+    """Let a line scanner take the (n, 3) points of the grid of a layout, in the object space."""
     sensors = flown.sensors()
     cameras = [Camera("perspective", {"c": flown.principal_distance}, name=name) for name in sensors]
     ids: list[str] = []

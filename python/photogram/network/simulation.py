@@ -17,10 +17,8 @@ from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.geometry import Spheroid
-from photogram.network.photo_cameras import checked_cameras
 from photogram.network.refraction import Refraction
-from photogram.network.simulated_cameras import photographed
-from photogram.network.simulated_frames import photograph, seen_side
+from photogram.network.simulated_images import photograph, photographed, seen_side
 from photogram.network.simulated_layout import (
     control_pattern,
     flight,
@@ -30,6 +28,7 @@ from photogram.network.simulated_layout import (
     point_ids,
 )
 from photogram.network.simulated_motion import LineScanner, RollingShutter, rolled
+from photogram.network.tables import checked_cameras
 
 __all__ = ["Blunders", "Simulation", "simulate"]
 
@@ -328,10 +327,7 @@ def _looks(
 ) -> tuple[float, float]:
     """Return how far aside cameras see, and how far they may be inclined, of (tilt, crab); radians.
 
-    Raises
-    ------
-    InputError
-        Photos that see too little, or to the horizon, or past each other.
+    InputError: photos that see too little, or to the horizon, or past each other.
     """
     tilt, crab = angles
     spread = frame_size / 2 / abs(principal_distance) * (math.cos(crab) + math.sin(crab))

@@ -10,13 +10,7 @@ __all__ = ["strips_of"]
 
 
 def strips_of(positions: Floats) -> list[Indices]:
-    """Cut the photos, in their order, into strips: where the flight turns or jumps.
-
-    Parameters
-    ----------
-    positions
-        (P, 3) in metric axes.
-    """
+    """Cut photos at (P, 3) in metric axes, in their order, into strips: where the flight turns or jumps."""
     plan = positions[:, :2]
     steps = np.linalg.norm(np.diff(plan, axis=0), axis=1)
     usual = float(np.median(steps)) if steps.size else 0.0

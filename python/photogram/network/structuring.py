@@ -18,16 +18,10 @@ __all__ = ["Overflow", "Structure", "structure"]
 
 @dataclass(frozen=True)
 class Overflow:
-    """Where the bandwidth first exceeds a limit.
+    """Where the bandwidth first exceeds a limit: the station whose entry is too much.
 
-    Attributes
-    ----------
-    photo
-        The station whose entry is too much.
-    photos
-        The stations in storage then, in the order of their entry.
-    point
-        The point whose first image called for it.
+    `photos` are the stations in storage then, in the order of their entry, `point` that whose first image
+    called for it.
     """
 
     photo: int
@@ -39,14 +33,9 @@ class Overflow:
 class Structure:
     """The order of the parameter sets and what it costs.
 
-    Attributes
-    ----------
-    photos
-        (P',) photos with images in the order of their entry.
-    entry, exit
-        (P',) places, in `points`, of the points at which they enter, and of the last points they observe.
-    points
-        (n',) points with images in the order of their first image.
+    Of P' photos with images, in the order of their entry, `entry` and `exit` are the places, in `points`, of
+    the points at which they enter, and of the last they observe; n' points are in the order of their first
+    image.
     """
 
     photos: Indices
@@ -105,12 +94,8 @@ class Structure:
 def structure(image_photos: Indices, image_points: Indices, order: Indices | None = None) -> Structure:
     """Structure the normal equations of a block as the 1987 program did.
 
-    Parameters
-    ----------
-    image_photos, image_points
-        (m,) the photo and the point of each image, indices; the points of a photo in the order of its images.
-    order
-        (P,) the photos in the order in which they are walked; by default that of their indices.
+    The points of a photo are in the order of its (m,) images; the photos are walked in the order (P,), by
+    default that of their indices.
     """
     if not len(image_photos):
         nothing = np.empty(0, dtype=np.int64)

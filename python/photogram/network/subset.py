@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.arguments.types import Bools, Indices
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness
 
-__all__ = ["IMAGES", "PHOTOS", "kept_images", "of_photos"]
+__all__ = ["IMAGES", "PHOTOS", "image_rows", "kept_images", "of_photos"]
 
 PHOTOS = (
     *("photo_positions", "photo_attitudes", "photo_position_sd", "photo_attitude_sd"),
@@ -19,9 +21,14 @@ IMAGES = ("image_photos", "image_points", "image_xy", "image_sd")
 """Those with a row for each image."""
 
 
+def image_rows(network: object, kept: Indices | Bools) -> dict[str, Any]:
+    """Return arrays of some images of a block or collection, by their rows or a mask, by their names."""
+    return {name: getattr(network, name)[kept] for name in IMAGES}
+
+
 def kept_images(block: Block, kept: Indices | Bools) -> Block:
     """Return a block with some of its images, by their rows or a mask."""
-    return block.replace(**{name: getattr(block, name)[kept] for name in IMAGES})
+    return block.replace(**image_rows(block, kept))
 
 
 def of_photos(block: Block, kept: Bools) -> Block:

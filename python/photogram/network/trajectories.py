@@ -10,8 +10,8 @@ weighted or known. Times are seconds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Literal, get_args
+import math
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from photogram.arguments.arrays import names, number, numbers, one_of, shaped, s
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.network.unknowns import Unknown
+from photogram.network.unknowns import Numbers, Unknown
 
 __all__ = [
     "Clock",
@@ -43,12 +43,8 @@ BasisRow = tuple[str, int, list[float]]
 DEGREES = {"polynomial": (0, 8), "spline": (1, 5)}
 
 
-@dataclass(frozen=True, eq=False)
-class Coefficient(Unknown):
+class Coefficient(Numbers):
     """A coefficient c_k or r_k of a trajectory."""
-
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
 
 
 class PositionCoefficient(Coefficient):
@@ -63,8 +59,7 @@ class RotationCoefficient(Coefficient):
     KIND = "rotation coefficient"
 
 
-@dataclass(frozen=True, eq=False)
-class GyroBias(Unknown):
+class GyroBias(Numbers):
     """What a gyroscope says of a body at rest: b, about the axes of the body.
 
     Parameters
@@ -76,9 +71,6 @@ class GyroBias(Unknown):
     """
 
     KIND = "gyro bias"
-
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
 
 
 class _Scalar(Unknown):
@@ -345,7 +337,7 @@ class Spline:
             own = places[k : k + order + 1]
             gaps = own[:, np.newaxis] - own
             np.fill_diagonal(gaps, 1.0)
-            factors = h**order * _factorial(order) / gaps.prod(axis=1)
+            factors = h**order * math.factorial(order) / gaps.prod(axis=1)
             step = (own[-1] - own[0]) / order
             found.append((list(range(k, k + order + 1)), factors.tolist(), sd * float(np.sqrt(h / step))))
         return found
@@ -360,10 +352,6 @@ class Spline:
             kept = float(np.exp(-step / time))
             found.append(([k, k + 1], [-kept, 1.0], sd * float(np.sqrt(1 - kept**2))))
         return found
-
-
-def _factorial(n: int) -> float:
-    return float(np.prod(np.arange(1, n + 1)))
 
 
 Basis = Polynomial | Spline
@@ -471,7 +459,9 @@ class Trajectory:
             "rotation_basis": none if self.rotation is None else self.rotation.row(origin),
             "position": position,
             "rotation": rotation,
-            "body": None if self.body is None else attitudes(*_arrays(self.body), "linear"),
+            "body": None
+            if self.body is None
+            else attitudes(np.asarray(self.body[0]), np.asarray(self.body[1]), "linear"),
             "axes": self.position_axes,
             "rotations": self.angles,
         }
@@ -500,8 +490,3 @@ def _of_each(name: str, given: ArrayLike, count: int) -> Floats:
     """Return (count, 3) of what is given of every coefficient, or of each."""
     found = numbers(name, given)
     return shaped(name, np.tile(found, (count, 1)) if found.shape == (3,) else found, (count, 3))
-
-
-def _arrays(body: Sequence[Any]) -> tuple[Floats, Floats]:
-    times, matrices = body
-    return np.asarray(times), np.asarray(matrices)

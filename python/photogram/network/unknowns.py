@@ -45,13 +45,7 @@ _UNKNOWNS = dict(_photocore.UNKNOWNS)
 
 
 def rotation(name: str, value: ArrayLike) -> Floats:
-    """Return a (3, 3) rotation matrix.
-
-    Raises
-    ------
-    InputError
-        What is none: rows that are not orthonormal to six digits, a mirrored matrix.
-    """
+    """Return a (3, 3) rotation matrix; InputError where it is not orthonormal to six digits, or mirrored."""
     matrix = shaped(name, value, (3, 3))
     if not np.abs(matrix.T @ matrix - np.eye(3)).max() < _ORTHONORMAL:
         raise InputError(f"{name} is no rotation matrix: {matrix.tolist()}")
@@ -122,7 +116,7 @@ class Unknown:
         object.__setattr__(self, name, value)
 
     def _position(self) -> Floats:
-        return shaped(f"value of {self.title}", getattr(self, "value"), (3,))  # noqa: B009
+        raise NotImplementedError
 
     def _attitude(self) -> Floats:
         return np.eye(3)
@@ -172,7 +166,7 @@ class Numbers(Unknown):
 
 
 @dataclass(frozen=True, eq=False)
-class LeverArm(Unknown):
+class LeverArm(Numbers):
     """The vector l from the projection centre to the antenna, in the axes of the photo.
 
     Parameters
@@ -187,12 +181,9 @@ class LeverArm(Unknown):
 
     KIND = "lever arm"
 
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
-
 
 @dataclass(frozen=True, eq=False)
-class Shift(Unknown):
+class Shift(Numbers):
     """The vector s that GNSS positions of a strip, a flight or a session are off by.
 
     Parameters
@@ -207,12 +198,9 @@ class Shift(Unknown):
 
     KIND = "shift"
 
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
-
 
 @dataclass(frozen=True, eq=False)
-class Drift(Unknown):
+class Drift(Numbers):
     """The vector d by which that grows in a second.
 
     Parameters
@@ -229,8 +217,6 @@ class Drift(Unknown):
 
     KIND = "drift"
 
-    value: ArrayLike = 0.0
-    sd: ArrayLike = np.inf
     epoch: float | None = None
 
     def __post_init__(self) -> None:
@@ -483,13 +469,7 @@ def _across(name: str, value: ArrayLike | None) -> Floats:
 
 
 def different_unknowns(unknowns: Iterable[Unknown]) -> list[Unknown]:
-    """Return unknowns, each once, in the order in which they come.
-
-    Raises
-    ------
-    InputError
-        Two of one type and name.
-    """
+    """Return unknowns, each once, in the order in which they come; refuse two of one type and name."""
     found = list({id(each): each for each in unknowns}.values())
     titles: set[str] = set()
     for each in found:

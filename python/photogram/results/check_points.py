@@ -13,7 +13,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
-from photogram.network.observations.control import Control
+from photogram.network.observations.points import Control
 from photogram.results.network import AdjustedNetwork
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Floats
 from photogram.network.block import Block
-from photogram.network.film_form import Affine, affine_form
+from photogram.network.film_reduction import Affine, affine_form
 from photogram.network.films import Film, Mark, Scan
 from photogram.network.observations import Fiducial
 from photogram.results.observation_kinds import ObservedKind

@@ -14,9 +14,8 @@ from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.csm.reading import read_isd
 from photogram.formats.format import Wishes
 from photogram.formats.isis import FORMAT
-from photogram.formats.isis.columns import measures_of, points_of
 from photogram.formats.isis.contents import contents_of
-from photogram.formats.isis.network import ControlNetwork
+from photogram.formats.isis.network import ControlNetwork, measures_of, points_of
 from photogram.formats.isis.outcome import Outcome
 from photogram.formats.isis.writing import network_text
 

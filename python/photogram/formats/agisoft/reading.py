@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from photogram.arguments.arrays import is_covariance
-from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.arguments.types import Floats, Indices
 from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN, checked_rotation
 from photogram.formats.xml_stream import Element, read_stream
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
@@ -27,15 +29,13 @@ GEOCENTRIC = 1e6
 _TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
 
 
-@dataclass
-class _Sensor:
+class _Sensor(NamedTuple):
     camera: Camera
     size: Size
     pixel: float | None
 
 
-@dataclass
-class _Similarity:
+class _Similarity(NamedTuple):
     """X_world = s R X_chunk + T."""
 
     rotation: Floats
@@ -44,13 +44,7 @@ class _Similarity:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the first chunk of a document, or the one that is asked for; PhotoScan has a list of them.
-
-    Raises
-    ------
-    InputError
-        What is no such document, a calibration in a form that is not known for certain.
-    """
+    """Read the first chunk of a document, or the one that is asked for; PhotoScan has a list of them."""
     root = read_stream(path, {}, "document")
     messages: list[Message] = []
     chunk = _chunk(root, wishes.model, messages)
@@ -92,28 +86,28 @@ def read(path: Path, wishes: Wishes) -> Project:
 
 
 def _chunk(root: Element, wanted: int | None, messages: list[Message]) -> Element:
-    chunks = [*root.all("chunk"), *_members(root, "chunks", "chunk")]
-    if not chunks or (wanted or 0) >= len(chunks):
-        raise root.error(
-            f"has {len(chunks)} chunks; there is no model {wanted or 0}" if chunks else "has no chunk"
-        )
+    chunks, taken = [*root.all("chunk"), *_members(root, "chunks", "chunk")], wanted or 0
+    if taken >= len(chunks):
+        raise root.error(f"has {len(chunks)} chunks; there is no model {taken}" if chunks else "has no chunk")
     if len(chunks) > 1:
         names = listed([each.attributes.get("label", "?") for each in chunks], 4)
-        messages.append(Message(f"{len(chunks)} chunks ({names}); taken is {wanted or 0} (--model N)"))
-    return chunks[wanted or 0]
+        messages.append(Message(f"{len(chunks)} chunks ({names}); taken is {taken} (--model N)"))
+    return chunks[taken]
 
 
 def _accuracies(chunk: Element, wishes: Wishes) -> dict[str, Floats]:
     """Return standard deviations where references have none: those of a user, else of the settings."""
-    settings = {
-        each.attributes.get("name"): each.attribute("value")
-        for each in _members(chunk, "settings", "property")
-        if each.attributes.get("name") in ("accuracy_cameras", "accuracy_markers")
-    }
+    settings = _properties(_members(chunk, "settings", "property"), "accuracy_cameras", "accuracy_markers")
     return {
         kind: np.broadcast_to(wishes.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
         for kind, name in (("gnss", "cameras"), ("control", "markers"))
     }
+
+
+def _properties(elements: Iterable[Element], *names: str) -> dict[str, float]:
+    """Return the values of properties of some names."""
+    own = ((each.attributes.get("name", ""), each) for each in elements)
+    return {name: each.attribute("value") for name, each in own if name in names}
 
 
 def _members(chunk: Element, folder: str, name: str) -> list[Element]:
@@ -133,10 +127,8 @@ def _sensors(chunk: Element, messages: list[Message]) -> dict[str, _Sensor]:
         while name in names:
             name += "'"
         names.add(name)
-        try:
+        with at_place(each):
             found[key] = _sensor(each, name, messages)
-        except InputError as error:
-            raise (error if error.file else each.error(error.message)) from None
     if not found:
         raise chunk.error("has no sensors")
     return found
@@ -149,11 +141,7 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
     if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
         raise resolution.error("the pictures have no size")
     size = int(width), int(height)
-    properties = {
-        each.attributes.get("name"): each.attribute("value")
-        for each in element.all("property")
-        if each.attributes.get("name") in ("pixel_width", "focal_length")
-    }
+    properties = _properties(element.all("property"), "pixel_width", "focal_length")
     pixel = properties.get("pixel_width") or None
     if kind == "spherical":
         return _Sensor(Camera("equirectangular", {"w": width, "h": height}, name=name), size, pixel)
@@ -172,18 +160,15 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> _Sensor:
         values |= {"f": fy, "b1": fx - fy, "b2": calibration.number("skew", 0.0)}
         values |= {"cx": calibration.number("cx") - width / 2, "cy": calibration.number("cy") - height / 2}
         if values["p1"] or values["p2"]:
-            messages.append(
-                Message(
-                    f"{name}: documents of version 1.2 are said to have p1 and p2 exchanged: look"
-                    " at the residuals"
-                )
-            )
+            text = "documents of version 1.2 are said to have p1 and p2 exchanged: look at the residuals"
+            messages.append(Message(f"{name}: {text}"))
     else:
         values |= {"f": calibration.number("f")} | {term: calibration.number(term, 0.0) for term in _TERMS}
+    model = f"agisoft_{kind}"
     further = {term: 0.0 if calibration is None else calibration.number(term, 0.0) for term in ("p3", "p4")}
     if any(further.values()):
-        return _Sensor(Camera(f"agisoft_{kind}_p4", values | further, name=name), size, pixel)
-    return _Sensor(Camera(f"agisoft_{kind}", values, name=name), size, pixel)
+        model, values = f"{model}_p4", values | further
+    return _Sensor(Camera(model, values, name=name), size, pixel)
 
 
 def _shots(chunk: Element, sensors: dict[str, _Sensor], messages: list[Message]) -> list[Element]:
@@ -211,32 +196,27 @@ def _shots(chunk: Element, sensors: dict[str, _Sensor], messages: list[Message])
 
 def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats]:
     """Return centres and attitudes in the world."""
-    own = chunk.child("transform")
-    whole = _similarity(own) if own is not None and own.child("rotation") is not None else None
+    whole = _similarity(chunk.child("transform")) or _Similarity(np.eye(3), np.zeros(3), 1.0)
     components = {
-        each.attributes.get("id"): each.child("transform")
+        each.attributes.get("id"): _similarity(each.child("transform"))
         for each in _members(chunk, "components", "component")
-    }
-    by_component = {
-        key: _similarity(each)
-        for key, each in components.items()
-        if each is not None and each.child("rotation")
     }
     centres, matrices = np.empty((len(shots), 3)), np.empty((len(shots), 3, 3))
     for row, each in enumerate(shots):
         transform = each.need("transform")
         values = transform.numbers(16).reshape(4, 4)
         turn = checked_rotation(transform, values[:3, :3])
-        similarity = by_component.get(each.attributes.get("component_id"), whole)
-        if similarity is None:
-            similarity = _Similarity(np.eye(3), np.zeros(3), 1.0)
+        similarity = components.get(each.attributes.get("component_id")) or whole
         matrices[row] = similarity.rotation @ turn @ Y_DOWN
         centres[row] = similarity.scale * similarity.rotation @ values[:3, 3] + similarity.translation
     return centres, matrices
 
 
-def _similarity(element: Element) -> _Similarity:
-    rotation = element.need("rotation")
+def _similarity(element: Element | None) -> _Similarity | None:
+    """Return the similarity of a transform; None of one without a rotation."""
+    rotation = None if element is None else element.child("rotation")
+    if element is None or rotation is None:
+        return None
     scale = element.number("scale", 1.0)
     if not scale > 0:
         raise element.error("the scale is not positive")
@@ -247,7 +227,7 @@ def _similarity(element: Element) -> _Similarity:
 
 @dataclass
 class _Positions:
-    """What carries references into the frame."""
+    """What carries references into the frame; `known`: whether a way leads there."""
 
     frame: Frame
     crs: str
@@ -286,11 +266,8 @@ def _frame(
         frame = Frame()
         known = not reference or reference.upper().startswith(LOCAL)
         if given and not known:
-            messages.append(
-                Message(
-                    f"the chunk has no place on the earth: {len(given)} references in its system are left out"
-                )
-            )
+            text = f"the chunk has no place on the earth: {len(given)} references in its system are left out"
+            messages.append(Message(text))
         return frame, _Positions(frame, "", known)
     from photogram.formats.crs import GEOCENTRIC as EARTH
     from photogram.formats.crs import GEOGRAPHIC, amid, to_frame, turn_to_frame
@@ -300,9 +277,8 @@ def _frame(
     centres[:] = to_frame(EARTH, centres, np.zeros((len(centres), 3, 3)), frame)[0]
     messages.append(Message(f"geocentric poses are adjusted in a frame that is {frame}"))
     if not reference:
-        messages.append(
-            Message("the document names no system of its references: longitude, latitude, height")
-        )
+        text = "the document names no system of its references: longitude, latitude, height"
+        messages.append(Message(text))
     return frame, _Positions(frame, reference or GEOGRAPHIC)
 
 
@@ -334,20 +310,15 @@ def _gnss(
         if _enabled(each) and (own := positions.reference(each, default)) is not None
     }
     known = {row: own for row, own in given.items() if (own[1] > 0).all()}
-    lacks = []
-    if len(known) < len(given):
-        lacks.append(
-            f"no standard deviations of {len(given) - len(known)} references of cameras (--sd gnss=..)"
-        )
+    lost = len(given) - len(known)
+    lacks = [f"no standard deviations of {lost} references of cameras (--sd gnss=..)"] if lost else []
     if not known:
         return [], lacks
-    found, turned = positions.carried(
-        np.array([own[0] for own in known.values()]), np.array([own[1] for own in known.values()])
-    )
-    return [
-        Position(names[row], found[k], covariance=(turned[k] + turned[k].T) / 2)
-        for k, row in enumerate(known)
-    ], lacks
+    xyz, sd = map(np.array, zip(*known.values(), strict=True))
+    found, turned = positions.carried(xyz, sd)
+    covariances = (turned + turned.transpose(0, 2, 1)) / 2
+    each = zip(known, found, covariances, strict=True)
+    return [Position(names[row], place, covariance=own) for row, place, own in each], lacks
 
 
 def _markers(
@@ -386,7 +357,7 @@ def _markers(
 
 def _locations(
     chunk: Element, rows: dict[str, int], markers: dict[str, int]
-) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], np.ndarray[tuple[int], np.dtype[np.int64]], Floats]:
+) -> tuple[Indices, Indices, Floats]:
     """Return what was measured by hand: predicted locations are no observations."""
     photos, points, xy = [], [], []
     for frame in _members(chunk, "frames", "frame"):
@@ -394,18 +365,10 @@ def _locations(
             point = markers.get(marker.attributes.get("marker_id", ""))
             for each in marker.all("location"):
                 photo = rows.get(each.attributes.get("camera_id", ""))
-                if point is None or photo is None:
-                    continue
-                if (
-                    each.attributes.get("pinned", "true") == "false"
-                    or each.attributes.get("valid", "true") == "false"
-                ):
+                by_hand = all(each.attributes.get(name) != "false" for name in ("pinned", "valid"))
+                if point is None or photo is None or not by_hand:
                     continue
                 photos.append(photo)
                 points.append(point)
                 xy.append((each.attribute("x"), each.attribute("y")))
-    return (
-        np.array(photos, dtype=np.int64),
-        np.array(points, dtype=np.int64),
-        np.array(xy, dtype=float).reshape(-1, 2),
-    )
+    return np.array(photos, dtype=np.int64), np.array(points, dtype=np.int64), np.reshape(xy, (-1, 2))

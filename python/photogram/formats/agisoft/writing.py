@@ -36,11 +36,11 @@ def cannot_hold(project: Project) -> list[str]:
     found = ["standard deviations of images, poses and cameras"]
     if ties:
         found.append(f"{ties} images of tie points: export BlocksExchange for these")
-    if lost := int(np.count_nonzero(~posed(project.block))):
+    if lost := int(np.count_nonzero(~posed(block))):
         found.append(f"{lost} photos without a pose")
-    partly = _known(project) & ~marked
-    if partly.any():
-        found.append(f"{np.count_nonzero(partly)} control points that are not known in all coordinates")
+    known = np.isfinite(block.point_positions).any(axis=1) & ~marked  # those with correlations are marked
+    if known.any():
+        found.append(f"{np.count_nonzero(known)} control points that are not known in all coordinates")
     found += lost_observations(block, "correlations")
     if project.frame.kind in ("topocentric", "geocentric"):
         found.append("digits: geocentric positions are good to 1e-9 m, degrees of references to 1e-9 m")
@@ -48,35 +48,33 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the file; a topocentric frame is written with its place on the earth.
-
-    Raises
-    ------
-    InputError
-        Cameras that Metashape does not have, pictures of unknown size, no poses.
-    """
+    """Return the file; a topocentric frame is written with its place on the earth."""
     block = project.block
-    if not posed(project.block).any():
+    if not posed(block).any():
         raise InputError("no photo has a pose, and the file holds nothing but photos with one")
     world = _world(project.frame)
     cameras, which = known_cameras(block)
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<document version="2.0.0">', '<chunk enabled="true">']
-    lines += [f'<sensors next_id="{len(cameras)}">']
-    for row, (camera, size, pixel) in enumerate(zip(cameras, project.sizes, project.pixel_mm, strict=True)):
-        lines += _sensor(row, camera, size, pixel)
-    lines += [
+    sensors = enumerate(zip(cameras, project.sizes, project.pixel_mm, strict=True))
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<document version="2.0.0">',
+        '<chunk enabled="true">',
+        f'<sensors next_id="{len(cameras)}">',
+        *(line for row, given in sensors for line in _sensor(row, *given)),
         "</sensors>",
         '<components next_id="1" active_id="0">',
         '<component id="0" label="Component 1">',
-    ]
-    lines += [
         f"<transform><rotation>{_numbers(world.rotation)}</rotation>"
         f"<translation>{_numbers(world.translation)}</translation><scale>1.0</scale></transform>",
         "</component>",
         "</components>",
+        *_shots(project, world, which),
+        *_markers(project, world),
+        f"<reference>{world.text}</reference>",
+        "</chunk>",
+        "</document>",
+        "",
     ]
-    lines += [*_shots(project, world, which), *_markers(project, world)]
-    lines += [f"<reference>{world.text}</reference>", "</chunk>", "</document>", ""]
     return {FILE: "\n".join(lines).encode()}
 
 
@@ -193,13 +191,6 @@ def _reference(position: Floats, sd: Floats, check: bool = False) -> str:
         values |= dict(zip(("sx", "sy", "sz"), sd.tolist(), strict=True))
     attributes = " ".join(f'{name}="{value!r}"' for name, value in values.items())
     return f'<reference {attributes} enabled="{"false" if check else "true"}"/>'
-
-
-def _known(project: Project) -> Bools:
-    """Return which points are control or check points, in some coordinate at least."""
-    block, full = project.block, correlated_control(project.block)
-    known = np.isfinite(block.point_positions).any(axis=1)
-    return np.asarray(known | np.array([name in full for name in block.point_ids], dtype=bool))
 
 
 def _marked(project: Project) -> Bools:

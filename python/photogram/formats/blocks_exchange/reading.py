@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rotations import checked_rotation
 from photogram.formats.self_check import agreement
 from photogram.formats.xml_stream import Element, read_stream
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -37,7 +39,12 @@ ORIENTATIONS = {
 """Rows: the axes of a camera orientation in those of the house, x right, y up, z back."""
 CENTER = 0.5
 """The middle of the first pixel is 0, 0: what is added to count from the corner."""
-_TERMS = frozenset({"K1", "K2", "K3", "P1", "P2"})
+_TERMS = ("K1", "K2", "K3", "P1", "P2")
+_READINGS: Mapping[str, Callable[[Mapping[str, float]], Mapping[str, float]]] = {
+    "P1 and P2 exchanged": lambda own: {"p1": own["p2"], "p2": own["p1"]},
+    "K1, K2, K3 with the other sign": lambda own: {name: -own[name] for name in ("k1", "k2", "k3")},
+}
+"""What programs may mean by the terms of a distortion otherwise."""
 BETTER, NOTICED = 3.0, 0.1
 """How much better another reading of the distortion must be to refuse a file, and above which median."""
 
@@ -68,16 +75,10 @@ class _Found:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a file with one block.
-
-    Raises
-    ------
-    InputError
-        What is no such file, a camera or an attitude in a form that is not known for certain.
-    """
+    """Read a file with one block."""
     found = _Found(wishes)
-    take = {
-        "SRS": partial(_system, found),
+    take: dict[str, Callable[[Element], None]] = {
+        "SRS": lambda own: found.systems.__setitem__(own.word("Id"), own.word("Definition")),
         "Photogroup": partial(_group, found),
         "ControlPoint": partial(_control, found),
         "TiePoint": partial(_tie, found),
@@ -89,10 +90,6 @@ def read(path: Path, wishes: Wishes) -> Project:
     if block is None or not found.photos:
         raise root.error("holds no block with photos")
     return _checked(_project(path, found, block.word("SRSId")))
-
-
-def _system(found: _Found, element: Element) -> None:
-    found.systems[element.word("Id")] = element.word("Definition")
 
 
 def _group(found: _Found, element: Element) -> None:
@@ -108,12 +105,9 @@ def _group(found: _Found, element: Element) -> None:
         raise element.error(f"the camera orientation {orientation} is none of {', '.join(ORIENTATIONS)}")
     axes = np.array(ORIENTATIONS[orientation], dtype=float)
     pixel = _pixel(element, size)
-    try:
-        camera = _camera(
-            element, size, axes, pixel, f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
-        )
-    except InputError as error:
-        raise (error if error.file else element.error(error.message)) from None
+    name = f"{element.word('Name') or 'camera'} {len(found.groups) + 1}"
+    with at_place(element):
+        camera = _camera(element, size, axes, pixel, name)
     found.groups.append(_Group(camera, size, axes, pixel))
     srs = element.word("SRSId")
     for photo in element.all("Photo"):
@@ -153,28 +147,15 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
     fy, skew = f * element.number("AspectRatio", 1.0), element.number("Skew", 0.0)
     if skew:
         offsets = {"cx": cx - size[0] / 2, "cy": cy - size[1] / 2, "w": float(size[0]), "h": float(size[1])}
-        own = {"k1": terms["K1"], "k2": terms["K2"], "k3": terms["K3"], "p1": terms["P1"], "p2": terms["P2"]}
+        own = {term.lower(): value for term, value in terms.items()}
         return Camera("agisoft_frame", {"f": fy, "b1": f - fy, "b2": skew, **offsets, **own}, name=name)
-    return Camera(
-        "full_opencv",
-        # P1 is the coefficient of r^2 + 2 x^2 in x, which OpenCV calls p2.
-        {
-            "fx": f,
-            "fy": fy,
-            "cx": float(cx),
-            "cy": float(cy),
-            "k1": terms["K1"],
-            "k2": terms["K2"],
-            "k3": terms["K3"],
-            "p1": terms["P2"],
-            "p2": terms["P1"],
-        },
-        name=name,
-    )
+    # P1 is the coefficient of r^2 + 2 x^2 in x, which OpenCV calls p2.
+    own = {term: terms[theirs] for term, theirs in zip(("k1", "k2", "k3", "p2", "p1"), _TERMS, strict=True)}
+    return Camera("full_opencv", {"fx": f, "fy": fy, "cx": float(cx), "cy": float(cy), **own}, name=name)
 
 
 def _terms(element: Element) -> dict[str, float]:
-    found = dict.fromkeys(sorted(_TERMS), 0.0)
+    found = dict.fromkeys(_TERMS, 0.0)
     distortion = element.child("Distortion")
     if distortion is None:
         return found
@@ -206,9 +187,8 @@ def _photo(found: _Found, element: Element, srs: str) -> None:
     path = element.word("ImagePath")
     if not path:
         raise element.error(f"the photo {number} has no ImagePath")
-    found.photos[number] = PhotoRecord(
-        path, len(found.groups) - 1, centre, rotation, srs, gnss, gnss_srs, element
-    )
+    group = len(found.groups) - 1
+    found.photos[number] = PhotoRecord(path, group, centre, rotation, srs, gnss, gnss_srs, element)
 
 
 def _position(element: Element) -> Floats:
@@ -244,12 +224,8 @@ def _control(found: _Found, element: Element) -> None:
     elif category != "Full":
         raise element.error(f"the category {category} is none of Full, Horizontal, Vertical")
     default = np.broadcast_to(found.wishes.sd.get("control", (np.nan,)), 3)
-    sd = np.array(
-        [
-            *[element.number("HorizontalAccuracy", float(default[0]))] * 2,
-            element.number("VerticalAccuracy", float(default[2])),
-        ]
-    )
+    horizontal = element.number("HorizontalAccuracy", float(default[0]))
+    sd = np.array([horizontal, horizontal, element.number("VerticalAccuracy", float(default[2]))])
     check = element.word("CheckPoint").lower() in ("true", "1")
     if not check and not (sd[~np.isnan(position)] > 0).all():
         raise element.error(f"the control point {name} has no accuracy: --sd control=...")
@@ -283,10 +259,8 @@ def _project(path: Path, found: _Found, srs: str) -> Project:
     matrices = np.array([each.rotation.T for each in photos])
     centres, matrices = frames.poses(photos, centres, matrices)
     images = [each for each in found.images if each[0] in rows]
-    if len(images) < len(found.images):
-        messages.append(
-            Message(f"{len(found.images) - len(images)} measurements are on photos that are not there")
-        )
+    if lost := len(found.images) - len(images):
+        messages.append(Message(f"{lost} measurements are on photos that are not there"))
     names = [each.path.replace("\\", "/").rsplit("/", 1)[-1] for each in photos]
     if len(set(names)) < len(names):
         names = [each.path for each in photos]
@@ -363,24 +337,16 @@ def _checked(project: Project) -> Project:
     as_read = agreement(project).median
     if not as_read > NOTICED:
         return project
-    for name, change in (("P1 and P2 exchanged", _exchanged), ("K1, K2, K3 with the other sign", _negated)):
-        cameras = [change(each) for each in project.block.cameras]
+    for name, change in _READINGS.items():
+        cameras = [
+            each.replace(parameters={**each.parameters, **change(each.parameters)})
+            for each in project.block.cameras
+        ]
         other = agreement(project.replace(block=project.block.replace(cameras=cameras))).median
         if other * BETTER < as_read:
             raise InputError(
-                f"the median residual is {as_read:.3g} px by the published distortion, {other:.3g} px"
-                f" with {name}:"
-                " the program that wrote the file means something else",
+                f"the median residual is {as_read:.3g} px by the published distortion, {other:.3g} px with"
+                f" {name}: the program that wrote the file means something else",
                 file=project.path,
             )
     return project
-
-
-def _exchanged(camera: Camera) -> Camera:
-    values = camera.parameters
-    return camera.replace(parameters={**values, "p1": values["p2"], "p2": values["p1"]})
-
-
-def _negated(camera: Camera) -> Camera:
-    values = camera.parameters
-    return camera.replace(parameters={**values, **{name: -values[name] for name in ("k1", "k2", "k3")}})

@@ -68,9 +68,8 @@ class Systems:
                 if not len(known):
                     raise InputError(f"no photo has a position in {definition}", file=photos[0].place.file)
                 self.frame = Frame("topocentric", "EPSG:4979", amid(definition, known))
-                messages.append(
-                    Message(f"positions in {definition} are adjusted in a frame that is {self.frame}")
-                )
+                text = f"positions in {definition} are adjusted in a frame that is {self.frame}"
+                messages.append(Message(text))
         self.same = definition
 
     def definition(self, srs: str) -> str:
@@ -89,9 +88,8 @@ class Systems:
         from photogram.formats.crs import to_frame
 
         found, turned, remarks = to_frame(definition, xyz, covariances, self.frame)
-        self.messages += [
-            Message(text) for text in remarks if text not in {each.text for each in self.messages}
-        ]
+        known = {each.text for each in self.messages}
+        self.messages += [Message(text) for text in remarks if text not in known]
         return found, turned
 
     def poses(self, photos: list[PhotoRecord], centres: Floats, matrices: Floats) -> tuple[Floats, Floats]:
@@ -126,9 +124,8 @@ class Systems:
             local = self.definition(srs) == self.same and self.frame.kind == "cartesian"
             for k, row in enumerate(rows):
                 if not local and points[row].sd is not None and not whole[k]:
-                    raise points[row].place.error(
-                        "a part of a position cannot be carried into another system"
-                    )
+                    text = "a part of a position cannot be carried into another system"
+                    raise points[row].place.error(text)
             deviation = np.array([np.zeros(3) if points[row].sd is None else points[row].sd for row in rows])
             covariances = np.zeros((len(rows), 3, 3))
             covariances[:, range(3), range(3)] = np.nan_to_num(deviation) ** 2
@@ -158,9 +155,8 @@ class Systems:
         if not rows:
             return []
         if "gnss" not in wishes.sd:
-            self.lacks.append(
-                f"no standard deviations of {len(rows)} GNSS positions, which are left out (--sd gnss=..)"
-            )
+            text = f"no standard deviations of {len(rows)} GNSS positions, which are left out (--sd gnss=..)"
+            self.lacks.append(text)
             return []
         sd = np.broadcast_to(wishes.sd["gnss"], 3)
         found: list[Observation] = []

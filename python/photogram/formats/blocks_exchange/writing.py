@@ -36,13 +36,7 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the file.
-
-    Raises
-    ------
-    InputError
-        Cameras with more than K1, K2, K3, P1, P2; pictures of unknown size.
-    """
+    """Return the file."""
     block = project.block
     cameras, which = known_cameras(block)
     frame = project.frame
@@ -59,11 +53,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     lines += [f"<SRS><Id>0</Id><Name>frame</Name><Definition>{escape(definition)}</Definition></SRS>"]
     lines += ["</SpatialReferenceSystems>", "<Block>", f"<Name>{_text(block.title or 'block')}</Name>"]
     lines += ["<Type>Aerial</Type>", "<SRSId>0</SRSId>", "<Photogroups>"]
-    gnss = {
-        each.photos[0]: each.observed[:3].tolist()
-        for each in block.observations
-        if isinstance(each, Position)
-    }
+    gnss = {each.photos[0]: each.observed[:3] for each in block.observations if isinstance(each, Position)}
     rotations = Y_DOWN @ attitude_matrices(block).transpose(0, 2, 1)
     for row, (camera, size) in enumerate(zip(cameras, sizes_of(project), strict=True)):
         lines += ["<Photogroup>", *_camera(camera, size)]
@@ -80,6 +70,10 @@ def _text(text: str) -> str:
 
 def _tags(values: Mapping[str, float]) -> str:
     return "".join(f"<{name}>{value!r}</{name}>" for name, value in values.items())
+
+
+def _xyz(position: Floats) -> str:
+    return _tags(dict(zip("xyz", position.tolist(), strict=True)))
 
 
 def _camera(camera: Camera, size: Size) -> list[str]:
@@ -103,7 +97,7 @@ def _camera(camera: Camera, size: Size) -> list[str]:
 
 
 def _photo(
-    project: Project, photo: int, rotation: list[list[float]], gnss: Mapping[str, list[float]]
+    project: Project, photo: int, rotation: list[list[float]], gnss: Mapping[str, Floats]
 ) -> list[str]:
     name = project.block.photo_ids[photo]
     pose = ""
@@ -112,11 +106,9 @@ def _photo(
         pose += f"<Rotation>{_tags(matrix)}<Accurate>true</Accurate></Rotation>"
     centre = project.block.photo_positions[photo]
     if np.isfinite(centre).all():
-        own = _tags(dict(zip("xyz", centre.tolist(), strict=True)))
-        pose += f"<Center>{own}<Accurate>true</Accurate></Center>"
+        pose += f"<Center>{_xyz(centre)}<Accurate>true</Accurate></Center>"
     if name in gnss:
-        own = _tags(dict(zip("xyz", gnss[name], strict=True)))
-        pose += f"<Metadata><SRSId>0</SRSId><Center>{own}</Center></Metadata>"
+        pose += f"<Metadata><SRSId>0</SRSId><Center>{_xyz(gnss[name])}</Center></Metadata>"
     return [
         "<Photo>",
         f"<Id>{photo}</Id>",
@@ -141,23 +133,16 @@ def _points(project: Project) -> list[str]:
         position, sd = block.point_positions[row], block.point_sd[row]
         if name in full:
             position, sd = full[name].observed, np.sqrt(np.diag(full[name].precision))
+        told = f"<Name>{escape(name)}</Name>"
         if name in full or row in checks or np.isfinite(sd).any():
-            control += [
-                "<ControlPoint>",
-                f"<Name>{escape(name)}</Name>",
-                *_given(
-                    position, sd if check_sd is None or row not in checks else check_sd[row], row in checks
-                ),
-            ]
-            control += [*images[row], "</ControlPoint>"]
+            if check_sd is not None and row in checks:
+                sd = check_sd[row]
+            given = _given(position, sd, row in checks)
+            control += ["<ControlPoint>", told, *given, *images[row], "</ControlPoint>"]
             continue
         start = project.starts[row]
-        known = (
-            [f"<Position>{_tags(dict(zip('xyz', start.tolist(), strict=True)))}</Position>"]
-            if np.isfinite(start).all()
-            else []
-        )
-        ties += ["<TiePoint>", f"<Name>{escape(name)}</Name>", *known, *images[row], "</TiePoint>"]
+        known = [f"<Position>{_xyz(start)}</Position>"] if np.isfinite(start).all() else []
+        ties += ["<TiePoint>", told, *known, *images[row], "</TiePoint>"]
     return [*control, "</ControlPoints>", *ties, "</TiePoints>"]
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from photogram.formats.colmap.reading import TITLE, place_of, read
-from photogram.formats.colmap.sidecar import covariance_files
-from photogram.formats.colmap.writing import cannot_hold, write
+from photogram.formats.colmap.writing import cannot_hold, covariance_files, write
 from photogram.formats.format import Format
 
 __all__ = ["FORMAT"]

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from photogram.arguments.types import Indices
 from photogram.formats.colmap.content import (
     CAMERA,
     IMU,
@@ -81,11 +82,9 @@ class _Reader:
 
     def records(self, least: int, what: str, make: Callable[[_Reader], _Made]) -> list[_Made]:
         """Return all records of the file, which ends with them."""
-        self.what = "count"
         found = []
         for record in range(1, self.count(least, what) + 1):
-            self.record = record
-            self.what = f"record {self.record}"
+            self.record, self.what = record, f"record {record}"
             found.append(make(self))
         self.end()
         return found
@@ -97,13 +96,7 @@ class _Reader:
 
 
 def read_binary(folder: Path) -> Model:
-    """Read a model.
-
-    Raises
-    ------
-    InputError
-        A file that is missing, that ends too early or late, or holds what cannot be.
-    """
+    """Read a model."""
     paths = {name: folder / f"{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")}
     cameras = _Reader(paths["cameras"]).records(24, "cameras", _camera)
     images = _images(_Reader(paths["images"]))
@@ -118,8 +111,8 @@ def _camera(reader: _Reader) -> Camera:
     number, model, width, height = (int(each) for each in reader.take("IiQQ"))
     if not 0 <= model < len(MODELS):
         raise place.error(
-            f"camera {number} has a model of the number {model}, which is not known: what follows cannot"
-            f" be read"
+            f"camera {number} has a model of the number {model}, which is not known: what follows cannot be"
+            " read"
         )
     name, count = MODELS[model]
     return Camera(number, name, width, height, reader.take(f"{count}d"), place)
@@ -129,8 +122,7 @@ def _images(reader: _Reader) -> Images:
     heads: list[tuple[float | int, ...]] = []
     names, features, places = [], [], []
     for record in range(1, reader.count(73, "images") + 1):
-        reader.record = record
-        reader.what = f"image {reader.record}"
+        reader.record, reader.what = record, f"image {record}"
         places.append(reader.place)
         heads.append(reader.take("I7dI"))
         end = reader.data.find(b"\0", reader.at, reader.at + _MOST_NAME)
@@ -152,17 +144,9 @@ def _images(reader: _Reader) -> Images:
         names,
         np.array([len(each) for each in features], dtype=np.int64),
         np.array(whole["xy"]).reshape(-1, 2),
-        _signed(whole["point"]),
+        whole["point"].astype(np.int64),  # 2^64 - 1, which is none, becomes NO_POINT
         places,
     )
-
-
-def _signed(
-    points: np.ndarray[tuple[int], np.dtype[np.uint64]],
-) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Return ids of points; 2^64 - 1 is none."""
-    found: np.ndarray[tuple[int], np.dtype[np.int64]] = points.astype(np.int64)
-    return found
 
 
 def _points(reader: _Reader) -> Points:
@@ -237,15 +221,9 @@ def binary_files(model: Model) -> dict[str, bytes]:
     """Return the files of a model."""
     names = {name: number for number, (name, _) in enumerate(MODELS)}
     cameras = [
-        struct.pack(
-            f"<IiQQ{len(each.parameters)}d",
-            each.number,
-            names[each.model],
-            each.width,
-            each.height,
-            *each.parameters,
-        )
-        for each in model.cameras
+        struct.pack("<IiQQ", c.number, names[c.model], c.width, c.height)
+        + struct.pack(f"<{len(c.parameters)}d", *c.parameters)
+        for c in model.cameras
     ]
     return {
         "cameras.bin": _file(cameras),
@@ -278,12 +256,12 @@ def _packed_images(images: Images) -> list[bytes]:
     return found
 
 
-def tracks_of(model: Model) -> list[np.ndarray[tuple[int, int], np.dtype[np.int64]]]:
+def tracks_of(model: Model) -> list[Indices]:
     """Return of each point the images that show it with the index of the feature there."""
     images, points = model.images, model.points
     rows = np.repeat(np.arange(len(images.counts)), images.counts)
     within = np.arange(len(rows)) - np.repeat(np.cumsum(images.counts) - images.counts, images.counts)
-    places = {int(number): row for row, number in enumerate(points.numbers.tolist())}
+    places = {number: row for row, number in enumerate(points.numbers.tolist())}
     owner = np.array([places.get(number, -1) for number in images.points.tolist()], dtype=np.int64)
     order = np.argsort(owner, kind="stable")
     order = order[owner[order] >= 0]
@@ -295,15 +273,7 @@ def tracks_of(model: Model) -> list[np.ndarray[tuple[int, int], np.dtype[np.int6
 def _packed_points(model: Model) -> list[bytes]:
     points = model.points
     return [
-        struct.pack(
-            "<Q3d3BdQ",
-            int(number),
-            *position,
-            *colour,
-            -1.0,
-            len(track),
-        )
-        + track.astype("<u4").tobytes()
+        struct.pack("<Q3d3BdQ", number, *position, *colour, -1.0, len(track)) + track.astype("<u4").tobytes()
         for number, position, colour, track in zip(
             points.numbers.tolist(),
             points.positions.tolist(),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.colmap.binary import read_binary
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Images, Model, Pose
@@ -18,7 +19,7 @@ from photogram.formats.names import NAMES, renamed
 from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rigging import FrameOf, Rig, mounted
 from photogram.formats.rotations import Y_DOWN
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.unknowns import Sensor
@@ -42,13 +43,7 @@ def place_of(path: Path) -> Path | None:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a model; binary files where there are both, as the package does.
-
-    Raises
-    ------
-    InputError
-        Files that are missing, end too early, or hold what cannot be.
-    """
+    """Read a model; binary files where there are both, as the package does."""
     del wishes
     folder = place_of(path)
     if folder is None:
@@ -92,9 +87,9 @@ def _project(model: Model, path: Path) -> Project:
         image_points=points,
         image_xy=images.xy[rows],
         mounts=mounts,
-        lacks=[]
-        if len(rows) == 0
-        else ["no control, scale or position on the earth: a free network (--control FILE)"],
+        lacks=["no control, scale or position on the earth: a free network (--control FILE)"]
+        if len(rows)
+        else [],
         messages=messages,
         details={
             "image numbers": dict(zip(images.names, images.numbers.tolist(), strict=True)),
@@ -105,21 +100,10 @@ def _project(model: Model, path: Path) -> Project:
 
 def _camera(camera: Camera) -> HouseCamera:
     model = camera.model.lower()
-    values = camera.parameters
-    try:
-        if model == "equirectangular":
-            return HouseCamera(model, {"w": values[0], "h": values[1]}, name=str(camera.number))
-        names = HouseCamera(model, _some(model), unit="px").names
-        return HouseCamera(model, dict(zip(names, values, strict=True)), name=str(camera.number), unit="px")
-    except InputError as error:
-        raise camera.place.error(error.message) from None
-
-
-def _some(model: str) -> dict[str, float]:
-    """Return values with which a model can be made, to ask it for its names."""
-    from photogram import _photocore
-
-    return dict.fromkeys((name for name, _ in dict(_photocore.camera_models())[model][1]), 1.0)
+    names = [name for name, _ in dict(_photocore.camera_models())[model][1]]
+    values = dict(zip(names, camera.parameters, strict=True))
+    with at_place(camera.place):
+        return HouseCamera(model, values, name=str(camera.number), unit="px")
 
 
 def _check_images(model: Model, places: dict[int, int]) -> None:
@@ -140,13 +124,14 @@ def _check_images(model: Model, places: dict[int, int]) -> None:
         feature = int(np.flatnonzero(~np.isfinite(images.xy).all(axis=1))[0])
         row = int(np.searchsorted(np.cumsum(images.counts), feature, side="right"))
         raise images.places[row].error(f"image {images.numbers[row]} has a feature that is no finite number")
-    bad = np.flatnonzero(~np.isfinite(images.translations).all(axis=1))
-    if len(bad):
-        raise images.places[int(bad[0])].error("the translation is no finite number")
     points = model.points
-    bad = np.flatnonzero(~np.isfinite(points.positions).all(axis=1))
-    if len(bad):
-        raise points.places[int(bad[0])].error("the position is no finite number")
+    for values, stand, what in (
+        (images.translations, images.places, "translation"),
+        (points.positions, points.places, "position"),
+    ):
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        if len(bad):
+            raise stand[int(bad[0])].error(f"the {what} is no finite number")
     order = np.argsort(points.numbers, kind="stable")
     again = np.flatnonzero(np.diff(points.numbers[order]) == 0)
     if again.size:
@@ -169,8 +154,7 @@ def _rotations(quaternions: Floats, images: Images, messages: list[Message]) -> 
         messages.append(
             Message(
                 f"{len(off)} quaternions have not the length 1, by up to {np.abs(lengths - 1).max():.2g},"
-                f" and were"
-                f" normalised: {listed([images.names[row] for row in off[:20]], 3)}"
+                f" and were normalised: {listed([images.names[row] for row in off[:20]], 3)}"
             )
         )
     return _matrices(quaternions / lengths[:, np.newaxis])
@@ -206,7 +190,53 @@ def _composed(
     if not model.frames:
         return []
     cameras = {each.number: str(each.number) for each in model.cameras}
-    rigs = {each.number: each for each in model.rigs}
+    rigs = {each.number for each in model.rigs}
+    sensors, house = _mounted_sensors(model, cameras)
+    rows = {number: row for row, number in enumerate(model.images.numbers.tolist())}
+    found, seen, unknown = [], set(), 0
+    for frame in model.frames:
+        if frame.rig not in rigs:
+            raise frame.place.error(f"frame {frame.number} has the rig {frame.rig}, which is not there")
+        turn, shift = _rigid(frame.pose, frame.place)
+        photos: dict[str, int] = {}
+        for kind, sensor, image in frame.data:
+            if kind != CAMERA:
+                continue
+            if image not in rows:
+                raise frame.place.error(f"frame {frame.number} has the image {image}, which is not there")
+            row = rows[image]
+            if (frame.rig, sensor) not in sensors or model.images.cameras[row] != sensor:
+                raise frame.place.error(
+                    f"frame {frame.number}: the image {image} is not of the camera {sensor} of its rig"
+                )
+            if row in seen:
+                raise frame.place.error(f"the image {image} is in two frames")
+            seen.add(row)
+            own_pose = sensors[frame.rig, sensor]
+            if own_pose is None:
+                rotations[row], translations[row] = np.nan, np.nan
+                unknown += 1
+                continue
+            rotations[row], translations[row] = own_pose[0] @ turn, own_pose[0] @ shift + own_pose[1]
+            if cameras[sensor] in photos:
+                raise frame.place.error(f"frame {frame.number} has two images of the camera {sensor}")
+            photos[cameras[sensor]] = row
+        of_frame = house.get(frame.rig)
+        if of_frame is not None and any(camera != of_frame.reference for camera in photos):
+            found.append(FrameOf(str(frame.number), of_frame, photos))
+    if unknown:
+        text = f"{unknown} images are of sensors whose pose on the rig is not known: they are oriented first"
+        messages.append(Message(text))
+    if alone := len(rows) - len(seen):
+        text = f"{alone} images are in no frame: their poses are those of the table of images"
+        messages.append(Message(text))
+    return found
+
+
+def _mounted_sensors(
+    model: Model, cameras: Mapping[int, str]
+) -> tuple[dict[tuple[int, int], tuple[Floats, Floats] | None], dict[int, Rig]]:
+    """Return the poses of cameras on rigs, None where not known, and the rigs whose frame is a camera."""
     sensors: dict[tuple[int, int], tuple[Floats, Floats] | None] = {}
     house: dict[int, Rig] = {}
     for rig in model.rigs:
@@ -216,67 +246,16 @@ def _composed(
                 continue
             if number not in cameras:
                 raise rig.place.error(f"rig {rig.number} has the camera {number}, which is not there")
-            sensors[rig.number, number] = None if pose is None else _rigid(pose, rig.place)
-            if pose is not None:
-                matrix, shift = _rigid(pose, rig.place)
-                own[cameras[number]] = Sensor.from_colmap(f"rig {rig.number}, camera {number}", matrix, shift)
+            found = sensors[rig.number, number] = None if pose is None else _rigid(pose, rig.place)
+            if found is not None:
+                own[cameras[number]] = Sensor.from_colmap(f"rig {rig.number}, camera {number}", *found)
         if rig.reference is not None and rig.reference[0] == CAMERA:
             sensors[rig.number, rig.reference[1]] = np.eye(3), np.zeros(3)
             house[rig.number] = Rig(str(rig.number), cameras.get(rig.reference[1], ""), own)
-    rows = {number: row for row, number in enumerate(model.images.numbers.tolist())}
-    found, seen, unknown = [], set(), 0
-    for frame in model.frames:
-        if frame.rig not in rigs:
-            _refuse(frame.place, f"frame {frame.number} has the rig {frame.rig}, which is not there")
-        turn, shift = _rigid(frame.pose, frame.place)
-        photos: dict[str, int] = {}
-        for kind, sensor, image in frame.data:
-            if kind != CAMERA:
-                continue
-            if image not in rows:
-                _refuse(frame.place, f"frame {frame.number} has the image {image}, which is not there")
-            row = rows[image]
-            if (frame.rig, sensor) not in sensors or model.images.cameras[row] != sensor:
-                _refuse(
-                    frame.place,
-                    f"frame {frame.number}: the image {image} is not of the camera {sensor} of its rig",
-                )
-            if row in seen:
-                _refuse(frame.place, f"the image {image} is in two frames")
-            seen.add(row)
-            own_pose = sensors[frame.rig, sensor]
-            if own_pose is None:
-                rotations[row], translations[row] = np.nan, np.nan
-                unknown += 1
-                continue
-            rotations[row], translations[row] = own_pose[0] @ turn, own_pose[0] @ shift + own_pose[1]
-            if cameras[sensor] in photos:
-                _refuse(frame.place, f"frame {frame.number} has two images of the camera {sensor}")
-            photos[cameras[sensor]] = row
-        of_frame = house.get(frame.rig)
-        if of_frame is not None and any(camera != of_frame.reference for camera in photos):
-            found.append(FrameOf(str(frame.number), of_frame, photos))
-    if unknown:
-        messages.append(
-            Message(
-                f"{unknown} images are of sensors whose pose on the rig is not known: they are oriented first"
-            )
-        )
-    alone = len(rows) - len(seen)
-    if alone:
-        messages.append(
-            Message(f"{alone} images are in no frame: their poses are those of the table of images")
-        )
-    return found
+    return sensors, house
 
 
-def _refuse(place: Place, message: str) -> NoReturn:
-    raise place.error(message)
-
-
-def _observed(
-    model: Model, messages: list[Message]
-) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], np.ndarray[tuple[int], np.dtype[np.int64]]]:
+def _observed(model: Model, messages: list[Message]) -> tuple[Indices, Indices]:
     """Return rows of features that are images of points, and the rows of these."""
     images, points = model.images, model.points
     with_point = np.flatnonzero(images.points != NO_POINT)
@@ -294,9 +273,8 @@ def _observed(
         lost = np.unique(wanted[~there])
         messages.append(
             Message(
-                f"{np.count_nonzero(~there)} features are of {len(lost)} points that points3D does not"
-                f" have, and"
-                f" are left out: {listed([str(each) for each in lost[:20].tolist()], 3)}"
+                f"{np.count_nonzero(~there)} features are of {len(lost)} points that points3D does not have,"
+                f" and are left out: {listed([str(each) for each in lost[:20].tolist()], 3)}"
             )
         )
     rows = order[at[there]]

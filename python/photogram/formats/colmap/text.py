@@ -32,8 +32,7 @@ _HEADS = {
     "images": "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, POINT3D_ID)",
     "points3D": "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)",
     "rigs": "# RIG_ID, NUM_SENSORS, REF_SENSOR_TYPE, REF_SENSOR_ID, SENSORS[] as (SENSOR_TYPE, SENSOR_ID,"
-    " HAS_POSE,"
-    " [QW, QX, QY, QZ, TX, TY, TZ])",
+    " HAS_POSE, [QW, QX, QY, QZ, TX, TY, TZ])",
     "frames": "# FRAME_ID, RIG_ID, RIG_FROM_WORLD[QW, QX, QY, QZ, TX, TY, TZ], NUM_DATA_IDS, DATA_IDS[] as"
     " (SENSOR_TYPE, SENSOR_ID, DATA_ID)",
 }
@@ -84,13 +83,7 @@ def _lines(path: Path) -> Iterator[Place]:
 
 
 def read_text(folder: Path) -> Model:
-    """Read a model.
-
-    Raises
-    ------
-    InputError
-        A file that is missing, a line that holds something else.
-    """
+    """Read a model."""
     rigs, frames = folder / "rigs.txt", folder / "frames.txt"
     return Model(
         folder,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
@@ -30,13 +32,15 @@ from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
 from photogram.formats.rotations import Y_DOWN
+from photogram.io.json import to_json
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.rigs import Mount
+from photogram.results.result import Result
 
-__all__ = ["Made", "cannot_hold", "made", "write", "write_as_text"]
+__all__ = ["cannot_hold", "covariance_files", "write", "write_as_text"]
 
 _NAMES = dict(MODELS)
 
@@ -78,26 +82,19 @@ def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> boo
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the binary files of a project.
-
-    Raises
-    ------
-    InputError
-        Cameras of other models than those of COLMAP, pictures of unknown size, no
-        poses.
-    """
-    found = made(project)
+    """Return the binary files of a project."""
+    found = _made(project)
     return {**binary_files(found.model), **names_file(found.points)}
 
 
 def write_as_text(project: Project) -> Mapping[str, bytes]:
-    """Return the text files of a project; see :func:`write`."""
-    found = made(project)
+    """Return the text files of a project."""
+    found = _made(project)
     return {**text_files(found.model), **names_file(found.points)}
 
 
 @dataclass(frozen=True)
-class Made:
+class _Made:
     """A model with the numbers that photos, points and cameras have in it, and its images in their order."""
 
     model: Model
@@ -107,8 +104,8 @@ class Made:
     rows: Indices
 
 
-def made(project: Project) -> Made:
-    """Return the model of a project; see :func:`write`."""
+def _made(project: Project) -> _Made:
+    """Return the model of a project; an error of cameras that COLMAP does not have, or without poses."""
     block = project.block
     cameras, photo_cameras = known_cameras(block)
     numbers = numbered([each.name for each in cameras])
@@ -126,36 +123,28 @@ def made(project: Project) -> Made:
     translations = -np.einsum("nij,nj->ni", rotations, block.photo_positions[shown])
     quaternions = Attitudes(matrices).values("quaternion_to_vision")
     camera_numbers = np.array([numbers[cameras[photo_cameras[row]].name] for row in shown], dtype=np.int64)
-    ids = np.array([photos[block.photo_ids[row]] for row in shown], dtype=np.int64)
+    ids = np.array(list(photos.values()), dtype=np.int64)
     images, rows = _images(project, shown, ids, camera_numbers, quaternions, translations, placed, points)
     colours = project.details.get("colours", {})
     poses = {
-        block.photo_ids[row]: Pose(tuple(q), tuple(t))
-        for row, q, t in zip(shown.tolist(), quaternions.tolist(), translations.tolist(), strict=True)
+        name: Pose(tuple(q), tuple(t))
+        for name, q, t in zip(photos, quaternions.tolist(), translations.tolist(), strict=True)
     }
-    of_photo = {
-        block.photo_ids[row]: int(number) for row, number in zip(shown.tolist(), camera_numbers, strict=True)
-    }
+    of_photo = dict(zip(photos, camera_numbers.tolist(), strict=True))
     rigs, frames = _rigs(project, poses, photos, of_photo, sorted(numbers.values()))
-    order = np.argsort([points[block.point_ids[row]] for row in placed], kind="stable")
-    placed = placed[order]
-    model = Model(
-        project.path,
-        sorted(lines, key=lambda each: each.number),
-        images,
-        Points(
-            np.array([points[block.point_ids[row]] for row in placed], dtype=np.int64),
-            positions[placed],
-            np.array(
-                [colours.get(block.point_ids[row], (0, 0, 0)) for row in placed], dtype=np.int64
-            ).reshape(-1, 3),
-            np.zeros(len(placed), dtype=np.int64),
-            [],
-        ),
-        rigs,
-        frames,
+    point_numbers = np.array(list(points.values()), dtype=np.int64)
+    order = np.argsort(point_numbers, kind="stable")
+    shown_colours = [colours.get(block.point_ids[row], (0, 0, 0)) for row in placed[order]]
+    of_points = Points(
+        point_numbers[order],
+        positions[placed[order]],
+        np.array(shown_colours, dtype=np.int64).reshape(-1, 3),
+        np.zeros(len(placed), dtype=np.int64),
+        [],
     )
-    return Made(model, photos, points, numbers, rows)
+    by_number = sorted(lines, key=lambda each: each.number)
+    model = Model(project.path, by_number, images, of_points, rigs, frames)
+    return _Made(model, photos, points, numbers, rows)
 
 
 def _camera(camera: HouseCamera, size: Size, number: int) -> Camera:
@@ -166,7 +155,7 @@ def _camera(camera: HouseCamera, size: Size, number: int) -> Camera:
     if lens is None:
         raise InputError(
             f"the camera {camera.title} has the model {camera.model}, which COLMAP does not have; none is"
-            f" fitted"
+            " fitted"
         )
     if lens.fx == lens.fy and lens.is_plain("k1", "k2"):
         return Camera(number, "RADIAL", *size, (lens.fx, lens.cx, lens.cy, lens.k1, lens.k2), Place())
@@ -175,20 +164,20 @@ def _camera(camera: HouseCamera, size: Size, number: int) -> Camera:
 
 def _images(
     project: Project,
-    posed: np.ndarray[tuple[int], np.dtype[np.int64]],
-    ids: np.ndarray[tuple[int], np.dtype[np.int64]],
-    cameras: np.ndarray[tuple[int], np.dtype[np.int64]],
+    shown: Indices,
+    ids: Indices,
+    cameras: Indices,
     quaternions: Floats,
     translations: Floats,
-    placed: np.ndarray[tuple[int], np.dtype[np.int64]],
+    placed: Indices,
     points: Mapping[str, int],
 ) -> tuple[Images, Indices]:
     block = project.block
     number = np.full(len(block.point_ids), NO_POINT, dtype=np.int64)
-    number[placed] = [points[block.point_ids[row]] for row in placed]
+    number[placed] = list(points.values())
     rank = np.full(len(block.photo_ids), -1, dtype=np.int64)
     by_id = np.argsort(ids, kind="stable")
-    rank[posed[by_id]] = np.arange(len(posed))
+    rank[shown[by_id]] = np.arange(len(shown))
     rows = np.flatnonzero(rank[block.image_photos] >= 0)
     rows = rows[np.argsort(rank[block.image_photos[rows]], kind="stable")]
     images = Images(
@@ -196,8 +185,8 @@ def _images(
         cameras[by_id],
         quaternions[by_id],
         translations[by_id],
-        [block.photo_ids[row] for row in posed[by_id]],
-        np.bincount(rank[block.image_photos[rows]], minlength=len(posed)),
+        [block.photo_ids[row] for row in shown[by_id]],
+        np.bincount(rank[block.image_photos[rows]], minlength=len(shown)),
         to_corner(project)[rows],
         number[block.image_points[rows]],
         [],
@@ -249,3 +238,97 @@ def _sensor_pose(position: Floats, axes: Floats) -> Pose:
     turn = Y_DOWN @ axes.T @ Y_DOWN
     quaternion = Attitudes(turn[np.newaxis]).values("quaternion")[0]
     return Pose(tuple(quaternion.tolist()), tuple((-turn @ Y_DOWN @ position).tolist()))
+
+
+def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
+    """Return the covariances of a result in the order of the model's files: docs/formats.md."""
+    model = _made(project)
+    block = result.block
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    photos = {number: rows[name] for name, number in model.photos.items()}
+    places = {name: row for row, name in enumerate(block.point_ids)}
+    points = {number: places[name] for name, number in model.points.items()}
+    points = {number: row for number, row in points.items() if result.used_points[row]}
+    about = {
+        "format": 1,
+        "what": "covariances: cofactors times the variance of unit weight",
+        "variance_of_unit_weight": result.covariance_scale,
+        "frame": str(project.frame),
+        "unit": block.linear_unit,
+        "datum": str(result.datum),
+        "photo": ["C_x", "C_y", "C_z", "r_x", "r_y", "r_z"],
+        "photo_rotation": "R_true = exp([r]x) R, R world to camera; r in the camera's axes, radians",
+        "point": ["X", "Y", "Z"],
+        "camera": "the parameters of cameras.bin; held ones have zeros",
+        "layout": "u64 n; n x {id, lower triangle by rows as f64}; little endian, no padding",
+        "quality": "u64 n; n x {u32 image_id, u32 point2D_idx, f32 x 6}: residual, redundancy number and test"
+        " value of column and row; NaN where there is none",
+        "files": [
+            "photo_covariances.bin",
+            "camera_covariances.bin",
+            "point_covariances.bin",
+            "observation_quality.bin",
+        ],
+    }
+    return {
+        "covariances.json": to_json(about),
+        "photo_covariances.bin": _triangles(photos, _centre_and_rotation(result), "<u4"),
+        "camera_covariances.bin": _camera_covariances(model, result),
+        "point_covariances.bin": _triangles(points, result.point_covariances, "<u8"),
+        "observation_quality.bin": _quality(model, result),
+    }
+
+
+def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> bytes:
+    """Return covariances, whose rows stand at their numbers, in the order of these."""
+    own = sorted(rows.items())
+    lower = _lower(covariances[[row for _, row in own]])
+    table = np.empty(len(own), [("id", number), ("c", "<f8", lower.shape[1])])
+    table["id"], table["c"] = [each for each, _ in own], lower
+    return struct.pack("<Q", len(table)) + table.tobytes()
+
+
+def _quality(model: _Made, result: Result) -> bytes:
+    """Return residuals, redundancy numbers and test values of images, by image and feature."""
+    images = model.model.images
+    counts = np.asarray(images.counts)
+    table = np.empty(len(model.rows), [("image", "<u4"), ("feature", "<u4"), ("values", "<f4", 6)])
+    table["image"] = np.repeat(images.numbers, counts)
+    table["feature"] = np.arange(len(model.rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    parts = (result.residuals, result.redundancy, result.standardized)
+    table["values"] = np.hstack([part[model.rows] for part in parts])
+    return struct.pack("<Q", len(table)) + table.tobytes()
+
+
+def _camera_covariances(model: _Made, result: Result) -> bytes:
+    found = []
+    own = {each.name: each.covariance for each in result.cameras}
+    names = {number: name for name, number in model.cameras.items()}
+    for camera in model.model.cameras:
+        count = len(camera.parameters)
+        matrix = own.get(names[camera.number])
+        if matrix is None or matrix.shape != (count, count):
+            matrix = np.zeros((count, count))
+        triangle = _lower(matrix[np.newaxis])[0].astype("<f8")
+        found.append(struct.pack("<II", camera.number, count) + triangle.tobytes())
+    return struct.pack("<Q", len(found)) + b"".join(found)
+
+
+def _lower(matrices: Floats) -> Floats:
+    rows, columns = np.tril_indices(matrices.shape[1])
+    found: Floats = matrices[:, rows, columns]
+    return found
+
+
+def _centre_and_rotation(result: Result) -> Floats:
+    """Return (P, 6, 6) covariances of centres and of rotations in the axes of the cameras.
+
+    A Exp(rho) is F A' before: r = -F rho.
+    """
+    kind = "omega_phi_kappa_photo_to_ground" if result.block.photo_to_ground else "omega_phi_kappa"
+    rates = _photocore.attitudes_from_numbers(kind, result.photo_attitudes, _photocore.nadir_boresight(0))[1]
+    jacobian = np.zeros((len(rates), 6, 6))
+    jacobian[:, :3, :3] = np.eye(3)
+    jacobian[:, 3:, 3:] = -Y_DOWN @ rates
+    found: Floats = jacobian @ result.photo_covariances @ jacobian.transpose(0, 2, 1)
+    return found

@@ -67,14 +67,9 @@ def to_quaternions(matrices: Floats) -> Floats:
 
 
 class Polynomials(NamedTuple):
-    """Three angles, or coordinates, as polynomials of (t - reference) / scale.
+    """Three angles, or coordinates, as polynomials of (t - reference) / scale, both in seconds.
 
-    Attributes
-    ----------
-    coefficients
-        (3, degree + 1), powers from 0 on.
-    reference, scale
-        Seconds.
+    `coefficients` are (3, degree + 1), powers from 0 on.
     """
 
     coefficients: Floats
@@ -100,27 +95,14 @@ class Polynomials(NamedTuple):
 
 
 def fitted_angles(times: Floats, matrices: Floats, degree: int) -> Polynomials:
-    """Return polynomials that fit the angles of records, all of one weight, as the program jigsaw does.
-
-    Parameters
-    ----------
-    times, matrices
-        (k,) seconds and (k, 3, 3) matrices from inertial axes to those of the camera.
-    degree
-        Of the polynomials; time is scaled by the middle and half of the records.
-    """
+    """Return polynomials that fit the angles of (k, 3, 3) matrices, inertial to camera, as jigsaw does."""
     return fitted(times, to_angles(matrices), degree)
 
 
 def fitted(times: Floats, values: Floats, degree: int) -> Polynomials:
-    """Return polynomials that fit (k, 3) values of records, all of one weight.
+    """Return polynomials that fit (k, 3) values at (k,) seconds, all of one weight.
 
-    Parameters
-    ----------
-    times, values
-        (k,) seconds, and the values.
-    degree
-        Of the polynomials; time is scaled by the middle and half of the records.
+    Time is scaled by the middle and half of the records.
     """
     reference, scale = (times[0] + times[-1]) / 2, (times[-1] - times[0]) / 2 or 1.0
     powers = np.vander((times - reference) / scale, degree + 1, increasing=True)

@@ -1,31 +1,196 @@
-"""ISIS cubes after spiceinit as support data: their labels, tables, and keywords of instruments."""
+"""ISIS cubes after spiceinit as support data: labels, keywords of instruments, tables of pose behind them."""
 
 from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from os import SEEK_END
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.csm.cube_tables import members, one, read_label, read_positions, read_turns
-from photogram.formats.csm.isd import Detector, Isd
+from photogram.formats.csm.angles import Polynomials, of_angles, of_quaternions
+from photogram.formats.csm.isd import Detector, Isd, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift
-from photogram.formats.csm.optics import from_pixels, not_zero, transformed
-from photogram.io.pvl import Group
+from photogram.formats.csm.reading import from_pixels, not_zero, transformed
+from photogram.io.files import reading
+from photogram.io.places import at_place
+from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.io.tree import Tree
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
+from photogram.network.trajectories import Interpolation, increasing, rotations
 
-__all__ = ["read_cube", "serial_number"]
+__all__ = ["is_cube", "read_cube", "read_label", "read_positions", "read_turns", "serial_number"]
 
+PIECE = 1 << 16
+LONGEST = 1 << 26
+"""Bytes of a label, at most."""
 KM = 1000.0
+
+_END = re.compile(rb"(?mi)^[ \t]*End[ \t]*\r?$")
+_MARK = b"Object = IsisCube"
+_JOINED: dict[str, Interpolation] = {"linear": "linear", "hermitespline": "hermite"}
+_POLYNOMIAL = "polyfunction"
+_PLACES = ("J2000X", "J2000Y", "J2000Z")
+_SPEEDS = ("J2000XV", "J2000YV", "J2000ZV")
+_QUATERNIONS = ("J2000Q0", "J2000Q1", "J2000Q2", "J2000Q3")
+_TIME = "ET"
+_POLYNOMIALS = (("J2000SVX", "J2000SVY", "J2000SVZ"), ("J2000Ang1", "J2000Ang2", "J2000Ang3"))
+
 _LRO, _APOLLO = "LUNAR RECONNAISSANCE ORBITER", re.compile(r"APOLLO[ _]?(1[567])")
 _NAC = ("NACL", "NACR")
 _CHANGED = {"AlphaCube": "a part of another cube, or made smaller", "Mapping": "a map"}
 """Groups of cubes whose samples and lines are not those of their camera."""
+
+
+def is_cube(path: Path) -> bool:
+    """Whether a file is an ISIS cube."""
+    with reading(path), path.open("rb") as file:
+        return file.read(len(_MARK)).lower() == _MARK.lower()
+
+
+def read_label(path: Path) -> Group:
+    """Return the label of a cube."""
+    text = b""
+    with reading(path), path.open("rb") as file:
+        while (end := _END.search(text)) is None:
+            piece = file.read(PIECE)
+            if not piece or len(text) > LONGEST:
+                raise InputError("has no label with an End", file=path)
+            text += piece
+    label = parsed(text[: end.end()].decode("utf-8", "replace"), path)
+    _group(label, "IsisCube", path)
+    return label
+
+
+def _group(within: Group, name: str, path: Path) -> Group:
+    """Return the group of a name; an error where there is none."""
+    found = within.groups(name)
+    if not found:
+        raise InputError(f"the label has no {name}", file=path, record=within.line)
+    return found[0]
+
+
+def _members(group: Group, path: Path) -> Tree:
+    """Return the keys of a group with their values, without units, as a tree whose errors name them."""
+    return Tree({key: _plain(value) for key, value in group.items}, path, group.name)
+
+
+def _plain(value: Value) -> Any:
+    if isinstance(value, Quantity):
+        return _plain(value.value)
+    return [_plain(each) for each in value] if isinstance(value, list) else value
+
+
+class _Table:
+    """A table of a cube: numbers by the names of their columns."""
+
+    def __init__(self, label: Group, name: str, path: Path) -> None:
+        own = [each for each in label.groups("Table") if each.get("Name") == name]
+        if not own:
+            raise InputError(f"has no table {name}: run spiceinit on it", file=path)
+        self.label, self.path, self.name = own[0], path, name
+        self.keys = replace(_members(own[0], path), path=name)
+        fields = [_members(each, path) for each in own[0].groups("Field")]
+        self.columns = [each["Name"].text() for each in fields]
+        for each in fields:
+            if each["Type"].text().lower() != "double" or each["Size"].whole() != 1:
+                raise self.error(f"the column {each['Name'].value} is none of single doubles")
+        self.rows = self._rows()
+
+    def error(self, message: str) -> InputError:
+        return InputError(f"the table {self.name}: {message}", file=self.path, record=self.label.line)
+
+    def _rows(self) -> Floats:
+        records, width = self.keys["Records"].whole(1), len(self.columns)
+        order = self.keys.get("ByteOrder", "Lsb").text().lower()
+        if order not in ("lsb", "msb"):
+            raise self.error(f"has the byte order {order}, which is neither Lsb nor Msb")
+        if "^Table" in self.keys:
+            raise self.error("stands in another file, which is not read")
+        size = 8 * width * records
+        if self.keys["Bytes"].whole() != size:
+            raise self.error(
+                f"has {self.keys['Bytes'].value} bytes, {records} records of {width} doubles {size}"
+            )
+        begin = self.keys["StartByte"].whole(1, 1 << 62) - 1
+        with reading(self.path), self.path.open("rb") as file:
+            if begin + size > file.seek(0, SEEK_END):
+                raise self.error("goes on beyond the end of the file")
+            file.seek(begin)
+            data = file.read(size)
+        found = np.frombuffer(data, dtype="<f8" if order == "lsb" else ">f8").astype(float)
+        if not np.isfinite(found).all():
+            raise self.error("has numbers that are not finite")
+        return found.reshape(records, width)
+
+    def has(self, columns: Sequence[str]) -> bool:
+        return set(columns) <= set(self.columns)
+
+    def of(self, columns: Sequence[str]) -> Floats:
+        """Return (k, n) numbers of columns."""
+        missing = [each for each in columns if each not in self.columns]
+        if missing:
+            raise self.error(f"has no column {missing[0]}, but {', '.join(self.columns)}")
+        return np.asarray(self.rows[:, [self.columns.index(each) for each in columns]])
+
+    @property
+    def times(self) -> Floats:
+        with at_place(self):
+            return increasing(_TIME, self.of([_TIME])[:, 0])
+
+    def sampled(self, columns: Sequence[str], kernel: str) -> tuple[Floats, Floats]:
+        """Return (k,) times and (k, 3) values of polynomials, on records that join without loss."""
+        coefficients = self.of(columns)
+        (reference, scale, degree), own = coefficients[-1], coefficients[:-1]
+        if len(own) != degree + 1 or not scale:
+            raise self.error(f"is no polynomial: {len(own)} coefficients of the degree {degree:g}")
+        first, last = (self.keys[f"{kernel}Table{end}Time"].number() for end in ("Start", "End"))
+        if not last > first:
+            raise self.error(f"reaches from {first!r} to {last!r}")
+        return Polynomials(own.T, float(reference), float(scale)).sampled(first, last)
+
+    @property
+    def constant(self) -> Floats:
+        """The constant rotation behind that of the records."""
+        if "ConstantRotation" not in self.keys:
+            return np.eye(3)
+        given = self.keys["ConstantRotation"].numbers(9)
+        with at_place(self):
+            return np.asarray(rotations("ConstantRotation", given.reshape(1, 3, 3), 1)[0])
+
+
+def read_positions(label: Group, path: Path) -> Positions:
+    """Return the table InstrumentPosition of a cube."""
+    table = _Table(label, "InstrumentPosition", path)
+    joined = table.keys.get("CacheType", "Linear").text().lower()
+    if table.has(_POLYNOMIALS[0]) and joined in (_POLYNOMIAL, "linear"):
+        times, places = table.sampled(_POLYNOMIALS[0], "Spk")
+        return Positions(times, KM * places, None, "lagrange")
+    if joined not in _JOINED:
+        raise table.error(f"its CacheType {joined} is not known: give an ISD")
+    speeds = KM * table.of(_SPEEDS) if table.has(_SPEEDS) else None
+    if speeds is None and _JOINED[joined] == "hermite":
+        raise table.error("has no velocities, which its CacheType needs")
+    return Positions(table.times, KM * table.of(_PLACES), speeds, _JOINED[joined])
+
+
+def read_turns(label: Group, name: str, path: Path) -> Turns:
+    """Return a table of rotations of a cube, InstrumentPointing or BodyRotation."""
+    table = _Table(label, name, path)
+    if table.has(_POLYNOMIALS[1]):
+        times, angles = table.sampled(_POLYNOMIALS[1], "Ck")
+        return Turns(times, table.constant @ of_angles(angles), "lagrange")
+    quaternions = table.of(_QUATERNIONS)
+    if not (np.abs(np.linalg.norm(quaternions, axis=1) - 1) < 1e-3).all():
+        raise table.error("has quaternions that are not of the length 1")
+    return Turns(table.times, table.constant @ of_quaternions(quaternions), "linear")
 
 
 def _named(instrument: Tree) -> tuple[str, str]:
@@ -34,14 +199,8 @@ def _named(instrument: Tree) -> tuple[str, str]:
 
 
 def serial_number(label: Group, path: Path) -> str:
-    """Return what control networks call the image of a cube.
-
-    Raises
-    ------
-    InputError
-        An instrument whose rule is not known, keys that are missing.
-    """
-    instrument = members(one(one(label, "IsisCube", path), "Instrument", path), path)
+    """Return what control networks call the image of a cube; an error where no rule for it is known."""
+    instrument = _members(_group(_group(label, "IsisCube", path), "Instrument", path), path)
     spacecraft, name = _named(instrument)
     if spacecraft == _LRO and name in _NAC:
         return f"LRO/{instrument['SpacecraftClockStartCount'].text()}/{name}"
@@ -58,18 +217,15 @@ def serial_number(label: Group, path: Path) -> str:
 def read_cube(path: Path) -> Isd:
     """Return what the label and the tables of a cube say of its image.
 
-    Raises
-    ------
-    InputError
-        No cube, one without spiceinit, a part of another one or a map; an instrument that is not known by its
-        label and needs an ISD.
+    A part of another cube or a map is refused, and an instrument that is not known by its label: it needs an
+    ISD.
     """
     label = read_label(path)
-    cube = one(label, "IsisCube", path)
+    cube = _group(label, "IsisCube", path)
     for name, what in _CHANGED.items():
         if cube.groups(name):
             raise InputError(f"is {what} ({name}): take the cube that was made into it", file=path)
-    instrument = members(one(cube, "Instrument", path), path)
+    instrument = _members(_group(cube, "Instrument", path), path)
     known = _CAMERAS.get(_named(instrument))
     if known is None:
         spacecraft, name = _named(instrument)
@@ -82,9 +238,9 @@ def read_cube(path: Path) -> Isd:
 
 def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
     """Return a narrow angle camera of the Lunar Reconnaissance Orbiter."""
-    keywords = members(one(label, "NaifKeywords", path), path)
-    code = f"INS{members(one(cube, 'Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
-    size = members(one(one(cube, "Core", path), "Dimensions", path), path)
+    keywords = _members(_group(label, "NaifKeywords", path), path)
+    code = f"INS{_members(_group(cube, 'Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
+    size = _members(_group(_group(cube, "Core", path), "Dimensions", path), path)
     samples, count = size["Samples"].whole(1), size["Lines"].whole(1)
     pointing = read_turns(label, "InstrumentPointing", path)
     rate = not_zero(instrument["LineExposureDuration"]) / 1000
@@ -93,8 +249,7 @@ def _nac(label: Group, cube: Group, instrument: Tree, path: Path) -> Isd:
     return Isd(
         path,
         "line",
-        _named(instrument)[0],
-        _named(instrument)[1],
+        *_named(instrument),
         (samples, count),
         _radii(keywords),
         not_zero(keywords[f"{code}_FOCAL_LENGTH"]),
@@ -141,14 +296,10 @@ def _start(instrument: Tree, keywords: Tree) -> float:
 
     Its bytes stand there as hexadecimal digits, the least significant first.
     """
-    counts = [
-        key for key in ("SpacecraftClockPrerollCount", "SpacecraftClockStartCount") if key in instrument
-    ]
-    names = {
-        name for name, _ in keywords.items() if name.startswith("CLOCK_ET_") and name.endswith("_COMPUTED")
-    }
-    for key in counts:
-        own = [name for name in names if f"_{instrument[key].text()}_" in name]
+    known = re.compile(r"CLOCK_ET_.*_COMPUTED")
+    names = [name for name, _ in keywords.items() if known.fullmatch(name)]
+    for key in ("SpacecraftClockPrerollCount", "SpacecraftClockStartCount"):
+        own = [name for name in names if key in instrument and f"_{instrument[key].text()}_" in name]
         if own:
             value = keywords[own[0]]
             try:

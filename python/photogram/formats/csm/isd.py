@@ -20,6 +20,8 @@ __all__ = ["Detector", "Framelets", "Isd", "Jitter", "Pixels", "Plane", "Positio
 
 Pixels = Literal["isis", "csm"]
 """How pixels are counted: the middle of the first is 1 (ISIS) or 0.5, half a pixel of the detector apart."""
+HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}
+"""What the corner of the first pixel is counted as."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,16 +69,9 @@ class Plane:
 class Detector:
     """How an image lies on its detector; pairs are (sample, line).
 
-    Attributes
-    ----------
-    centre
-        Of the detector, in its pixels: where the axis of the camera meets it.
-    first
-        The pixel of the detector, from 0, at which the image begins.
-    summing
-        Pixels of the detector in one of the image.
-    planes
-        To the focal plane: as the Community Sensor Model has it, and as ISIS does.
+    The axis of the camera meets the detector in `centre`, in its pixels; the image begins at the pixel
+    `first`, from 0; `summing` pixels of the detector are one of the image; `planes` lead to the focal plane,
+    as the Community Sensor Model has it, and as ISIS does.
     """
 
     centre: Floats
@@ -90,27 +85,18 @@ class Detector:
         Image coordinates are 0.5 in the middle of the first pixel however pixels are counted; ISIS has them
         half a pixel of the detector farther on.
         """
-        return image * self.summing + self.first + self._half(pixels) - self.centre
+        return image * self.summing + self.first + HALF[pixels] - self.centre
 
     def image(self, from_centre: Floats, pixels: Pixels) -> Floats:
         """Return what :meth:`from_centre` makes these of."""
-        return (from_centre + self.centre - self.first - self._half(pixels)) / self.summing
-
-    @staticmethod
-    def _half(pixels: Pixels) -> float:
-        return 0.5 if pixels == "isis" else 0.0
+        return (from_centre + self.centre - self.first - HALF[pixels]) / self.summing
 
 
 @dataclass(frozen=True, eq=False)
 class Jitter:
-    """What moved the lines of a frame: pixels, as polynomials of the time at which each was read.
+    """What moved the lines of a frame: pixels, as polynomials of the (n,) times at which each was read.
 
-    Attributes
-    ----------
-    coefficients
-        (2, k) of samples and of lines, the highest power first, down to the first.
-    times
-        (n,) of the lines.
+    `coefficients` are (2, k), of samples and of lines, the highest power first, down to the first.
     """
 
     coefficients: Floats
@@ -125,22 +111,10 @@ class Jitter:
 
 @dataclass(frozen=True)
 class Framelets:
-    """The framelets of a push frame camera, each at one time.
+    """The framelets of a push frame camera: `count` of `height` lines, each at one time.
 
-    Attributes
-    ----------
-    height
-        Lines of the image in each.
-    count
-        Of the image.
-    first
-        The time of the earliest, seconds.
-    every
-        Seconds from one to the next.
-    backwards
-        Whether the last of the image is the earliest.
-    flipped
-        Whether the first line of each is the last of the detector.
+    The earliest is at `first` seconds, the next `every` seconds later; `backwards`: the last of the image is
+    the earliest; `flipped`: the first line of each is the last of the detector.
     """
 
     height: float
@@ -170,26 +144,18 @@ class Framelets:
 
 @dataclass(frozen=True, eq=False)
 class Isd:
-    """The support data of an image.
+    """The support data of an image: a line scanner, a frame, or a push frame camera.
 
     Attributes
     ----------
-    path
-        The file.
-    kind
-        `line`: a line scanner; `frame`, `push frame`.
-    platform, sensor
-        Their names.
     size
         Samples and lines.
     radii
         Of the body's spheroid, a and b in metres.
     focal_length
         Millimetres.
-    detector
-        How the image lies on the detector.
     lens
-        Before it; None: a perfect one.
+        Before the detector; None: a perfect one.
     position, pointing, body
         Tables of the camera's places, of inertial axes to those of the camera (x along samples as the plane
         has it, looking along +z), and to those of the body.
@@ -197,10 +163,6 @@ class Isd:
         Of a frame; the middle of others.
     lines
         The times of the lines of a scanner, by lines from the upper edge (0).
-    framelets
-        Of a push frame camera.
-    jitter
-        Of a frame.
     remarks
         What the file contradicts itself in, and what was made of it, in sentences.
     """

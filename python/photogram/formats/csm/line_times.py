@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
+from photogram.io.places import at_place
 from photogram.io.tree import Tree
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.moving_photos import Lines
@@ -33,21 +33,13 @@ class Drift:
 
 
 def read_lines(tree: Tree, center: float) -> Lines:
-    """Return the times of lines from the upper edge: ISIS counts 1 in the middle of the first.
-
-    Raises
-    ------
-    InputError
-        No rows of line, seconds from the centre, seconds per line; rates of zero, lines that do not increase.
-    """
+    """Return the times of lines from the upper edge: ISIS counts 1 in the middle of the first."""
     rates = tree["line_scan_rate"]
     rows = np.array([row.numbers(3) for row in rates])
     if not len(rows):
         raise rates.error("is empty")
-    try:
+    with at_place(rates):
         return Lines(rows - [0.5, -center, 0.0])
-    except InputError as error:
-        raise rates.error(error.message) from None
 
 
 def read_drift(keywords: Tree, code: str | None) -> Drift | None:
@@ -63,15 +55,8 @@ def read_drift(keywords: Tree, code: str | None) -> Drift | None:
 def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tuple[Lines, tuple[str, ...]]:
     """Return the times of lines that fit the pointing of the same file, and what there is to say of them.
 
-    Parameters
-    ----------
-    lines, count
-        The times as the file has them, and how many lines there are.
-    table
-        (k,) times of the pointing.
-    drift
-        What the rates may lack. It is added where the lines then begin and end nearer to the table's ends:
-        newer files have it in their rates already.
+    `drift` is added where the lines then begin and end nearer to the ends of `table`, the (k,) times of the
+    pointing: newer files have it in their rates already.
     """
     ends = table[[0, -1]]
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.formats.csm.cube_tables import is_cube, read_label
-from photogram.formats.csm.cubes import read_cube, serial_number
+from photogram.formats.csm.cubes import is_cube, read_cube, read_label, serial_number
 from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.reading import read_isd
 from photogram.io.files import read_lines
 
-__all__ = ["read_list", "read_support"]
+__all__ = ["listed_lines", "read_list", "read_support"]
 
 
 def read_support(path: Path) -> Isd:
@@ -23,6 +23,14 @@ def read_support(path: Path) -> Isd:
         As :func:`read_cube` and :func:`read_isd` have it.
     """
     return read_cube(path) if is_cube(path) else read_isd(path)
+
+
+def listed_lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield numbers and texts of the lines of a list; empty ones and those that begin with # do not count."""
+    for record, line in enumerate(read_lines(path), 1):
+        text = line.strip()
+        if text and not text.startswith("#"):
+            yield record, text
 
 
 def read_list(path: Path) -> dict[str, Path]:
@@ -40,10 +48,7 @@ def read_list(path: Path) -> dict[str, Path]:
         Files that are not there; ISDs without a serial number; one that stands there twice; an empty list.
     """
     found: dict[str, Path] = {}
-    for record, line in enumerate(read_lines(path), 1):
-        text = line.strip()
-        if not text or text.startswith("#"):
-            continue
+    for record, text in listed_lines(path):
         try:
             serial, file = _of_line(text, path.parent)
         except InputError as error:

@@ -11,20 +11,23 @@ from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.csm.angles import fitted_angles, of_angles
-from photogram.formats.csm.isd import Framelets, Isd, Pixels, Turns, check_choice
-from photogram.formats.csm.spheroids import nearest_intersection
+from photogram.formats.csm.isd import HALF, Framelets, Isd, Pixels, Turns, check_choice
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import LineSensor, Timed
 from photogram.network.projecting import projected
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
 
-__all__ = ["SupportedImage", "camera_of", "to_camera", "trajectory_of", "with_polynomial_pointing"]
+__all__ = ["SupportedImage", "to_camera", "trajectory_of", "with_polynomial_pointing"]
 
 _OURS = np.diag([1.0, -1.0, -1.0])
 """From the axes of cameras that look along +z, y down, to those of photos; and back."""
 _JOINED: dict[str, Interpolation] = {"csm": "lagrange", "isis": "linear"}
 """How records are joined where they do not say it themselves."""
+_STEPS = 5
+"""Until a shift no longer changes the line that it is of: shifts are less than a line."""
+_EDGE = 1e-6
+"""Rows beyond a framelet that are rounding at its edge."""
 
 
 def trajectory_of(
@@ -37,23 +40,10 @@ def trajectory_of(
 ) -> Trajectory:
     """Return the trajectory of a camera: inertial records in metres, under which its body turns.
 
-    Parameters
-    ----------
-    isd
-        The support data.
-    name
-        For reports.
-    interpolation
-        `csm`: polynomials through eight records, of positions and quaternions, at their own times however
-        far apart these are; `isis`: positions straight, attitudes uniformly from record to record. Records
-        that say it themselves (cubes) are joined so.
-    position, rotation
-        What corrections are made of, as for :class:`Trajectory`.
-
-    Raises
-    ------
-    InputError
-        Another interpolation; records that ask for velocities and have none.
+    Records are joined as `interpolation` says, those of cubes as they say themselves. `csm`: polynomials
+    through eight records, of positions and quaternions, at their own times however far apart these are;
+    `isis`: positions straight, attitudes uniformly from record to record. Corrections are as for
+    :class:`Trajectory`.
     """
     check_choice("csm", interpolation)
     places, pointing, joined = isd.position, isd.pointing, _JOINED[interpolation]
@@ -78,19 +68,9 @@ def to_camera(attitudes: Floats) -> Floats:
 
 
 def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
-    """Return support data whose pointing is that of polynomials fitted to its three angles, as jigsaw has it.
+    """Return support data whose pointing is polynomials fitted to its three angles, as jigsaw has it.
 
-    Parameters
-    ----------
-    isd
-        The support data.
-    degree
-        Of the polynomials: CKDEGREE.
-
-    Raises
-    ------
-    InputError
-        Fewer records than coefficients.
+    `degree` is its CKDEGREE; there have to be as many records as coefficients.
     """
     own = isd.pointing
     if not 0 <= degree < len(own.times):
@@ -100,16 +80,6 @@ def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
     fit = fitted_angles(own.times, own.matrices, degree)
     times, angles = fit.sampled(float(own.times[0]), float(own.times[-1]))
     return replace(isd, pointing=Turns(times, of_angles(angles), "lagrange"))
-
-
-def camera_of(isd: Isd, name: str = "") -> Camera:
-    """Return the camera behind the corrected focal plane: nothing but its principal distance."""
-    return Camera("perspective", {"c": -isd.focal_length}, name=name)
-
-
-def _named(isd: Isd) -> str:
-    """Return the platform and the sensor; many sensors have the name of their platform before their own."""
-    return isd.sensor if isd.sensor.startswith(isd.platform) else f"{isd.platform} {isd.sensor}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +103,7 @@ class SupportedImage:
     Attributes
     ----------
     camera
-        In millimetres; what is before it is known.
+        Behind the corrected focal plane, in millimetres: nothing but its principal distance.
     timed
         Its photos on the trajectory: one, or each framelet.
 
@@ -158,7 +128,11 @@ class SupportedImage:
         if own is None:
             own = trajectory_of(self.isd, self.name, interpolation=self.interpolation)
         object.__setattr__(self, "flown", own)
-        object.__setattr__(self, "camera", camera_of(self.isd, _named(self.isd)))
+        # Many sensors have the name of their platform before their own.
+        platform, sensor = self.isd.platform, self.isd.sensor
+        name = sensor if sensor.startswith(platform) else f"{platform} {sensor}"
+        camera = Camera("perspective", {"c": -self.isd.focal_length}, name=name)
+        object.__setattr__(self, "camera", camera)
         object.__setattr__(self, "timed", self._photos(own))
 
     def _photos(self, on: Trajectory) -> tuple[Timed, ...]:
@@ -166,8 +140,8 @@ class SupportedImage:
         if isd.lines is not None:
             return (Timed(self.name, on, isd.time, lines=isd.lines, line_sensor=self._line_sensor()),)
         if isd.framelets is not None:
-            all_of_them = range(isd.framelets.count)
-            return tuple(Timed(f"{self.name}/{k}", on, time=isd.framelets.time(k)) for k in all_of_them)
+            times = map(isd.framelets.time, range(isd.framelets.count))
+            return tuple(Timed(f"{self.name}/{k}", on, time=time) for k, time in enumerate(times))
         return (Timed(self.name, on, time=isd.time),)
 
     def _line_sensor(self) -> LineSensor:
@@ -201,7 +175,7 @@ class SupportedImage:
         own = [np.atleast_1d(numbers(name, each)) for name, each in (("samples", samples), ("lines", lines))]
         if own[0].ndim != 1 or own[0].shape != own[1].shape:
             raise InputError(f"samples and lines have the shapes {own[0].shape} and {own[1].shape}")
-        image = np.column_stack(own) - self._corner
+        image = np.column_stack(own) - HALF[self.pixels]
         photos = np.zeros(len(image), dtype=np.int64)
         if self.isd.lines is not None:
             return photos, image
@@ -213,11 +187,6 @@ class SupportedImage:
             photos = numbered.astype(np.int64)
             image[:, 1] = framelets.rows(image[:, 1], numbered)
         return photos, self._corrected(image)
-
-    @property
-    def _corner(self) -> float:
-        """What the corner of the first pixel is counted as."""
-        return 0.5 if self.pixels == "isis" else 0.0
 
     def _corrected(self, image: Floats) -> Floats:
         """Return (n, 2) places behind a perfect lens, y up, of samples and lines of a frame."""
@@ -258,10 +227,11 @@ class SupportedImage:
             times = self.isd.lines.times(xy[:, 1])
             xy = self._line_sensor().places(xy[:, 0])
         self._check_reached(times, np.atleast_1d(np.asarray(lines, dtype=float)))
-        places, turned, *_ = self.flown.flown(times, *_coefficients(self.flown))
+        given = (np.array([each.position for each in own]) for own in self.flown.coefficients)
+        places, turned, *_ = self.flown.flown(times, *given)
         rays = np.einsum("nij,nj->ni", turned.reshape(-1, 3, 3), self.camera.rays(xy))
         a, b = self.isd.radii
-        return nearest_intersection(places, rays, a + height, b + height)
+        return _nearest_intersection(places, rays, a + height, b + height)
 
     def _check_reached(self, times: Floats, lines: Floats) -> None:
         """Refuse times at which nothing is known of the pose."""
@@ -290,11 +260,11 @@ class SupportedImage:
         points = np.atleast_2d(numbers("xyz", xyz))
         seen = [projected(each, self.flown, self.camera, points) for each in self.timed]
         if self.isd.lines is not None:
-            return seen[0][:, ::-1] + self._corner
+            return seen[0][:, ::-1] + HALF[self.pixels]
         images = np.array([self._measured(each) for each in seen])
         framelets = self.isd.framelets
         found = images[0] if framelets is None else _in_framelets(framelets, images)
-        return self._jittered(found)[:, ::-1] + self._corner
+        return self._jittered(found)[:, ::-1] + HALF[self.pixels]
 
     def _jittered(self, image: Floats) -> Floats:
         """Return where samples and lines are measured that jitter has shifted."""
@@ -305,20 +275,6 @@ class SupportedImage:
         for _ in range(_STEPS):
             found = image + jitter.shifts(np.nan_to_num(found[:, 1]))
         return found
-
-
-_STEPS = 5
-"""Until a shift no longer changes the line that it is of: shifts are less than a line."""
-
-
-_EDGE = 1e-6
-"""Rows beyond a framelet that are rounding at its edge."""
-
-
-def _coefficients(trajectory: Trajectory) -> tuple[Floats, Floats]:
-    """Return what is given of the corrections of a trajectory."""
-    position, rotation = (np.array([each.position for each in own]) for own in trajectory.coefficients)
-    return position, rotation
 
 
 def _in_framelets(framelets: Framelets, images: Floats) -> Floats:
@@ -333,3 +289,21 @@ def _in_framelets(framelets: Framelets, images: Floats) -> Floats:
     lines = framelets.lines(own[:, 1], best)
     seen = off.min(axis=0, initial=np.inf) <= framelets.height / 2 + _EDGE
     return np.where(seen[:, np.newaxis], np.column_stack([own[:, 0], lines]), np.nan)
+
+
+def _nearest_intersection(origins: Floats, rays: Floats, a: float, b: float) -> Floats:
+    """Return (n, 3) where lines meet a spheroid about the origin, nearest to where they begin.
+
+    Of a line that misses it: where the spheroid, enlarged, would touch it. `a` is the semi-axis along X and
+    Y.
+    """
+    stretch = np.array([1.0, 1.0, a / b])
+    from_centre, along = origins * stretch, rays * stretch
+    square = np.einsum("ni,ni->n", along, along)
+    middle = -np.einsum("ni,ni->n", from_centre, along) / square
+    # |o + (m + s) d|^2 = a^2 about the middle of the chord, where o + m d is square to d.
+    foot = from_centre + middle[:, np.newaxis] * along
+    half = np.sqrt(np.maximum(a * a - np.einsum("ni,ni->n", foot, foot), 0.0) / square)
+    ends = np.stack([middle - half, middle + half])
+    nearest = np.where(np.abs(ends[0]) <= np.abs(ends[1]), ends[0], ends[1])
+    return np.asarray(origins + nearest[:, np.newaxis] * rays)

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.formats.csm.angles import of_quaternions
-from photogram.formats.csm.isd import Framelets, Isd, Jitter, Positions, Turns
+from photogram.formats.csm.isd import Detector, Framelets, Isd, Jitter, Pixels, Plane, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift, read_lines
-from photogram.formats.csm.optics import instrument, not_zero, read_detector, read_lens
+from photogram.io.places import at_place
 from photogram.io.tree import Tree, read_json, unknown
+from photogram.network.lens import Lens, LensModel
 from photogram.network.trajectories import increasing, rotations
 
-__all__ = ["UNITS", "read_isd"]
+__all__ = ["UNITS", "from_pixels", "not_zero", "read_isd", "transformed"]
 
+_TRANSX = re.compile(r"(INS-?\d+)_TRANSX")
 _KINDS = {
     "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL": "line",
     "USGS_ASTRO_FRAME_SENSOR_MODEL": "frame",
@@ -25,19 +27,21 @@ _KINDS = {
 }
 FRAMELETS = 100_000
 """At most in an image: each is a photo."""
+_MEMBERS = {
+    "radial": ("coefficients",),
+    "transverse": ("x", "y"),
+    "lrolrocnac": ("coefficients",),
+    "kaguyalism": ("boresight_x", "x", "boresight_y", "y"),
+    "cahvor": ("coefficients",),
+    "radtan": ("coefficients",),
+}
+"""Where the coefficients of each lens are; all of them may also stand in `coefficients`."""
 UNITS = {"m": 1.0, "km": 1000.0}
 """Metres; km where nothing is said."""
 
 
 def read_isd(path: Path) -> Isd:
-    """Read the support data of an image.
-
-    Raises
-    ------
-    InputError
-        A file that is no JSON; a key that matters and is missing, or is not what it should be; a sensor or a
-        lens that is not known.
-    """
+    """Read the support data of an image."""
     tree = read_json(path)
     keywords = tree.get("naif_keywords", {})
     model = tree["name_model"]
@@ -47,13 +51,13 @@ def read_isd(path: Path) -> Isd:
     size = tree["image_samples"].whole(1), tree["image_lines"].whole(1)
     focal_length = not_zero(tree["focal_length_model"]["focal_length"])
     _check_frames(tree)
-    detector = read_detector(tree, keywords)
+    detector = _detector(tree, keywords)
     pointing, center = _turns(tree, "instrument_pointing"), tree["center_ephemeris_time"].number()
     own: dict[str, Any] = {}
     if kind != "frame" and "jitter" in tree:
         raise tree["jitter"].error("is known of frames alone")
     if kind == "line":
-        drift = read_drift(keywords, instrument(tree, keywords))
+        drift = read_drift(keywords, _instrument(tree, keywords))
         lines = read_lines(tree, center)
         own["lines"], own["remarks"] = fitting(lines, size[1], pointing.times, drift)
     elif kind == "push frame":
@@ -69,7 +73,7 @@ def read_isd(path: Path) -> Isd:
         _radii(tree["radii"]),
         focal_length,
         detector,
-        read_lens(tree, focal_length),
+        _lens(tree, focal_length),
         _positions(tree["instrument_position"]),
         pointing,
         _turns(tree, "body_rotation"),
@@ -120,11 +124,8 @@ def _rows(tree: Tree, width: int) -> Floats:
 def _times(tree: Tree, count: int) -> Floats:
     """Return as many times as there are records."""
     times = tree["ephemeris_times"]
-    found = times.numbers(count)
-    try:
-        return increasing("ephemeris_times", found)
-    except InputError as error:
-        raise times.error(error.message) from None
+    with at_place(times):
+        return increasing("ephemeris_times", times.numbers(count))
 
 
 def _positions(tree: Tree) -> Positions:
@@ -148,10 +149,8 @@ def _turns(tree: Tree, name: str) -> Turns:
     constant = np.eye(3)
     if "constant_rotation" in own:
         given = own["constant_rotation"]
-        try:
+        with at_place(given):
             constant = rotations("constant_rotation", given.numbers(9).reshape(1, 3, 3), 1)[0]
-        except InputError as error:
-            raise given.error(error.message) from None
     return Turns(_times(own, len(quaternions)), constant @ of_quaternions(quaternions))
 
 
@@ -166,16 +165,11 @@ def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
             f"does not divide the {lines} lines of the image, or into more than {FRAMELETS} framelets"
         )
     first = tree["starting_ephemeris_time"].number() + 0.5 * tree["exposure_duration"].number()
-    backwards, flipped = (
-        _truth(tree.get(name, False)) for name in ("framelet_order_reversed", "framelets_flipped")
-    )
-    return Framelets(height, round(lines / height), first, every, backwards, flipped)
-
-
-def _truth(tree: Tree) -> bool:
-    if not isinstance(tree.value, bool):
-        raise tree.error("is neither true nor false")
-    return tree.value
+    switches = [tree.get(name, False) for name in ("framelet_order_reversed", "framelets_flipped")]
+    for each in switches:
+        if not isinstance(each.value, bool):
+            raise each.error("is neither true nor false")
+    return Framelets(height, round(lines / height), first, every, *(each.value for each in switches))
 
 
 def _jitter(tree: Tree) -> Jitter:
@@ -186,3 +180,89 @@ def _jitter(tree: Tree) -> Jitter:
     if len(coefficients[0]) != len(coefficients[1]) or not len(times):
         raise tree.error("has not as many coefficients of samples as of lines, or no lineExposureTimes")
     return Jitter(np.array(coefficients), times)
+
+
+def _lens(tree: Tree, focal_length: float) -> Lens | None:
+    """Return the lens; None where it is perfect."""
+    optics = tree["optical_distortion"]
+    models = [name for name, _ in optics.items()]
+    if len(models) != 1:
+        raise optics.error(f"has {len(models)} models, not one")
+    model = models[0]
+    if model not in _MEMBERS:
+        raise unknown(Tree(model, optics.file, optics.path), "the lens", _MEMBERS)
+    own = optics[model]
+    members = ("coefficients",) if "coefficients" in own else _MEMBERS[model]
+    found = [value for name in members for value in _flat(own[name])]
+    if not any(found) and model == "radial":
+        return None
+    try:
+        return Lens(cast("LensModel", model), tuple(found), focal_length if model == "radtan" else 1.0)
+    except ValueError as error:
+        raise own.error(str(error)) from None
+
+
+def _flat(tree: Tree) -> list[float]:
+    """Return the numbers of a list, or a number that stands alone."""
+    return [each.number() for each in tree] if isinstance(tree.value, list) else [tree.number()]
+
+
+def _detector(tree: Tree, keywords: Tree) -> Detector:
+    """Return the detector; ISIS has its own way from pixels to millimetres in the keywords of NAIF."""
+
+    def pair(form: str) -> Floats:
+        return np.array([tree[form.format(axis)].number() for axis in ("sample", "line")])
+
+    centre = tree["detector_center"]
+    summing = pair("detector_{}_summing")
+    if not (summing > 0).all():
+        raise tree["detector_sample_summing"].error("is not positive, or that of lines is not")
+    csm = from_pixels(tree["focal2pixel_samples"], tree["focal2pixel_lines"])
+    planes: dict[Pixels, Plane] = {"csm": csm, "isis": csm}
+    code = _instrument(tree, keywords)
+    if code is not None:
+        planes["isis"] = transformed(keywords, code)
+    return Detector(
+        np.array([centre["sample"].number(), centre["line"].number()]),
+        pair("starting_detector_{}"),
+        summing,
+        planes,
+    )
+
+
+def from_pixels(samples: Tree, lines: Tree) -> Plane:
+    """Return the inverse of the transformation from millimetres to samples and lines of the detector."""
+    rows = _affine(samples, lines)
+    inverse: Floats = np.asarray(np.linalg.inv(rows[:, 1:]), dtype=float)
+    return Plane(-inverse @ rows[:, 0], inverse)
+
+
+def _affine(first: Tree, second: Tree) -> Floats:
+    rows = np.array([first.numbers(3), second.numbers(3)])
+    if not 0 < abs(np.linalg.det(rows[:, 1:])) < np.inf:
+        raise first.error(f"has no inverse, together with {second.path}")
+    return rows
+
+
+def _instrument(tree: Tree, keywords: Tree) -> str | None:
+    """Return the prefix of an instrument's keywords, as `INS-85600`; None where there are none."""
+    codes = sorted({own[1] for name, _ in keywords.items() if (own := _TRANSX.fullmatch(name))})
+    frames = tree["instrument_pointing"].get("time_dependent_frames", []).value
+    named = [code for code in codes if isinstance(frames, list) and frames and code == f"INS{frames[0]}"]
+    if len(codes) > 1 and not named:
+        raise keywords.error(f"has several instruments, {', '.join(codes)}, none that of the pointing")
+    return (named or [*codes, None])[0]
+
+
+def transformed(keywords: Tree, code: str) -> Plane:
+    """Return the transformation of an instrument's keywords TRANSX, TRANSY."""
+    rows = _affine(keywords[f"{code}_TRANSX"], keywords[f"{code}_TRANSY"])
+    return Plane(rows[:, 0], rows[:, 1:])
+
+
+def not_zero(tree: Tree) -> float:
+    """Return a number that is not zero."""
+    found = tree.number()
+    if not found:
+        raise tree.error("is zero")
+    return found

@@ -38,24 +38,16 @@ def _recognises(path: Path) -> bool:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read an export file of PhotoModeler, its tables of measurements, a script of DBAT or its tables.
-
-    Raises
-    ------
-    InputError
-        Files at fault.
-    """
+    """Read an export file of PhotoModeler, its tables of measurements, a script of DBAT or its tables."""
     if path.is_dir():
         path = _the_file(path) or path
     if path.is_dir():
-        content = read_folder(path, wishes)
+        take = read_folder
     elif path.suffix.lower() == ".xml":
-        content = read_script(path, wishes)
-    elif is_measurements(path):
-        content = read_measurements(path, wishes)
+        take = read_script
     else:
-        content = read_export(path, wishes)
-    return project_of(content, wishes)
+        take = read_measurements if is_measurements(path) else read_export
+    return project_of(take(path, wishes), wishes)
 
 
 FORMAT = Format(name="dbat", title="PhotoModeler or DBAT block", recognises=_recognises, read=read)

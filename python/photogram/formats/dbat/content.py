@@ -48,22 +48,10 @@ def sensor_of(
     terms: dict[str, float],
     skew: float = 0.0,
 ) -> Sensor:
-    """Return a camera as PhotoModeler and DBAT describe it.
+    """Return a camera as PhotoModeler and DBAT describe it, in millimetres.
 
-    Parameters
-    ----------
-    name
-        Of the camera.
-    size
-        Of its pictures.
-    sides
-        Width and height of a pixel, mm.
-    principal
-        c, and the principal point from the upper-left corner, to the right and down; mm.
-    terms
-        K1, K2, K3, P1, P2 in powers of millimetres.
-    skew
-        Shear.
+    `sides` are width and height of a pixel; `principal` is c, and the principal point from the upper-left
+    corner, to the right and down; `terms` are K1, K2, K3, P1, P2.
     """
     across, down = sides
     c, px, py = principal
@@ -83,13 +71,7 @@ def sensor_of(
 def sensors_of_table(
     cameras: Sequence[Camera], sizes: Sequence[Size | None], pixels: Sequence[float | None], path: Path
 ) -> dict[str, Sensor]:
-    """Return the cameras of a table of the plain project, by their names.
-
-    Raises
-    ------
-    InputError
-        A camera without the size of its pictures and pixels.
-    """
+    """Return the cameras of a table of the plain project, by their names."""
     found = {}
     for camera, size, pixel in zip(cameras, sizes, pixels, strict=True):
         if size is None or pixel is None or camera.image_y != "up":
@@ -108,26 +90,17 @@ class Content:
 
     Attributes
     ----------
-    path, title
-        What was read, and what it is.
     sensors
         The cameras by name.
-    photos, cameras
-        Name and camera of each photo.
-    poses
-        Centre, and omega, phi, kappa in radians.
-    control
-        Position and standard deviations of control points.
-    checks, check_sd, starts
-        Positions of check points with their standard deviations, and of others as they were computed before.
-    image_photos, image_points
-        Of each measurement.
+    photos, cameras, poses
+        Name and camera of each photo; its centre, and omega, phi, kappa in radians.
+    control, checks, check_sd, starts
+        Position and standard deviations of control points, those of check points, and positions of others as
+        they were computed before.
     pixels, image_sd
         (m, 2) columns and rows from the corner, and their standard deviations; NaN where none is said.
-    held
-        Photos whose pose is held.
-    free
-        Parameters of cameras that are unknown.
+    held, free
+        Photos whose pose is held, and parameters of cameras that are unknown.
     """
 
     path: Path
@@ -152,13 +125,7 @@ class Content:
 
 
 def project_of(content: Content, wishes: Wishes) -> Project:
-    """Return the project; standard deviations of measurements that a user gives are in pixels, as these.
-
-    Raises
-    ------
-    InputError
-        It has no measurements.
-    """
+    """Return the project; standard deviations of measurements that a user gives are in pixels, as these."""
     if not content.image_photos:
         raise InputError("has no measurements in photos", file=content.path)
     order = {number: row for row, number in enumerate(content.photos)}

@@ -19,7 +19,7 @@ from photogram.formats.dbat.content import Content, Sensor, sensor_of
 from photogram.formats.format import Wishes
 from photogram.formats.project import Size
 from photogram.io.files import read_beginning, read_lines
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 
@@ -79,13 +79,7 @@ class _Lines:
 
 
 def read_export(path: Path, wishes: Wishes) -> Content:
-    """Read an export file.
-
-    Raises
-    ------
-    InputError
-        Lines that hold something else, photos and points that are there twice or not at all.
-    """
+    """Read an export file."""
     lines = _Lines(path)
     content = Content(path, TITLE)
     lines.take("the title")
@@ -128,12 +122,9 @@ def _sensor(card: Card, first: int, name: str, size: Size) -> Sensor:
         raise card.place.error(
             f"a principal distance of {c:g} mm and pixels of {sides[0]:.3g} x {sides[1]:.3g} mm cannot be"
         )
-    try:
-        return sensor_of(
-            name, size, sides, (c, px, py), dict(zip(("K1", "K2", "K3", "P1", "P2"), terms, strict=True))
-        )
-    except InputError as error:
-        raise card.place.error(error.message) from None
+    with at_place(card.place):
+        named = dict(zip(("K1", "K2", "K3", "P1", "P2"), terms, strict=True))
+        return sensor_of(name, size, sides, (c, px, py), named)
 
 
 @dataclass

@@ -59,13 +59,7 @@ def _sensors(path: Path, wishes: Wishes, messages: list[Message]) -> dict[str, S
 
 
 def read_folder(path: Path, wishes: Wishes) -> Content:
-    """Read `images.txt`, `markpts.txt`, and `stations.txt` and `control.txt` where they are there.
-
-    Raises
-    ------
-    InputError
-        Tables at fault, no cameras.
-    """
+    """Read `images.txt`, `markpts.txt`, and `stations.txt` and `control.txt` where they are there."""
     content = Content(path, "tables of DBAT")
     content.sensors = _sensors(path, wishes, content.messages)
     take_photos(titled(path / PHOTOS), content)
@@ -78,13 +72,7 @@ def read_folder(path: Path, wishes: Wishes) -> Content:
 
 
 def read_measurements(path: Path, wishes: Wishes) -> Content:
-    """Read `NAME-2dpts.txt`, with the positions of `NAME-3dpts.txt` to begin with where it lies beside.
-
-    Raises
-    ------
-    InputError
-        Lines that hold something else, no cameras.
-    """
+    """Read `NAME-2dpts.txt`, with the positions of `NAME-3dpts.txt` to begin with where it lies beside."""
     content = Content(path, "PhotoModeler measurements")
     content.sensors = _sensors(path, wishes, content.messages)
     if len(content.sensors) > 1:

@@ -1,4 +1,4 @@
-"""Scripts of DBAT: which tables there are, what their columns are, what is unknown."""
+"""Scripts of DBAT: cameras, which tables there are, what their columns are, what is unknown."""
 
 from __future__ import annotations
 
@@ -6,18 +6,21 @@ import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from photogram.formats.dbat.cameras import sensors_of_cameras
-from photogram.formats.dbat.content import Content, Sensor
+from photogram.formats.dbat.content import Content, Sensor, sensor_of
 from photogram.formats.dbat.tables import take_images, take_photos, take_points, take_poses, untitled
 from photogram.formats.format import Wishes
-from photogram.formats.project import Options
+from photogram.formats.project import Options, Size
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.delimited import ColumnTable
+from photogram.io.places import at_place
 from photogram.messages import Message, quoted
 
 __all__ = ["TITLE", "read_camera_file", "read_script"]
 
 TITLE = "DBAT script"
+PLAIN, AFFINE = 1, 3
+"""Models: Brown's terms of measured coordinates; the same after an affinity."""
+_TERMS = ("K1", "K2", "K3"), ("P1", "P2")
 _GROUPS = {
     "cc": ("c",),
     "pp": ("xp", "yp"),
@@ -33,21 +36,15 @@ _GROUPS = {
 
 
 def read_script(path: Path, wishes: Wishes) -> Content:
-    """Read a script with the tables that it names.
-
-    Raises
-    ------
-    InputError
-        A script or table at fault, files that are not there.
-    """
+    """Read a script with the tables that it names."""
     root = read_stream(path, {}, "document")
     given = root.need("input")
     content = Content(path, TITLE)
-    base = _folder(given, "base_dir", path.parent)
+    base = path.parent / _known(given, given.attributes.get("base_dir", "$HERE"))
     cameras = given.need("cameras")
     file = cameras.child("file")
     content.sensors = (
-        sensors_of_cameras(cameras, content.messages)
+        _cameras(cameras, content.messages)
         if file is None
         else read_camera_file(_path(file, base), content.messages)
     )
@@ -72,12 +69,7 @@ def read_script(path: Path, wishes: Wishes) -> Content:
 
 def read_camera_file(path: Path, messages: list[Message]) -> dict[str, Sensor]:
     """Read a file of cameras."""
-    return sensors_of_cameras(read_stream(path, {}, "document").need("cameras"), messages)
-
-
-def _folder(element: Element, attribute: str, here: Path) -> Path:
-    """Return the folder that an attribute names; $HERE is that of the script."""
-    return here / _known(element, element.attributes.get(attribute, "$HERE"))
+    return _cameras(read_stream(path, {}, "document").need("cameras"), messages)
 
 
 def _path(element: Element, base: Path) -> Path:
@@ -88,13 +80,13 @@ def _path(element: Element, base: Path) -> Path:
 
 
 def _known(element: Element, word: str) -> str:
-    """Return a path without $HERE; other places are not known."""
-    own = (
-        word.replace("\\", "/").removeprefix("$HERE").removeprefix("/") if word.startswith("$HERE") else word
-    )
+    """Return a path without $HERE, the folder of the script; other places are not known."""
+    own = word.replace("\\", "/")
+    if own.startswith("$HERE"):
+        own = own.removeprefix("$HERE").removeprefix("/")
     if own.startswith("$") or not own.isprintable():
         raise element.error(f"{quoted(word)}: only $HERE and paths are known here")
-    return own.replace("\\", "/")
+    return own
 
 
 def _tables(parent: Element, base: Path) -> Iterator[tuple[Element, ColumnTable]]:
@@ -172,3 +164,112 @@ def _datum(operations: Element, content: Content) -> None:
             raise each.error(f"there is no photo {number} with a pose")
         content.held.add(number)
         content.options = Options(datum="minimum")
+
+
+def _cameras(parent: Element, messages: list[Message]) -> dict[str, Sensor]:
+    """Return the cameras below an element, by their numbers; the first is 1."""
+    found: dict[str, Sensor] = {}
+    for row, each in enumerate(parent.all("camera"), 1):
+        number = each.word("id", str(row))
+        if number in found:
+            raise each.error(f"the camera {number} is there twice")
+        with at_place(each):
+            found[number] = _sensor(each, number, messages)
+    if not found:
+        raise parent.error("has no camera")
+    return found
+
+
+def _numbers(element: Element, name: str, count: int) -> list[float]:
+    own = element.need(name)
+    words = [word.strip() for word in own.text.split(",")]
+    if len(words) != count:
+        raise own.error(f"has {len(words)} numbers, not {count}")
+    return [own.place.number(word) for word in words]
+
+
+def _sensor(element: Element, number: str, messages: list[Message]) -> Sensor:
+    if (unit := element.word("unit", "mm")) != "mm":
+        raise element.error(f"a camera in {unit} is not read: mm is")
+    width, height = _numbers(element, "image", 2)
+    if not (0 < width < 2**31 and 0 < height < 2**31 and width == int(width) and height == int(height)):
+        raise element.need("image").error("is no number of pixels")
+    size = int(width), int(height)
+    sides = _sides(element, size)
+    model = element.whole("model") if element.child("model") else PLAIN
+    terms = _terms(element)
+    skew = element.number("skew", 0.0)
+    if model not in (PLAIN, AFFINE) and (any(terms.values()) or skew or sides[0] != sides[1]):
+        raise element.need("model").error(f"model {model} is not read: {PLAIN} and {AFFINE} are, backward")
+    if model == PLAIN and skew:
+        raise element.need("skew").error(f"model {PLAIN} has no skew")
+    c = _principal_distance(element, messages)
+    px, py = _principal_point(element, size, sides, terms, messages)
+    name = element.word("name") or f"camera {number}"
+    return sensor_of(name, size, sides, (c, px, py), terms, skew)
+
+
+def _sides(element: Element, size: Size) -> tuple[float, float]:
+    """Return width and height of a pixel: the width from `aspect` where it is said."""
+    sensor = element.need("sensor")
+    first, comma, second = (word.strip() for word in sensor.text.partition(","))
+    if not comma:
+        raise sensor.error("has not both width and height")
+    down = sensor.place.number(second) / size[1]
+    aspect = element.word("aspect", "1" if first == "auto" else "auto")
+    own = element.child("aspect") or sensor
+    if aspect == "auto" and first == "auto":
+        raise sensor.error("neither the width of the sensor nor the aspect of pixels is a number")
+    across = sensor.place.number(first) / size[0] if aspect == "auto" else own.place.number(aspect) * down
+    if not (1e-5 < down < 1 and 1e-5 < across < 1):
+        raise sensor.error(f"pixels of {across:.3g} x {down:.3g} mm cannot be")
+    return across, down
+
+
+def _terms(element: Element) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for letter, names in zip("KP", _TERMS, strict=True):
+        own = element.child(letter)
+        if own is None:
+            continue
+        words = own.text.replace(",", " ").split()
+        if len(words) > len(names):
+            raise own.error(f"has {len(words)} terms; {len(names)} are the most")
+        found |= {name: own.place.number(word) for name, word in zip(names, words, strict=False)}
+    return found
+
+
+def _principal_distance(element: Element, messages: list[Message]) -> float:
+    word = element.word("cc", "focal")
+    if word == "focal":
+        messages.append(Message(f"{element.word('name', 'camera')}: cc is the focal length", element.file))
+        c = element.number("focal")
+    else:
+        c = element.number("cc")
+    if not c > 0:
+        raise element.error(f"a principal distance of {c:g} mm")
+    return c
+
+
+def _principal_point(
+    element: Element,
+    size: Size,
+    sides: tuple[float, float],
+    terms: dict[str, float],
+    messages: list[Message],
+) -> tuple[float, float]:
+    middle = size[0] / 2 * sides[0], size[1] / 2 * sides[1]
+    if element.word("pp", "default") == "default":
+        messages.append(Message(f"{element.word('name', 'camera')}: pp is the middle", element.file))
+        return middle
+    px, py = _numbers(element, "pp", 2)
+    if py < 0:
+        # DBAT wrote y up, and the terms with the other sign, before its version 0.9.
+        if any(terms.values()):
+            raise element.need("pp").error(
+                "is of an older version of DBAT, with y up and K and P of the other sign: turn them all"
+            )
+        py = -py
+    if not (math.hypot(px - middle[0], py - middle[1]) < max(middle)):
+        raise element.need("pp").error("lies outside of the picture")
+    return px, py

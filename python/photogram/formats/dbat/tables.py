@@ -74,38 +74,29 @@ def _once(table: ColumnTable, numbers: Sequence[int], kind: str) -> None:
             raise table.error(row, f"the {kind} {number} is there already, in {table.records[seen[number]]}")
 
 
-def take_photos(table: ColumnTable, content: Content) -> None:
-    """Take photos: numbers, paths and cameras, the only one where there is no column.
+def _check_photos(table: ColumnTable, numbers: Sequence[int], content: Content) -> None:
+    for row, number in enumerate(numbers):
+        if number not in content.photos:
+            raise table.error(row, f"there is no photo {number}")
 
-    Raises
-    ------
-    InputError
-        Photos that are there twice, cameras that are not there.
-    """
+
+def take_photos(table: ColumnTable, content: Content) -> None:
+    """Take photos: numbers, paths and cameras, the only one where there is no column."""
     table.require("id", "path")
     numbers = _whole(table, "id")
     _once(table, numbers, "photo")
     known = list(content.sensors)
     if "cam" not in table and len(known) > 1:
         raise table.head.error(f"no column says which of {len(known)} cameras took a photo")
-    for row, (number, path, camera) in enumerate(
-        zip(
-            numbers, table.texts("path"), table.texts("cam", known[0] if len(known) == 1 else ""), strict=True
-        )
-    ):
+    cameras = table.texts("cam", known[0] if len(known) == 1 else "")
+    for row, (number, path, camera) in enumerate(zip(numbers, table.texts("path"), cameras, strict=True)):
         if camera not in content.sensors:
             raise table.error(row, f"there is no camera {camera!r}, but {', '.join(known)}")
         content.photos[number], content.cameras[number] = path, camera
 
 
 def take_poses(table: ColumnTable, content: Content, unit: str = "degrees") -> None:
-    """Take centres and angles omega, phi, kappa.
-
-    Raises
-    ------
-    InputError
-        Photos that are not there or twice, a unit that is not known.
-    """
+    """Take centres and angles omega, phi, kappa."""
     if unit not in _RADIANS:
         raise table.head.error(f"angles in {unit!r}: {', '.join(_RADIANS)} are read")
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
@@ -113,10 +104,8 @@ def take_poses(table: ColumnTable, content: Content, unit: str = "degrees") -> N
     _once(table, numbers, "photo")
     centres = _filled(table, "x", "y", "z")
     angles = _filled(table, "omega", "phi", "kappa") * _RADIANS[unit]
-    for row, number in enumerate(numbers):
-        if number not in content.photos:
-            raise table.error(row, f"there is no photo {number}")
-        content.poses[number] = centres[row], angles[row]
+    _check_photos(table, numbers, content)
+    content.poses |= dict(zip(numbers, zip(centres, angles, strict=True), strict=True))
 
 
 def take_points(
@@ -127,26 +116,7 @@ def take_points(
     check: bool = False,
     wanted: Callable[[int], bool] = lambda _: True,
 ) -> None:
-    """Take control or check points.
-
-    Parameters
-    ----------
-    table
-        The table.
-    content
-        Where they go.
-    sd
-        Standard deviations that a user gives; None: those of the table, none where it has no column.
-    check
-        Whether they are check points.
-    wanted
-        Which of them.
-
-    Raises
-    ------
-    InputError
-        Points that are there twice, negative standard deviations.
-    """
+    """Take control or check points; standard deviations are those of a user, else of the table."""
     table.require("id", "x", "y", "z")
     numbers = _whole(table, "id")
     _once(table, numbers, "point")
@@ -171,12 +141,9 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
     whole = table.numbers(common) if common in table else np.full(table.count, math.nan)
     flat = table.numbers("sxy") if "sxy" in table else whole
     defaults = (flat, flat, whole)
-    found = np.stack(
-        [
-            np.where(np.isnan(own := table.numbers(column)), default, own)
-            for column, default in zip(columns, defaults, strict=False)
-        ],
-        axis=1,
+    own = [table.numbers(column) for column in columns]
+    found = np.column_stack(
+        [np.where(np.isnan(each), default, each) for each, default in zip(own, defaults, strict=False)]
     )
     if (found < 0).any():
         raise table.error(int(np.argwhere(found < 0)[0][0]), "a standard deviation is negative")
@@ -184,19 +151,10 @@ def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floa
 
 
 def take_images(table: ColumnTable, content: Content, sd: float = math.nan) -> None:
-    """Take measurements; `sd` is their standard deviation in pixels, where the table has none.
-
-    Raises
-    ------
-    InputError
-        Photos that are not there, standard deviations that are not positive.
-    """
+    """Take measurements; `sd` is their standard deviation in pixels, where the table has none."""
     table.require("id", "im", "x", "y")
     photos = _whole(table, "im")
-    if (
-        bad := next((row for row, number in enumerate(photos) if number not in content.photos), None)
-    ) is not None:
-        raise table.error(bad, f"there is no photo {photos[bad]}")
+    _check_photos(table, photos, content)
     own = _deviations(table, ("sx", "sy"), "sxy")
     own = np.where(np.isnan(own), sd, own)
     if (own == 0).any():

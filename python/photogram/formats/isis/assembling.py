@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.csm.lists import read_list, read_support
+from photogram.formats.csm.lists import listed_lines, read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
 from photogram.formats.isis import TITLE
@@ -22,25 +21,17 @@ from photogram.formats.isis.reading import read_network
 from photogram.formats.isis.settings import Settings, read_settings
 from photogram.formats.isis.solving import solving
 from photogram.formats.project import Project, assembled
-from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import Message, counted, listed
-from photogram.network.geometry import Spheroid
+from photogram.network.geometry import Cartesian, Spheroid
+from photogram.network.motion import about
 from photogram.network.moving_photos import Timed
-from photogram.network.whereabouts import about
 
 __all__ = ["read"]
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read a control network, and the support data of the images that a list names.
-
-    Raises
-    ------
-    InputError
-        No list of images, measures in images that it does not name, settings that are none; what readers of
-        networks and support data refuse.
-    """
+    """Read a control network, and the support data of the images that a list names."""
     if wishes.cubes is None:
         raise InputError(
             "has no images: --cubes FILE names them, a line each: the path of a cube, or serial number, comma"
@@ -57,12 +48,13 @@ def read(path: Path, wishes: Wishes) -> Project:
     starts[seen.points] = _starts(network, images, seen, Place(path))
     contents = PlanetaryContents(network, path, photos, settings, starts)
     unused = [serial for serial in files if serial not in {each.serial for each in images}]
-    return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *_remarks(images)])
+    remarks = [Message(text, each.path) for each in images for text in each.supported.isd.remarks]
+    return _project(contents, seen, [*_left_out(network, unused, wishes.cubes), *remarks])
 
 
 def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings, cubes: Path) -> list[Image]:
     """Return the images that have measures, in the order of the network."""
-    rows = np.unique(network.measures.serial[_counting(network)]).tolist()
+    rows = np.unique(network.measures.serial[~network.is_ignored]).tolist()
     seen = [network.measures.serials[row] for row in rows]
     for serial in seen:
         if serial not in files:
@@ -88,10 +80,7 @@ def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
         return set()
     names = {str(file.resolve()): serial for serial, file in files.items()}
     found = set()
-    for record, line in enumerate(read_lines(settings.held), 1):
-        text = line.strip()
-        if not text or text.startswith("#"):
-            continue
+    for record, text in listed_lines(settings.held):
         serial = text if text in files else names.get(str((settings.held.parent / text).resolve()))
         if serial is None:
             raise InputError("is no image of --cubes", file=settings.held, record=record, text=text)
@@ -99,22 +88,8 @@ def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
     return found
 
 
-def _counting(network: ControlNetwork) -> Indices:
-    """Return measures that count: those that are not ignored, nor their points."""
-    ignored = network.measures.ignore | network.points.ignore[network.point_of_measure]
-    return np.flatnonzero(~ignored)
-
-
 class _Seen(NamedTuple):
-    """Measures that count, as images of a block.
-
-    Attributes
-    ----------
-    measures, points
-        Their rows in the network; (n,) those of their points.
-    image_points, image_photos, xy, sd
-        (m,), (m,), (m, 2), (m,) as of blocks.
-    """
+    """Measures that count: rows in the network, those of their n points; and as m images of a block."""
 
     measures: Indices
     points: Indices
@@ -125,14 +100,8 @@ class _Seen(NamedTuple):
 
 
 def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
-    """Return the measures of all images.
-
-    Raises
-    ------
-    InputError
-        There are none; one has no sample or line.
-    """
-    rows, own = _counting(network), network.measures
+    """Return the measures of all images."""
+    rows, own = np.flatnonzero(~network.is_ignored), network.measures
     if not len(rows):
         raise InputError("has no measures that count", file=path)
     bad = rows[~(np.isfinite(own.sample[rows]) & np.isfinite(own.line[rows]))]
@@ -183,6 +152,10 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     known = known_points(network, seen.points, starts, contents.settings, spheroid, place)
     timed = [each for own in contents.different for each in own.supported.timed]
     centres, matrices = _poses(contents, spheroid)
+    said = list(contents.settings.told)
+    if contents.settings.rejects:
+        call = "`photogram adjust`, in Python by `formats.adjusting(project, adjust)`"
+        said.append(f"OUTLIER_REJECTION: done by {call}")
     cameras, of_photos = _cameras(contents)
     return assembled(
         path=contents.path,
@@ -207,15 +180,9 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
         timed=timed,
         spheroid=spheroid,
         lacks=[f"no standard deviations of image coordinates: {PITCHES:g} px is assumed (--sd images=...)"],
-        messages=[*messages, *known.messages, *map(Message, _told(contents.settings))],
+        messages=[*messages, *known.messages, *map(Message, said)],
         details={DETAILS: contents, "further inputs": [each.path for each in contents.different]},
     )
-
-
-def _told(settings: Settings) -> list[str]:
-    """Return what becomes of settings, in sentences."""
-    by = "OUTLIER_REJECTION: done by `photogram adjust`, in Python by `formats.adjusting(project, adjust)`"
-    return [*settings.told, *([by] if settings.rejects else [])]
 
 
 def _poses(contents: PlanetaryContents, spheroid: Spheroid | None) -> tuple[Floats, Floats]:
@@ -246,19 +213,10 @@ def _cameras(contents: PlanetaryContents) -> tuple[list[Image], Indices]:
     return first, np.array(rows)
 
 
-def _remarks(images: list[Image]) -> list[Message]:
-    """Return what support data contradict themselves in."""
-    return [Message(text, each.path) for each in images for text in each.supported.isd.remarks]
-
-
 def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[Message]:
     """Return what does not count: what is ignored, images without measures; and what counts again."""
     measures, points = network.measures, network.points
-    of_ignored = points.ignore[network.point_of_measure] & ~measures.ignore
-    counts = {
-        "ignored point": int(points.ignore.sum()),
-        "ignored measure": int((measures.ignore | of_ignored).sum()),
-    }
+    counts = {"ignored point": int(points.ignore.sum()), "ignored measure": int(network.is_ignored.sum())}
     again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
     texts = [f"{counted(n, what)}: left out, and written as read" for what, n in counts.items() if n]
     if again.any():

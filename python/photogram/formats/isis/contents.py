@@ -26,19 +26,7 @@ PITCHES = 1.4
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """An image of a network.
-
-    Attributes
-    ----------
-    serial
-        Its serial number.
-    path
-        Its support data.
-    supported
-        The same with its photos.
-    solving
-        What is adjusted of it.
-    """
+    """An image of a network: its serial number, file, support data with photos, and what is adjusted."""
 
     serial: str
     path: Path
@@ -54,18 +42,9 @@ class Image:
 
 @dataclass(frozen=True, eq=False)
 class PlanetaryContents:
-    """A network with its images, and how it is adjusted.
+    """A network as it was read, its images that have measures by the names of photos, and how it is adjusted.
 
-    Attributes
-    ----------
-    network, path
-        As it was read, and where.
-    images
-        Those that have measures, by the names of their photos.
-    settings
-        How they are adjusted.
-    starts
-        (N, 3) X, Y, Z in metres where the points of the network begin; NaN for those that do not count.
+    `starts` are (N, 3) X, Y, Z in metres where all its points begin; NaN for those that do not count.
     """
 
     network: ControlNetwork
@@ -87,13 +66,7 @@ def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[Indices]:
 
 
 def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
-    """Return the contents of a project.
-
-    Raises
-    ------
-    InputError
-        It was not read from a control network.
-    """
+    """Return the contents of a project; an error where it was not read from a control network."""
     found = details.get(DETAILS)
     if not isinstance(found, PlanetaryContents):
         raise InputError("the project was not read from a control network")

@@ -1,8 +1,9 @@
-"""Control networks: points with their measures in images, as columns."""
+"""Control networks: points with their measures in images, as columns, and as the core takes these."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from photogram.io.pvl import Group
 from photogram.lazy_dataclasses import dataclass, field, fields
 
 __all__ = [
+    "HEADER",
     "MEASURE_TYPES",
     "MESSAGE",
     "POINT_TYPES",
@@ -20,6 +22,10 @@ __all__ = [
     "ControlMeasures",
     "ControlNetwork",
     "ControlPoints",
+    "columns_of_measures",
+    "columns_of_points",
+    "measures_of",
+    "points_of",
 ]
 
 POINT_TYPES = ("Tie", "Ground", "Free", "Constrained", "Fixed")
@@ -38,6 +44,15 @@ SOURCES = (
 MEASURE_TYPES = ("Candidate", "Manual", "RegisteredPixel", "RegisteredSubPixel")
 """What types of measures mean."""
 
+HEADER = {
+    "NetworkId": "network_id",
+    "TargetName": "target",
+    "UserName": "user",
+    "Created": "created",
+    "LastModified": "modified",
+    "Description": "description",
+}
+"""Keys of the header in the order of ISIS, and what they are here."""
 MESSAGE = ("network_id", "target", "created", "modified", "description", "user")
 """Texts of the header, in the order of their numbers in binary networks."""
 
@@ -45,10 +60,19 @@ _Codes = NDArray[np.int8]
 _Indices = NDArray[np.int32]
 _Rest = tuple[NDArray[np.uint8], NDArray[np.int64]]
 
-
-_WIDTHS = {"apriori": 3, "adjusted": 3, "constrained": 3, "apriori_covariance": 6, "adjusted_covariance": 6}
+_TRIPLES = {
+    "apriori": ("apriori_x", "apriori_y", "apriori_z"),
+    "adjusted": ("adjusted_x", "adjusted_y", "adjusted_z"),
+    "constrained": ("latitude_constrained", "longitude_constrained", "radius_constrained"),
+}
+"""Columns of a table each that are three columns of the core."""
+_WIDTHS = {**dict.fromkeys(_TRIPLES, 3), "apriori_covariance": 6, "adjusted_covariance": 6}
 """Numbers in each row of a column, where there are several."""
+_TRUTHS = {"edit_lock", "ignore", "rejected", *_TRIPLES["constrained"]}
+_CODES = {"types", "apriori_source", "apriori_radius_source"}
 _NO_COLUMNS = ("serials", "rest")
+_NAMES = ("ids", "serial", *_NO_COLUMNS)
+"""What is handed to the core apart from the columns of numbers."""
 
 
 class _Columns:
@@ -56,7 +80,11 @@ class _Columns:
 
     rest: _Rest
 
-    def _check(self, rows: int) -> None:
+    def __len__(self) -> int:
+        raise NotImplementedError
+
+    def __post_init__(self) -> None:
+        rows = len(self)
         for each in fields(self):  # type: ignore[arg-type]
             if each.name in _NO_COLUMNS:
                 continue
@@ -113,12 +141,7 @@ class ControlPoints(_Columns):
     adjusted_covariance: Floats
     rest: _Rest
 
-    def __post_init__(self) -> None:
-        """Check the shapes of the columns."""
-        self._check(len(self.ids))
-
     def __len__(self) -> int:
-        """Return the number of points."""
         return len(self.ids)
 
     @property
@@ -180,12 +203,7 @@ class ControlMeasures(_Columns):
     rejected: Bools
     rest: _Rest
 
-    def __post_init__(self) -> None:
-        """Check the shapes of the columns."""
-        self._check(len(self.serial))
-
     def __len__(self) -> int:
-        """Return the number of measures."""
         return len(self.serial)
 
 
@@ -229,7 +247,6 @@ class ControlNetwork:
     header_rest: bytes = b""
 
     def __post_init__(self) -> None:
-        """Check that the measures are those of the points."""
         if self.firsts.shape != (len(self.points) + 1,):
             raise InputError(f"firsts has the shape {self.firsts.shape}, not {(len(self.points) + 1,)}")
 
@@ -237,3 +254,77 @@ class ControlNetwork:
     def point_of_measure(self) -> NDArray[np.int64]:
         """(m,) the point of each measure."""
         return np.repeat(np.arange(len(self.points)), np.diff(self.firsts))
+
+    @property
+    def is_ignored(self) -> Bools:
+        """(m,) whether a measure does not count: it is ignored, or its point."""
+        return self.measures.ignore | self.points.ignore[self.point_of_measure]
+
+
+def _absent(name: str) -> np.generic:
+    """Return what stands in a column of the core where there is nothing."""
+    if name in _TRUTHS:
+        return np.bool_(False)
+    if name in _CODES:
+        return np.int8(-1)
+    return np.int32(-1) if name == "reference" else np.float64(np.nan)
+
+
+def _from_core(kind: type[_Columns], columns: Mapping[str, Any], rows: int) -> dict[str, Any]:
+    """Return the columns of points or measures; an empty one is one value that stands in all its rows."""
+
+    def column(name: str) -> NDArray[Any]:
+        shape = (rows, _WIDTHS[name]) if name in _WIDTHS else (rows,)
+        own: NDArray[Any] | None = columns.get(name)
+        return np.broadcast_to(_absent(name), shape) if own is None else own
+
+    found = {"rest": columns.get("rest", (np.zeros(0, np.uint8), np.zeros(rows + 1, np.int64)))}
+    for each in fields(kind):  # type: ignore[arg-type]
+        names = _TRIPLES.get(each.name, ())
+        if any(name in columns for name in names):
+            found[each.name] = np.column_stack([column(name) for name in names])
+        elif names:
+            found[each.name] = np.broadcast_to(_absent(names[0]), (rows, len(names)))
+        elif each.name not in _NAMES:
+            found[each.name] = column(each.name)
+    return found
+
+
+def _to_core(own: _Columns) -> dict[str, Any]:
+    """Return points or measures as columns of the core; those in which nothing stands are left out."""
+    found: dict[str, Any] = {"rest": own.rest}
+    for each in fields(own):  # type: ignore[arg-type]
+        if each.name in _NAMES:
+            continue
+        values = getattr(own, each.name)
+        triple = _TRIPLES.get(each.name)
+        for name, column in zip(triple, values.T, strict=True) if triple else [(each.name, values)]:
+            absent = _absent(name)
+            same = not any(column.strides)
+            if column.size and not (same and np.array_equal(column.flat[0], absent, equal_nan=True)):
+                found[name] = np.ascontiguousarray(column, dtype=absent.dtype)
+    return found
+
+
+def points_of(columns: Mapping[str, Any]) -> ControlPoints:
+    """Return points from the columns of the core: `ids`, `types`, and whatever else there is."""
+    ids = columns["ids"]
+    return ControlPoints(ids=ids, **_from_core(ControlPoints, columns, len(ids)))
+
+
+def measures_of(columns: Mapping[str, Any]) -> ControlMeasures:
+    """Return measures from the columns of the core: `serial`, `types`, and whatever else there is."""
+    serial, serials = columns["serial"]
+    own = _from_core(ControlMeasures, columns, len(serial))
+    return ControlMeasures(serials=serials, serial=serial, **own)
+
+
+def columns_of_points(points: ControlPoints) -> dict[str, Any]:
+    """Return points as columns of the core."""
+    return {"ids": list(points.ids), **_to_core(points)}
+
+
+def columns_of_measures(measures: ControlMeasures) -> dict[str, Any]:
+    """Return measures as columns of the core."""
+    serial = np.ascontiguousarray(measures.serial, dtype=np.int32)
+    return {"serial": (serial, list(measures.serials)), **_to_core(measures)}

@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import trajectory_of
 from photogram.messages import quoted
-from photogram.network.whereabouts import given_poses
+from photogram.network.motion import given_poses
 
 __all__ = ["observation_number", "observations_of", "one_flight"]
 
@@ -36,15 +36,8 @@ COMPARED = 16
 
 
 def observation_number(serial: str) -> str:
-    """Return the observation of an image by its serial number.
-
-    Raises
-    ------
-    InputError
-        A serial number of an instrument whose rule is not known.
-    """
-    known = (count for begin, count in _KEYWORDS.items() if re.match(begin, serial))
-    count = next(known, 0)
+    """Return the observation of an image by its serial number; an error where no rule is known."""
+    count = next((count for begin, count in _KEYWORDS.items() if re.match(begin, serial)), 0)
     if count == 0:
         raise InputError(
             f"OBSERVATIONS=yes: of which observation the image {quoted(serial)} is, no rule is known here"
@@ -61,13 +54,7 @@ def observations_of(serials: Sequence[str], *, shared: bool) -> dict[str, list[s
 
 
 def one_flight(isds: Sequence[Isd]) -> Isd:
-    """Return the support data of the first of several images with the tables of all: of one flight.
-
-    Raises
-    ------
-    InputError
-        Tables that contradict each other: of another flight, or another camera.
-    """
+    """Return the support data of the first of several images with the tables of all, which have to agree."""
     first, *others = isds
     for each in others:
         _check(first, each)

@@ -6,12 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.isis.contents import Image, PlanetaryContents, rows_of_each
 from photogram.formats.isis.points import per_metre
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.geometry import local_frames
+from photogram.network.geometry import Cartesian, local_frames
 from photogram.network.motion import focal_images
 from photogram.results.result import Result
 
@@ -20,15 +19,7 @@ __all__ = ["Outcome", "spherical"]
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A network after its adjustment.
-
-    Parameters
-    ----------
-    contents
-        The network.
-    result
-        Of the adjustment of its block, from which images and points may have been taken out.
-    """
+    """A network after the adjustment of its block, from which images and points may have been taken out."""
 
     contents: PlanetaryContents
     result: Result
@@ -50,13 +41,8 @@ class Outcome:
         different = self.contents.different
         places = {image: place for place, image in enumerate(different)}
         of_photo = np.array([places[image] for image in self.images], dtype=np.int64)
-        return dict(
-            zip(
-                different,
-                rows_of_each(of_photo[self.result.block.image_photos], len(different)),
-                strict=True,
-            )
-        )
+        own = rows_of_each(of_photo[self.result.block.image_photos], len(different))
+        return dict(zip(different, own, strict=True))
 
     @cached_property
     def measure_rows(self) -> Indices:
@@ -65,7 +51,7 @@ class Outcome:
         measures, count = network.measures, len(network.points)
         serial_of = {serial: row for row, serial in enumerate(measures.serials)}
         of_photo = np.array([serial_of[each.serial] for each in self.images], dtype=np.int64)
-        counting = np.flatnonzero(~(measures.ignore | network.points.ignore[network.point_of_measure]))
+        counting = np.flatnonzero(~network.is_ignored)
         keys = measures.serial[counting].astype(np.int64) * count + network.point_of_measure[counting]
         known, first = np.unique(keys, return_index=True)
         own = of_photo[block.image_photos] * count + self.point_rows[block.image_points]
@@ -78,8 +64,7 @@ class Outcome:
         measures, count = network.measures, len(network.points)
         keys = measures.serial.astype(np.int64) * count + network.point_of_measure
         used = keys[self.measure_rows[self.result.used_images]]
-        ignored = measures.ignore | network.points.ignore[network.point_of_measure]
-        return np.asarray(~ignored & ~np.isin(keys, used))
+        return np.asarray(~network.is_ignored & ~np.isin(keys, used))
 
     @cached_property
     def residuals(self) -> Floats:
@@ -99,7 +84,7 @@ class Outcome:
     @cached_property
     def xyz(self) -> Floats:
         """(n, 3) adjusted points, fixed to the body, metres; NaN where left out."""
-        return Cartesian.of(self.result.block).positions(np.array(self.result.point_positions))
+        return Cartesian(self.result.block.spheroid).positions(np.array(self.result.point_positions))
 
     @cached_property
     def latitudes(self) -> Floats:

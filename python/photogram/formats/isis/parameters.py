@@ -10,8 +10,8 @@ from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.photos import to_camera
 from photogram.formats.isis.contents import Image
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.motion import about
 from photogram.network.trajectories import Trajectory
-from photogram.network.whereabouts import about
 from photogram.results.trajectories import AdjustedTrajectory
 
 __all__ = ["Parameter", "parameters"]
@@ -23,18 +23,10 @@ _UNITS = ("km", "deg")
 
 @dataclass(frozen=True)
 class Parameter:
-    """A coefficient of an image.
+    """A coefficient of an image: X, Y, Z in km or RA, DEC, TWIST in degrees, by powers of scaled time.
 
-    Attributes
-    ----------
-    name, power, unit
-        X, Y, Z or RA, DEC, TWIST, the power of scaled time, and `km` or `deg`.
-    initial, correction
-        In that unit.
-    apriori
-        Standard deviation in metres or degrees: 0 where it is known, infinite where it is free.
-    adjusted
-        Standard deviation a posteriori, in the unit.
+    `apriori` is its standard deviation in metres or degrees: 0 where it is known, infinite where it is free;
+    `adjusted` that a posteriori, in the unit.
     """
 
     name: str
@@ -52,15 +44,7 @@ class Parameter:
 
 
 def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
-    """Return the coefficients of an image that are solved for, and of the rest that of degree 0.
-
-    Parameters
-    ----------
-    image
-        The image.
-    adjusted
-        The trajectory that it is on.
-    """
+    """Return the coefficients of an image that are solved for, and of the rest that of degree 0."""
     solving, own = image.solving, adjusted.given
     places, angles = _middle(image.supported.isd, own)
     degrees = float(np.rad2deg(1.0))
@@ -87,10 +71,6 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[Parameter]:
 def _middle(isd: Isd, own: Trajectory) -> tuple[Floats, Floats]:
     """Return the place and the angles in the middle of tables, inertial."""
     still = Trajectory(own.name, own.table)
-    places, _ = about(still, _half(isd.position.times))
-    _, turned = about(still, _half(isd.pointing.times))
+    tables = (isd.position.times, isd.pointing.times)
+    (places, _), (_, turned) = (about(still, float(times[0] + times[-1]) / 2) for times in tables)
     return places, to_angles(to_camera(turned[np.newaxis]))[0]
-
-
-def _half(times: Floats) -> float:
-    return float(times[0] + times[-1]) / 2

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.isis.network import ControlNetwork
 from photogram.formats.isis.settings import Settings
 from photogram.io.places import Place
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message, counted, listed
-from photogram.network.geometry import Spheroid, local_frames
+from photogram.network.geometry import Cartesian, Spheroid, local_frames
 from photogram.network.observations import Control
 
 __all__ = ["KnownPoints", "full_matrices", "given_starts", "known_points", "per_metre"]
@@ -26,23 +25,16 @@ _LOCAL = [1, 0, 2]
 class KnownPoints:
     """What is known of n points before their adjustment, in the coordinates of a block.
 
-    Attributes
-    ----------
-    positions, sd
-        (n, 3) as of blocks: what is observed or fixed, NaN else, and its standard deviations.
-    starts
-        (n, 3) where points begin.
-    controls
-        Points with a full covariance.
-    messages
-        What was taken otherwise than it stands in the network.
+    `positions` and `sd` are (n, 3) as of blocks: what is observed or fixed, NaN else, and its standard
+    deviations; `starts` (n, 3) where points begin; `controls` those with a full covariance; `messages` what
+    was taken otherwise than it stands in the network.
     """
 
     positions: Floats
     sd: Floats
     starts: Floats
-    controls: list[Control] = field(default_factory=list)
-    messages: list[Message] = field(default_factory=list)
+    controls: list[Control]
+    messages: list[Message]
 
 
 def known_points(
@@ -57,27 +49,9 @@ def known_points(
 
     Free points have the standard deviations of the settings, and a fixed radius unless that is asked for;
     constrained ones their own covariance, or where single coordinates are constrained the standard deviations
-    of these; fixed ones none.
-
-    Parameters
-    ----------
-    network
-        The network.
-    rows
-        (n,) its points that count.
-    starts
-        (n, 3) X, Y, Z where they begin, in metres.
-    settings
-        How they are weighted.
-    spheroid
-        A sphere where latitude, longitude and radius are adjusted; None: X, Y, Z.
-    place
-        Of the network, for messages.
-
-    Raises
-    ------
-    InputError
-        Covariances that are none.
+    of these; fixed ones none. `rows` are the points of the network that count, `starts` (n, 3) X, Y, Z where
+    they begin, in metres; `spheroid` is a sphere where latitude, longitude and radius are adjusted, None
+    where X, Y, Z are.
     """
     points = network.points
     coordinates = Cartesian(spheroid).from_cartesian(starts)
@@ -88,10 +62,9 @@ def known_points(
     if spheroid and not settings.radius:
         sd[:, 2] = np.where(points.is_constrained[rows], sd[:, 2], 0.0)
     sd[points.is_fixed[rows]] = 0.0
-    known = KnownPoints(coordinates, sd, coordinates)
+    known = KnownPoints(coordinates, sd, coordinates, [], [])
     _constrain(known, network, rows, metres, spheroid, place)
-    positions = np.where(np.isfinite(sd), coordinates, np.nan)
-    return KnownPoints(positions, sd, coordinates, known.controls, known.messages)
+    return replace(known, positions=np.where(np.isfinite(sd), coordinates, np.nan))
 
 
 def per_metre(coordinates: Floats, spheroid: Spheroid | None) -> Floats:
@@ -121,7 +94,10 @@ def _constrain(
     given = np.isfinite(covariances).all(axis=(1, 2))
     _tell(known, "have no covariance and are weighted as free ones", points.ids, rows[own[~given]])
     own, covariances = own[given], covariances[given]
-    _check(covariances, points.ids, rows[own], place)
+    bad = np.flatnonzero(~(np.linalg.eigvalsh(covariances) > 0).all(axis=1))
+    if len(bad):
+        name = points.ids[rows[own[bad[0]]]]
+        raise place.error(f"the AprioriCovarianceMatrix of {name} is not positive definite")
     if spheroid:
         axes = local_frames(known.starts[own])
         covariances = axes @ covariances @ axes.transpose(0, 2, 1)
@@ -137,13 +113,6 @@ def _constrain(
     _tell(known, text, points.ids, rows[own[parts]])
 
 
-def _check(covariances: Floats, ids: Sequence[str], rows: Indices, place: Place) -> None:
-    """Refuse covariances that weigh nothing."""
-    bad = np.flatnonzero(~(np.linalg.eigvalsh(covariances) > 0).all(axis=1))
-    if len(bad):
-        raise place.error(f"the AprioriCovarianceMatrix of {ids[rows[bad[0]]]} is not positive definite")
-
-
 def _tell(known: KnownPoints, text: str, ids: Sequence[str], rows: Indices) -> None:
     if len(rows):
         names = listed([ids[row] for row in rows.tolist()], 3)
@@ -153,10 +122,7 @@ def _tell(known: KnownPoints, text: str, ids: Sequence[str], rows: Indices) -> N
 def given_starts(network: ControlNetwork, rows: Indices, place: Place) -> Floats:
     """Return (n, 3) X, Y, Z that a network gives for points, a-priori ones before adjusted; NaN without.
 
-    Raises
-    ------
-    InputError
-        A fixed or constrained point without coordinates.
+    A fixed or constrained point has to have them.
     """
     points = network.points
     apriori, adjusted = points.apriori[rows], points.adjusted[rows]

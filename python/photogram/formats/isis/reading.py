@@ -12,13 +12,12 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.isis.columns import measures_of, points_of
-from photogram.formats.isis.network import MESSAGE, ControlNetwork
+from photogram.formats.isis.network import HEADER, MESSAGE, ControlNetwork, measures_of, points_of
 from photogram.io.files import read_bytes, reading
 from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["is_binary", "is_network", "read_network"]
+__all__ = ["LABEL_BYTES", "is_binary", "is_network", "read_network"]
 
 LABEL_BYTES = 65536
 """Bytes of the label of a binary network; zeros follow what it says."""
@@ -28,15 +27,7 @@ _BINARY_VERSIONS = ("2", "5")
 _TEXT_VERSIONS = ("3", "4", "5")
 _OLDEST = "1"
 """The version of a network that does not say it."""
-
-_HEADER = {
-    "networkid": "network_id",
-    "targetname": "target",
-    "username": "user",
-    "created": "created",
-    "lastmodified": "modified",
-    "description": "description",
-}
+_HEADER = {key.lower(): name for key, name in HEADER.items()}
 
 
 def _kind(data: bytes) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -34,13 +35,6 @@ def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
 
     A block is adjusted, measures are rejected or taken in again (:func:`flagged`), and it is adjusted anew,
     until none is rejected and none comes back; then without those that are out.
-
-    Parameters
-    ----------
-    project
-        Read from a control network.
-    adjust
-        A call that adjusts a block, with options by name.
     """
     contents = contents_of(project.details)
     if not contents.settings.rejects:
@@ -58,9 +52,7 @@ def _rejected(contents: PlanetaryContents, block: Block, adjust: Callable[[Block
     """Return the adjusted block without rejected measures, with a remark on what they were."""
     multiplier = contents.settings.multiplier
     out = np.zeros(len(block.image_xy), dtype=bool)
-    rounds = 0
-    while True:
-        rounds += 1
+    for rounds in count(1):
         result = adjust(block.replace(image_sd=block.image_sd * np.where(out, FAINT, 1.0)[:, np.newaxis]))
         if not result.converged:
             return result
@@ -85,7 +77,13 @@ def _rejected(contents: PlanetaryContents, block: Block, adjust: Callable[[Block
                 image_sd=block.image_sd[kept],
             )
         )
-    return replace(result, messages=[_told(out, rounds, multiplier, limit), *result.messages])
+    told = Message(
+        f"OUTLIER_REJECTION: {counted(int(out.sum()), 'measure')} of {len(out):,} rejected in"
+        f" {counted(rounds, 'round')}: residuals longer than their median and {multiplier:g} x {NORMAL} of"
+        f" their median absolute deviations, {limit:.4g} pixels in the end; at least {FEWEST} measures of a"
+        " point stay"
+    )
+    return replace(result, messages=[told, *result.messages])
 
 
 def rejection_limit(lengths: Floats, multiplier: float) -> float:
@@ -98,16 +96,8 @@ def flagged(lengths: Floats, out: Bools, points: Indices, limit: float) -> Bools
     """Return which measures are rejected after an adjustment, as jigsaw has it.
 
     What is rejected stays so while it is longer than the limit; of all others of a point the longest goes, if
-    it is longer and two stay.
-
-    Parameters
-    ----------
-    lengths, out
-        (m,) lengths of residuals, NaN of measures that took no part, and which were rejected before.
-    points
-        (m,) the point of each.
-    limit
-        Of lengths.
+    it is longer and two stay. `lengths` are (m,) of residuals, NaN of measures that took no part, `out` (m,)
+    which were rejected before, `points` (m,) the point of each.
     """
     long = lengths > limit
     stay = out & long
@@ -121,13 +111,3 @@ def flagged(lengths: Floats, out: Bools, points: Indices, limit: float) -> Bools
     longest = order[last]
     stay[longest[left[points[longest]] > FEWEST]] = True
     return stay
-
-
-def _told(out: Bools, rounds: int, multiplier: float, limit: float) -> Message:
-    """Say what was rejected, and by which rule."""
-    return Message(
-        f"OUTLIER_REJECTION: {counted(int(out.sum()), 'measure')} of {len(out):,} rejected in"
-        f" {counted(rounds, 'round')}: residuals longer than their median and {multiplier:g} x {NORMAL} of"
-        f" their median absolute deviations, {limit:.4g} pixels in the end; at least {FEWEST} measures of a"
-        " point stay"
-    )

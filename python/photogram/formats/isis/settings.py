@@ -199,16 +199,8 @@ REFUSED = {"SOLVETARGETBODY": "how the body turns is taken as known"}
 def read_settings(text: str) -> Settings:
     """Read settings as they stand on jigsaw's command line, or in a file.
 
-    Parameters
-    ----------
-    text
-        `NAME=value` with blanks between, names in any case, values with blanks in quotes; or the path of a
-        file with such lines, in which # begins a comment. A later value counts in place of an earlier one.
-
-    Raises
-    ------
-    InputError
-        A name that jigsaw does not have, or that has no counterpart here; a value that is none.
+    They are `NAME=value` with blanks between, names in any case, values with blanks in quotes; or the path of
+    a file with such lines, in which # begins a comment. A later value counts in place of an earlier one.
     """
     given: dict[str, Any] = {}
     told: dict[str, str] = {}
@@ -245,21 +237,20 @@ def _said(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
 
 def _put(given: dict[str, Any], own: _Parameter, value: str) -> None:
     found = own.read(value)
-    if own.place is None:
-        given[own.field] = found
-        return
-    three = list(given.get(own.field, (None, None, None)))
-    three[own.place] = found
-    given[own.field] = tuple(three)
+    if own.place is not None:
+        three = list(given.get(own.field, (None, None, None)))
+        three[own.place] = found
+        found = tuple(three)
+    given[own.field] = found
 
 
 def _elsewhere(name: str, value: str) -> dict[str, str]:
     """Return what is told of a setting that has another form here; nothing of one that asks for nothing."""
     if name in OTHERWISE:
         return {name: OTHERWISE[name]}
-    if name in REFUSED:
-        if _yes(value):
-            raise InputError(f"is not done: {REFUSED[name]}")
-        return {}
-    known = [*PARAMETERS, *OTHERWISE, *REFUSED]
-    raise InputError(f"is no setting of jigsaw that is known{nearest(name, known)}")
+    if name not in REFUSED:
+        known = [*PARAMETERS, *OTHERWISE, *REFUSED]
+        raise InputError(f"is no setting of jigsaw that is known{nearest(name, known)}")
+    if _yes(value):
+        raise InputError(f"is not done: {REFUSED[name]}")
+    return {}

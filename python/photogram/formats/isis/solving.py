@@ -19,17 +19,11 @@ __all__ = ["Solving", "solving"]
 
 @dataclass(frozen=True, eq=False)
 class Solving:
-    """The trajectory of an image, and the polynomials that it begins with.
+    """The trajectory of an image, in metres and radians, and the polynomials that it begins with.
 
-    Attributes
-    ----------
-    trajectory
-        In metres and radians; coefficients are of time from the middle of a table, scaled by half of it.
-    position, angles
-        (3, n) coefficients of the polynomials that stand for the tables, to which those of corrections of
-        positions are added; 0 where the tables stay.
-    over
-        Whether the tables of positions, and of angles, stay.
+    `position` and `angles` are (3, n) coefficients of the polynomials that stand for the tables, of time from
+    the middle of a table, scaled by half of it, to which corrections are added; 0 where the tables stay.
+    `over` says whether the tables of positions, and of angles, do.
     """
 
     trajectory: Trajectory
@@ -39,36 +33,17 @@ class Solving:
 
 
 def solving(isd: Isd, name: str, settings: Settings, *, held: bool, first: Isd) -> Solving:
-    """Return what is adjusted of an image, or of all images of an observation.
+    """Return what is adjusted of an image, or of all images of an observation: nothing if it is held.
 
-    Parameters
-    ----------
-    isd
-        Its support data; of several images with the tables of all.
-    name
-        Of the trajectory.
-    settings
-        Which coefficients are unknown.
-    held
-        Whether none is.
-    first
-        The support data of the first of several images: its tables say from when time counts, and which
-        polynomials all begin with, as in jigsaw.
-
-    Raises
-    ------
-    InputError
-        Records that ask for velocities and have none.
+    `isd` has the tables of all images of an observation, `first` those of its first, which say from when time
+    counts, and which polynomials all begin with, as in jigsaw.
     """
     counts = (0, 0) if held else (settings.position_coefficients, settings.angle_coefficients)
     position, isd, places = _positions(isd, first.position, settings, counts[0])
     rotation, isd, angles = _angles(isd, first.pointing, settings, counts[1])
     own = trajectory_of(isd, name, interpolation="isis", position=position)
-    return Solving(replace(own, rotation=rotation, angles="zxz"), places, angles, _over(settings))
-
-
-def _over(settings: Settings) -> tuple[bool, bool]:
-    return settings.over_hermite, settings.over_existing
+    over = settings.over_hermite, settings.over_existing
+    return Solving(replace(own, rotation=rotation, angles="zxz"), places, angles, over)
 
 
 def _scaled(times: Floats) -> tuple[float, float]:
@@ -133,8 +108,6 @@ def _of_degree(fit: Polynomials, degree: int) -> Polynomials:
 
 def deviations(sigmas: Sequence[float | None], count: int, degree: int) -> Floats:
     """Return (degree + 1, 3) standard deviations of coefficients, of which the first `count` are unknown."""
-    found = np.zeros((degree + 1, 3))
     given = [np.inf if sigma is None else sigma for sigma in sigmas]
-    for k in range(count):
-        found[k] = given[k] if k < len(given) else np.inf
-    return found
+    of_degrees = [*given, *[np.inf] * count][:count] + [0.0] * (degree + 1 - count)
+    return np.repeat(of_degrees, 3).reshape(-1, 3)

@@ -12,7 +12,7 @@ import orjson
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.csm.angles import Polynomials, angle_axes, of_angles, to_angles, to_quaternions
-from photogram.formats.csm.cube_tables import is_cube
+from photogram.formats.csm.cubes import is_cube
 from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import SupportedImage, to_camera, trajectory_of
 from photogram.formats.csm.reading import UNITS
@@ -35,28 +35,17 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
     """Return the support data of an image with adjusted tables; None of a cube, whose tables are binary.
 
     Positions, velocities, quaternions and angular velocities at the times of their records, and half-way
-    between these as often as it takes for straight joins to see a thousand points within :data:`CLOSE`.
-    Whatever was not adjusted, and all else, stays as it is.
-
-    Parameters
-    ----------
-    image
-        The image.
-    adjusted
-        The trajectory that it is on.
-
-    Raises
-    ------
-    InputError
-        However many records there are, they do not agree with the trajectory.
+    between these as often as it takes for straight joins to see a thousand points within :data:`CLOSE`; an
+    error if that never is. Whatever was not adjusted, and all else, stays as it is.
     """
     if is_cube(image.path):
         return None
     document = read_json(image.path).value
     corrected = _Corrected(image, adjusted)
     truth = _adjusted_image(image, adjusted)
-    grid = _grid(image.supported.isd)
-    ground = truth.to_ground(*grid)
+    samples, lines = (np.linspace(1.0, size, GRID) for size in image.supported.isd.size)
+    rows, columns = np.meshgrid(lines, samples)
+    ground = truth.to_ground(rows.ravel(), columns.ravel())
     seen = truth.to_image(ground)
     for halvings in range(HALVINGS + 1):
         isd = corrected.isd(halvings)
@@ -67,32 +56,16 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
     raise InputError("records of adjusted tables do not agree with their polynomials", file=image.path)
 
 
-def _grid(isd: Isd) -> tuple[Floats, Floats]:
-    """Return lines and samples all over an image."""
-    samples, lines = (np.linspace(1.0, size, GRID) for size in isd.size)
-    grid = np.meshgrid(lines, samples)
-    return grid[0].ravel(), grid[1].ravel()
-
-
 def _adjusted_image(image: Image, adjusted: AdjustedTrajectory) -> SupportedImage:
     """Return an image on its trajectory as adjusted; what of its tables stays is that of the image alone."""
     own, over = adjusted.given, image.solving.over
     table = trajectory_of(image.supported.isd, own.name, interpolation="isis").table
+    taken: tuple[str, ...] = ()
     if own.position is not None and not over[0]:
-        table = replace(
-            table,
-            times=own.table.times,
-            positions=own.table.positions,
-            velocities=own.table.velocities,
-            interpolation=own.table.interpolation,
-        )
+        taken += ("times", "positions", "velocities", "interpolation")
     if own.rotation is not None and not over[1]:
-        table = replace(
-            table,
-            attitude_times=own.table.attitude_times,
-            attitudes=own.table.attitudes,
-            attitude_interpolation=own.table.attitude_interpolation,
-        )
+        taken += ("attitude_times", "attitudes", "attitude_interpolation")
+    table = replace(table, **{name: getattr(own.table, name) for name in taken})
     changes: dict[str, Any] = {"table": table}
     for name, value in (("position", adjusted.position), ("rotation", adjusted.rotation)):
         if (basis := getattr(own, name)) is not None:
@@ -115,7 +88,8 @@ class _Corrected:
         found = self.original
         if self.places is not None:
             times = _halved(found.position.times, halvings)
-            found = replace(found, position=Positions(times, self._places(self.places, times)))
+            places = self.places.at(times) + (self._flown(times)[0] if self.over[0] else 0.0)
+            found = replace(found, position=Positions(times, places))
         if self.angles is not None:
             times = _halved(found.pointing.times, halvings)
             angles = self._before(times) + self.angles.at(times)
@@ -145,9 +119,6 @@ class _Corrected:
             if len(times) > 1:
                 own["angular_velocities"] = self._turning(self.angles, own, times).tolist()
             own["ephemeris_times"] = times.tolist()
-
-    def _places(self, total: Polynomials, times: Floats) -> Floats:
-        return total.at(times) + (self._flown(times)[0] if self.over[0] else 0.0)
 
     def _before(self, times: Floats) -> Floats:
         """Return the angles that those of polynomials are added to."""

@@ -6,28 +6,25 @@ from dataclasses import replace
 
 from photogram import _photocore
 from photogram.errors import InputError
-from photogram.formats.isis.columns import columns_of_measures, columns_of_points
-from photogram.formats.isis.network import MESSAGE, ControlNetwork
+from photogram.formats.isis.network import (
+    HEADER,
+    MESSAGE,
+    ControlNetwork,
+    columns_of_measures,
+    columns_of_points,
+)
+from photogram.formats.isis.reading import LABEL_BYTES
 from photogram.io.pvl import Group, Value, label_text
 
 __all__ = ["binary_network", "network_text"]
 
-_LABEL_BYTES = 65536
 _VERSION = 5
 _END = "End_Object\nEnd\n"
 
 
 def _header(network: ControlNetwork) -> list[tuple[str, Value]]:
     """Return what a network says of itself, in the order of ISIS."""
-    texts = {
-        "NetworkId": network.network_id,
-        "TargetName": network.target,
-        "UserName": network.user,
-        "Created": network.created,
-        "LastModified": network.modified,
-        "Description": network.description,
-    }
-    return [(key, text) for key, text in texts.items() if text is not None]
+    return [(key, text) for key, name in HEADER.items() if (text := getattr(network, name)) is not None]
 
 
 def binary_network(network: ControlNetwork) -> bytes:
@@ -53,20 +50,20 @@ def binary_network(network: ControlNetwork) -> bytes:
         ("Version", _VERSION),
     ]
     places: list[tuple[str, Value]] = [
-        ("HeaderStartByte", _LABEL_BYTES),
+        ("HeaderStartByte", LABEL_BYTES),
         ("HeaderBytes", len(header)),
-        ("PointsStartByte", _LABEL_BYTES + len(header)),
+        ("PointsStartByte", LABEL_BYTES + len(header)),
         ("PointsBytes", len(points)),
     ]
     info = [*_header(network), *counts, *network.others.items]
     inside = [Group("Core", "object", items=places), Group("ControlNetworkInfo", "group", items=info)]
     buffer = Group("ProtoBuffer", "object", inside=[*inside, *network.others.inside])
     label = label_text(Group("", "label", inside=[buffer])).encode()
-    if len(label) > _LABEL_BYTES:
+    if len(label) > LABEL_BYTES:
         raise InputError(
-            f"the header has {len(label)} bytes, and a binary network has room for {_LABEL_BYTES}"
+            f"the header has {len(label)} bytes, and a binary network has room for {LABEL_BYTES}"
         )
-    return label.ljust(_LABEL_BYTES, b"\0") + header + points
+    return label.ljust(LABEL_BYTES, b"\0") + header + points
 
 
 def network_text(network: ControlNetwork) -> bytes:

@@ -272,7 +272,7 @@ def _control(found: Placed) -> _Part:
     tests = np.abs(found.result.control.standardized)
     return shapely.points(given), {
         "point": _ids(found)[rows],
-        **{f"d_{axis}": column for axis, column in zip(_LOCAL, steps.T, strict=True)},
+        **_along("d", steps),
         "largest_test": np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0),
     }
 
@@ -284,7 +284,7 @@ def _vectors(found: Placed, rows: Indices, given: Floats, steps: Floats, scale: 
     lines = shapely.linestrings(np.stack([given, ends], axis=1)) if len(rows) else []
     return lines, {
         "point": _ids(found)[rows],
-        **{f"d_{axis}": column for axis, column in zip(_LOCAL, steps.T, strict=True)},
+        **_along("d", steps),
         "length": np.linalg.norm(steps, axis=1),
         "scale": np.full(len(rows), scale),
     }
@@ -407,8 +407,12 @@ _SUSPECT = ("what", "photo", "point", "x", "y", "residual", "unit", "test")
 
 
 def _deviations(covariances: Floats) -> dict[str, Floats]:
-    sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    return {f"sd_{axis}": column for axis, column in zip(_LOCAL, sd.T, strict=True)}
+    return _along("sd", np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)))
+
+
+def _along(what: str, values: Floats) -> dict[str, Floats]:
+    """Return (n, 3) values along east, north and up as columns."""
+    return {f"{what}_{axis}": column for axis, column in zip(_LOCAL, values.T, strict=True)}
 
 
 def _ids(found: Placed) -> np.ndarray[Any, Any]:

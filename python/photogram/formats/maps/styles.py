@@ -10,57 +10,25 @@ __all__ = ["LAYERS", "style"]
 _Symbol = tuple[str, str, Mapping[str, str]]
 """Type of the symbol, class of its one layer, and properties of this."""
 
-BLUE, RED, GREEN, GREY, CLEAR = (
-    "31,120,180,255",
-    "214,39,40,255",
-    "51,160,44,255",
-    "90,90,90,255",
-    "0,0,0,0",
-)
+BLUE, RED, GREEN = "31,120,180,255", "214,39,40,255", "51,160,44,255"
+GREY, CLEAR = "90,90,90,255", "0,0,0,0"
 
 
 def _marker(shape: str, colour: str, size: float) -> _Symbol:
-    return (
-        "marker",
-        "SimpleMarker",
-        {
-            "name": shape,
-            "color": colour,
-            "outline_color": "255,255,255,255",
-            "outline_width": "0.1",
-            "outline_width_unit": "MM",
-            "size": f"{size:g}",
-            "size_unit": "MM",
-        },
-    )
+    outline = {"outline_color": "255,255,255,255", "outline_width": "0.1", "outline_width_unit": "MM"}
+    own = {"name": shape, "color": colour, **outline, "size": f"{size:g}", "size_unit": "MM"}
+    return "marker", "SimpleMarker", own
 
 
 def _fill(colour: str, outline: str, width: float) -> _Symbol:
-    return (
-        "fill",
-        "SimpleFill",
-        {
-            "color": colour,
-            "style": "no" if colour == CLEAR else "solid",
-            "outline_color": outline,
-            "outline_style": "solid",
-            "outline_width": f"{width:g}",
-            "outline_width_unit": "MM",
-        },
-    )
+    own = {"color": colour, "style": "no" if colour == CLEAR else "solid", "outline_color": outline}
+    own |= {"outline_style": "solid", "outline_width": f"{width:g}", "outline_width_unit": "MM"}
+    return "fill", "SimpleFill", own
 
 
 def _line(colour: str) -> _Symbol:
-    return (
-        "line",
-        "SimpleLine",
-        {
-            "line_color": colour,
-            "line_style": "solid",
-            "line_width": "0.4",
-            "line_width_unit": "MM",
-        },
-    )
+    own = {"line_color": colour, "line_style": "solid", "line_width": "0.4", "line_width_unit": "MM"}
+    return "line", "SimpleLine", own
 
 
 LAYERS: Mapping[str, tuple[str, Sequence[tuple[str, _Symbol]]]] = {
@@ -95,24 +63,17 @@ def style(name: str) -> str:
         renderer.set("attr", attribute)
         categories = SubElement(renderer, "categories")
         for row, (value, _) in enumerate(symbols):
-            SubElement(
-                categories,
-                "category",
-                value=value,
-                label=value,
-                symbol=str(row),
-                render="true",
-                type="string",
-            )
+            own = {"value": value, "label": value, "symbol": str(row), "render": "true", "type": "string"}
+            SubElement(categories, "category", own)
     drawn = SubElement(renderer, "symbols")
     for row, (_, (form, layer, properties)) in enumerate(symbols):
         symbol = SubElement(drawn, "symbol", type=form, name=str(row), alpha="1", clip_to_extent="1")
-        own = SubElement(symbol, "layer", {"class": layer, "enabled": "1", "locked": "0", "pass": "0"})
+        inside = SubElement(symbol, "layer", {"class": layer, "enabled": "1", "locked": "0", "pass": "0"})
         # Versions from 3.26 on read the options, those before 3.18 the properties.
-        options = SubElement(own, "Option", type="Map")
+        options = SubElement(inside, "Option", type="Map")
         for key, value in properties.items():
             SubElement(options, "Option", name=key, type="QString", value=value)
-            SubElement(own, "prop", k=key, v=value)
+            SubElement(inside, "prop", k=key, v=value)
     indent(root)
     declared = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
     return declared + tostring(root, encoding="unicode") + "\n"

@@ -28,13 +28,7 @@ DETERMINED = 3.0
 
 
 def with_wished_photos(project: Project, wishes: Wishes) -> Project:
-    """Return a project with the positions that files of its photographs carry, where it or a user names them.
-
-    Raises
-    ------
-    InputError
-        As :func:`with_photo_files`.
-    """
+    """Return a project with the positions that files of its photographs carry, where these are named."""
     settings = project.details.get("settings")
     own = settings if isinstance(settings, Settings) else None
     files = wishes.photos or (None if own is None else own.photo_files)
@@ -48,22 +42,9 @@ def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple
 
     Photos whose position is observed already keep that. Positions with standard deviations of a receiver with
     corrections in real time have a shift of 0.05 m a priori in common in a flight, and a lever arm of 0.01 m:
-    they leave out the errors of the base and of the shutter's time.
-
-    Parameters
-    ----------
-    project
-        The project; a model without a place on the earth is carried onto the positions.
-    files
-        The folder, and what is said of it.
-    sd
-        Standard deviations by table; those of `gnss` where no source has any.
-
-    Raises
-    ------
-    InputError
-        Files at fault, no position of a photo of the project, heights of two kinds, a project that is held
-        in axes of its own.
+    they leave out the errors of the base and of the shutter's time. A model without a place on the earth is
+    carried onto the positions. `sd` are standard deviations by table; those of `gnss` where no source has
+    any.
     """
     metadata = read_metadata(files.directory, mrk_antenna=files.mrk_antenna)
     records = {name: metadata.photos[key] for name, key in _keys(project, metadata).items()}

@@ -32,24 +32,11 @@ LARGEST_FLAG = 1000
 
 @dataclass(frozen=True)
 class Exposure:
-    """A line of a file.
+    """A line of a file: an exposure by its number, from 1, and when it was, in seconds of a week of GPS.
 
-    Attributes
-    ----------
-    number
-        Of the exposure, from 1.
-    gps_seconds, week
-        When it was, in seconds of a week of GPS, and the week.
-    offset
-        From the antenna to the camera: north, east, down, metres.
-    position
-        Longitude, latitude (degrees) and height above the ellipsoid, of the camera; None for no solution.
-    sd
-        Standard deviations of east, north and height, metres; None without usable ones.
-    flag
-        Of the solution, as :func:`photogram.formats.metadata.record.fix_of` knows it.
-    place
-        Where it stands.
+    `offset` leads from the antenna to the camera: north, east, down, metres; `position` is longitude,
+    latitude (degrees) and height above the ellipsoid, of the camera; `sd` are those of east, north and
+    height, metres; `flag` is that of the solution, as `fix_of` knows it.
     """
 
     number: int
@@ -98,13 +85,6 @@ def prefix_of(path: Path) -> str:
 def read_exposures(path: Path) -> dict[int, Exposure]:
     """Read a file; return its exposures by their numbers.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, a line that is at fault, two of one number.
-
-    Notes
-    -----
     Section 6 of the specification: tabs between number, seconds of the week, `[week]`, `dN,N`, `dE,E`, `dV,V`
     in millimetres, `lat,Lat`, `lon,Lon`, `h,Ellh`, `sN, sE, sV` in metres, and `flag,Q`.
     """

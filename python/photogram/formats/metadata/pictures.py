@@ -1,34 +1,56 @@
-"""The heads of pictures: size, EXIF and XMP of JPEG, TIFF and DNG, without decoding (extra `photos`)."""
+"""The heads of pictures: EXIF and XMP of JPEG, TIFF and DNG, without decoding (extra `photos`).
+
+Of EXIF: a position in degrees, minutes and seconds, a height, a radial accuracy. Of packets of XMP: positions
+and standard deviations of DJI, accuracies of Pix4D. Metadata tools rewrite their attributes as nested
+elements and the other way: both are read, by their namespaces.
+"""
 
 from __future__ import annotations
 
+import math
 import warnings
-from collections.abc import Mapping
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from photogram.errors import InputError
-from photogram.formats.metadata.exif import said_by_tags
-from photogram.formats.metadata.record import Said
-from photogram.formats.metadata.xmp import said_by_packet
+from photogram.formats.metadata.record import (
+    ELLIPSOIDAL,
+    SEA_LEVEL,
+    UNSAID,
+    UNSAID_SYSTEM,
+    Said,
+    Triple,
+    geographic_position,
+    usable_deviations,
+)
 from photogram.io.files import reading
 from photogram.io.places import Place
+from photogram.messages import quoted
 
-__all__ = ["ENDINGS", "said_by_picture"]
+__all__ = ["ENDINGS", "said_by_packet", "said_by_picture", "said_by_tags"]
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff", ".dng")
 GPS = 0x8825
 """The tag of EXIF that leads to those of GPS."""
 
+LATITUDE, LONGITUDE, ALTITUDE_REFERENCE, ALTITUDE, STATUS, DOP, ERROR = 2, 4, 5, 6, 9, 11, 31
+"""Tags by their numbers (EXIF 2.32, table 15); the letter of a coordinate is the tag before it."""
+RADIAL = (
+    "GPSHPositioningError of EXIF is radial, and the standard does not say how sure: standard deviations of"
+    " east and north are its value over the root of 2, of heights twice that"
+)
+DOP_ALONE = "GPSDOP of EXIF gives no metres: it is not taken"
+DJI, PIX4D = "http://www.dji.com/drone-dji/1.0", "http://pix4d.com/camera/1.0"
+LARGEST = 1 << 20
+"""Bytes of a packet at most; those of cameras have a few thousand."""
+_SPELLINGS = {"GpsLongtitude": "GpsLongitude"}
+"""What older cameras write."""
+
 
 def said_by_picture(path: Path) -> list[Said]:
-    """Return what the head of a picture says: of its XMP, then of its EXIF; nothing where neither speaks.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, is no picture, or says what cannot be; pillow is not installed.
-    """
+    """Return what the head of a picture says: of its XMP, then of its EXIF; nothing where neither speaks."""
     packet, tags = _head(path)
     found = [None if packet is None else said_by_packet(packet, path), said_by_tags(tags, Place(path))]
     return [each for each in found if each is not None]
@@ -58,3 +80,157 @@ def _head(path: Path) -> tuple[bytes | None, Mapping[int, Any]]:
         except Exception as error:  # whatever a damaged file makes the library raise
             raise InputError(f"cannot be read as a picture: {error}", file=path) from None
     return (packet if isinstance(packet, bytes) else None), tags
+
+
+def said_by_tags(tags: Mapping[int, Any], place: Place) -> Said | None:
+    """Return what the GPS tags of a picture say; None where there is neither a position nor an accuracy.
+
+    Section 6 of the specification. `GPSHPositioningError` is horizontal and radial: east and north have its
+    value over the root of 2, heights twice that. `GPSAltitudeRef` 0 and 1 were sea level up to EXIF 2.32, and
+    are the ellipsoid from EXIF 3.0 on, which has 2 and 3 for sea level: what heights of 0 and 1 are above is
+    not certain, and who reads them says it.
+    """
+    error = _tag(tags, ERROR, place)
+    each = error / math.sqrt(2)
+    sd = usable_deviations(each, each, 2 * each)
+    position = _position_of_tags(tags, place)
+    if position is None and sd is None:
+        return None
+    remark = RADIAL if sd is not None else DOP_ALONE if not math.isnan(_tag(tags, DOP, place)) else ""
+    heights = UNSAID if _reference(tags, place) < 2 else SEA_LEVEL
+    return Said("EXIF", place, UNSAID_SYSTEM, heights, position, sd, remark=remark)
+
+
+def _tag(tags: Mapping[int, Any], tag: int, place: Place) -> float:
+    """Return a tag as a number; NaN where it is not there, or has no denominator."""
+    value = tags.get(tag)
+    return math.nan if value is None else _as_tag(value, place, tag)
+
+
+def _as_tag(value: Any, place: Place, tag: int) -> float:
+    try:
+        found = float(value)
+    except (TypeError, ValueError, OverflowError, ZeroDivisionError):
+        raise place.error(f"GPS tag {tag} of its EXIF is no number: {quoted(str(value))}") from None
+    if math.isinf(found):
+        raise place.error(f"GPS tag {tag} of its EXIF is no finite number")
+    return found
+
+
+def _reference(tags: Mapping[int, Any], place: Place) -> int:
+    """Return the altitude reference: 0, 1, 2 or 3; 0 where there is none."""
+    value = tags.get(ALTITUDE_REFERENCE, 0)
+    if isinstance(value, bytes) and len(value) == 1:
+        value = value[0]
+    if value not in (0, 1, 2, 3):
+        raise place.error(f"its EXIF has the altitude reference {quoted(str(value))}: 0 to 3 are known")
+    return int(value)
+
+
+def _position_of_tags(tags: Mapping[int, Any], place: Place) -> Triple | None:
+    if str(tags.get(STATUS, "")).strip("\0 ").upper() == "V":  # the receiver had no fix
+        return None
+    latitude = _angle(tags, LATITUDE, "NS", place)
+    longitude = _angle(tags, LONGITUDE, "EW", place)
+    if math.isnan(latitude) or math.isnan(longitude):
+        return None
+    height = _tag(tags, ALTITUDE, place)
+    signed = -height if _reference(tags, place) in (1, 3) else height
+    return geographic_position(place, (longitude, latitude, signed))
+
+
+def _angle(tags: Mapping[int, Any], tag: int, letters: str, place: Place) -> float:
+    """Return a latitude or longitude in degrees; NaN where it is not there."""
+    value = tags.get(tag)
+    if value is None:
+        return math.nan
+    if not isinstance(value, Sequence) or isinstance(value, str | bytes) or len(value) != 3:
+        raise place.error(f"GPS tag {tag} of its EXIF is not degrees, minutes and seconds")
+    degrees, minutes, seconds = (_as_tag(each, place, tag) for each in value)
+    letter = str(tags.get(tag - 1, "")).strip("\0 ").upper()
+    if letter not in tuple(letters):
+        raise place.error(f"GPS tag {tag - 1} of its EXIF is {quoted(letter)}: {' or '.join(letters)} is")
+    size = degrees + minutes / 60 + seconds / 3600
+    return -size if letter == letters[1] else size
+
+
+class _WithoutDoctype(ElementTree.TreeBuilder):
+    """A tree of a document that declares nothing: what entities could do is not begun."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise ValueError("has a <!DOCTYPE, which no packet needs: it is not read")
+
+
+def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
+    """Return the simple properties of a packet by namespace (without a slash at its end) and name."""
+    place = Place(path)
+    if len(data) > LARGEST:
+        raise place.error(f"a packet of XMP of {len(data)} bytes: {LARGEST} are the most")
+    try:
+        root = ElementTree.fromstring(
+            data.strip(b"\0 \t\r\n"), ElementTree.XMLParser(target=_WithoutDoctype())
+        )
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise place.error(f"its XMP cannot be read: {error}") from None
+    found: dict[tuple[str, str], str] = {}
+    for element in root.iter():
+        for name, value in (*element.attrib.items(), (element.tag, element.text or "")):
+            space, _, own = name.removeprefix("{").rpartition("}")
+            key = space.rstrip("/"), _SPELLINGS.get(own, own)
+            text = value.strip()
+            if key[0] in (DJI, PIX4D) and text and found.setdefault(key, text) != text:
+                raise place.error(f"its XMP has {own} twice: {quoted(found[key])} and {quoted(text)}")
+    return found
+
+
+def said_by_packet(data: bytes, path: Path) -> Said | None:
+    """Return what a packet of XMP says of its photo; None where it says nothing.
+
+    Section 6 of the specification: `RtkStdLon`, `RtkStdLat` and `RtkStdHgt` are the standard deviations of
+    east, north and height; without a solution they are not taken. Heights are above the ellipsoid where the
+    camera has had corrections, else nothing says what they are above.
+    """
+    properties = _properties(data, path)
+    if not properties:
+        return None
+    dji = {name: text for (space, name), text in properties.items() if space == DJI}
+    accuracies = {name: text for (space, name), text in properties.items() if space == PIX4D}
+    place = Place(path)
+    flag = place.whole(dji["RtkFlag"], "RtkFlag", highest=1000) if "RtkFlag" in dji else None
+    sd = None if flag == 0 else _triple(dji, ("RtkStdLon", "RtkStdLat", "RtkStdHgt"), place)
+    rtk = sd is not None or flag not in (None, 0)
+    position = _position_of_packet(dji, place)
+    if sd is None:
+        sd = _triple(accuracies, ("GPSXYAccuracy", "GPSXYAccuracy", "GPSZAccuracy"), place)
+    yaw, pitch, roll = (_number(dji, f"Gimbal{each}Degree", place) for each in ("Yaw", "Pitch", "Roll"))
+    return Said(
+        "XMP",
+        place,
+        crs=ELLIPSOIDAL if rtk else UNSAID_SYSTEM,
+        heights="" if rtk else UNSAID,
+        position=position,
+        sd=sd,
+        rtk=rtk,
+        flag=flag,
+        angles=None if math.isnan(yaw + pitch + roll) else (yaw, pitch, roll),
+    )
+
+
+def _number(properties: Mapping[str, str], name: str, place: Place) -> float:
+    """Return a property as a number; NaN where it is not there."""
+    if name not in properties:
+        return math.nan
+    return Place(place.file, text=f"{name} {properties[name]}").number(properties[name], name)
+
+
+def _triple(properties: Mapping[str, str], names: tuple[str, str, str], place: Place) -> Triple | None:
+    return usable_deviations(*(_number(properties, name, place) for name in names))
+
+
+def _position_of_packet(dji: Mapping[str, str], place: Place) -> Triple | None:
+    longitude, latitude, height = (
+        _number(dji, name, place) for name in ("GpsLongitude", "GpsLatitude", "AbsoluteAltitude")
+    )
+    if math.isnan(longitude) or math.isnan(latitude):
+        return None
+    return geographic_position(place, (longitude, latitude, height))

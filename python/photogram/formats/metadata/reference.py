@@ -1,4 +1,4 @@
-"""Tables of references: Metashape's, with a header in any order, and Pix4D's geolocation without one."""
+"""Positions by the names of photos: `geo.txt`, references of Metashape, geolocation of Pix4D."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.formats.column_words import words_of
 from photogram.formats.columns import PLAIN, is_geographic, settled
+from photogram.formats.control_lists import system_of
 from photogram.formats.metadata.pictures import ENDINGS
 from photogram.formats.metadata.record import (
+    ELLIPSOIDAL,
     UNSAID,
     UNSAID_SYSTEM,
     Said,
+    Triple,
     geographic_position,
     usable_deviations,
 )
@@ -25,11 +28,16 @@ from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
+from photogram.io.places import Place
 from photogram.messages import Message
 
-__all__ = ["is_reference", "read_reference"]
+__all__ = ["GEO_TXT", "is_reference", "read_geo_txt", "read_reference"]
 
 SOURCE = "reference"
+GEO_TXT = "geo.txt"
+"""Of OpenDroneMap: positions in the system of the first line."""
+WORDS = (3, 4, 7, 9)
+"""How many a line of it may have; what follows the ninth is of no use here."""
 HEAD = 40
 """Lines in which a header, a row or the name of a system is looked for."""
 _KNOWN = (*TABLES["gnss"].columns, "enabled")
@@ -72,20 +80,6 @@ def _is_row(line: str) -> bool:
 def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
     """Read a table; return what it says by the names of photos.
 
-    Parameters
-    ----------
-    path
-        The file.
-    messages
-        Where remarks go.
-
-    Raises
-    ------
-    InputError
-        A table at fault, a name that is there twice, angles beyond the earth.
-
-    Notes
-    -----
     Section 6 of the specification: columns by their names, units by their headings; one accuracy is that of
     each axis. What is switched off in Metashape is left out.
     """
@@ -129,3 +123,46 @@ def _deviations(table: ColumnTable) -> Floats:
     common = table.numbers("sd", infinite=True)[:, np.newaxis]
     found: Floats = np.where(np.isnan(own), common, own)
     return found
+
+
+def read_geo_txt(path: Path) -> dict[str, Said]:
+    """Read `geo.txt`; return what it says by the names of photos.
+
+    Section 6 of the specification: `name x y [z [yaw pitch roll [sd_h sd_v]]]`; east and north have sd_h
+    each. Without the two columns nothing is said of standard deviations: those of another source stay.
+    """
+    places = [
+        Place(path, record, line)
+        for record, line in enumerate(read_lines(path), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not places:
+        raise Place(path).error("names no system of coordinates in its first line")
+    head, *rest = places
+    crs = system_of((head.text or "").strip(), head)
+    found: dict[str, Said] = {}
+    for place in rest:
+        name, *words = (place.text or "").split()
+        if name in found:
+            raise place.error(f"the photo {name} is there already, in record {found[name].place.record}")
+        found[name] = _said_of_line(words, crs, place)
+    return found
+
+
+def _said_of_line(words: list[str], crs: str, place: Place) -> Said:
+    count = len(words) + 1
+    if count not in WORDS and count < WORDS[-1]:
+        raise place.error(f"has {count} words: name x y [z [yaw pitch roll [sd_h sd_v]]]")
+    values = [place.number(word) for word in words[:8]] + [math.nan] * (8 - len(words))
+    x, y, z, yaw, pitch, roll, horizontal, vertical = values
+    position: Triple | None = (x, y, z)
+    if crs in (ELLIPSOIDAL, UNSAID_SYSTEM):
+        position = geographic_position(place, (x, y, z))
+    return Said(
+        GEO_TXT,
+        place,
+        crs,
+        position=position,
+        sd=usable_deviations(horizontal, horizontal, vertical),
+        angles=None if count < 7 else (yaw, pitch, roll),
+    )

@@ -7,12 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from photogram.errors import InputError
-from photogram.formats.metadata.geo_txt import NAME as GEO_TXT
-from photogram.formats.metadata.geo_txt import read_geo_txt
 from photogram.formats.metadata.mrk import Exposure, number_of, prefix_of, read_exposures
 from photogram.formats.metadata.pictures import ENDINGS, said_by_picture
 from photogram.formats.metadata.record import Said
-from photogram.formats.metadata.reference import is_reference, read_reference
+from photogram.formats.metadata.reference import GEO_TXT, is_reference, read_geo_txt, read_reference
 from photogram.formats.plain.schema import TABLES
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass, field
@@ -26,20 +24,10 @@ _EXPOSURES = ".mrk"
 
 @dataclass
 class Found:
-    """What the files of a folder say of each photo.
+    """What the files of a folder say of each photo, by its path below the folder, and which were read.
 
-    Attributes
-    ----------
-    said
-        By the path of a photo below the folder: what its sources say, the first that counts first.
-    flights
-        The flight of each photo: its folder, and the .MRK file where the folder has several.
-    tables
-        Files that are no pictures and were read.
-    pictures
-        Files whose heads were read.
-    messages
-        Remarks.
+    `said` is what its sources say, the first that counts first; `flights` its folder, and the .MRK file where
+    the folder has several.
     """
 
     said: dict[str, list[Said]] = field(default_factory=dict)
@@ -52,17 +40,7 @@ class Found:
 def found_in(directory: Path, *, antenna: bool) -> Found:
     """Read all files of a folder, and of folders in it, that say where photos were taken.
 
-    Parameters
-    ----------
-    directory
-        The folder.
-    antenna
-        Whether positions of .MRK files are those of the antenna.
-
-    Raises
-    ------
-    InputError
-        No folder, nothing in it that says anything, a file at fault.
+    With `antenna` positions of .MRK files are those of the antenna.
     """
     with reading(directory):
         if not directory.is_dir():
@@ -101,13 +79,7 @@ def _key(directory: Path, path: Path) -> str:
 
 
 class Photos:
-    """Photos of a folder by what people call them.
-
-    Parameters
-    ----------
-    keys
-        Their paths below the folder.
-    """
+    """Photos of a folder, known by their paths below it, by what people call them."""
 
     def __init__(self, keys: Iterable[str]) -> None:
         self._known: tuple[dict[str, list[str]], ...] = ({}, {}, {})
@@ -117,15 +89,7 @@ class Photos:
                 names.setdefault(name, []).append(key)
 
     def meant(self, name: str, folder: str = ".") -> list[str]:
-        """Return those that a name means: its path, else its name, else that without its ending.
-
-        Parameters
-        ----------
-        name
-            A name, or a path.
-        folder
-            The folder in which, or below which, they are.
-        """
+        """Return those in a folder that a name means: its path, else its name, else without its ending."""
         path = PurePosixPath(name.replace("\\", "/"))
         paths, names, stems = self._known
         tried = (

@@ -1,21 +1,26 @@
-"""Positions of photos with their standard deviations, in systems of coordinates, heights all of one kind."""
+"""Positions of photos with standard deviations in systems of coordinates, and as plain tables."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.metadata.merged import PhotoRecord
+from photogram.formats.metadata.merged import Metadata, PhotoRecord
 from photogram.formats.metadata.record import ELLIPSOIDAL, SEA_LEVEL, Said
+from photogram.formats.plain.schema import AXES, deviation_columns
 from photogram.formats.project import Frame
+from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.network.geometry import Spheroid
 
-__all__ = ["LEVER_SD", "SHIFT_SD", "Located", "covariances_of", "located"]
+__all__ = ["GROUPS", "LEVER_SD", "SHIFT_SD", "Located", "gnss_files", "located"]
 
 SHIFT_SD = 0.05
 """Metres: a priori standard deviation of the shift that positions of a flight have in common."""
@@ -25,24 +30,20 @@ ABOVE = {False: "above the ellipsoid", True: "above the geoid"}
 _OPTION = "--photos-crs EPSG:4326+geoid=46.5 (heights above sea level, and the geoid above the ellipsoid)"
 _UNKNOWN = "above the geoid (as mostly) or above the ellipsoid"
 _SAY = f"{_OPTION} or --photos-crs {ELLIPSOIDAL} (heights above the ellipsoid) says it"
-
+GROUPS = "gnss_groups.csv"
+_COMMENT = (
+    "longitude and latitude (degrees), height above the ellipsoid (metres) of WGS 84, standard deviations of"
+    f' east, north, height (metres); project.toml: [gnss] crs = "{ELLIPSOIDAL}"'
+)
 _WGS84 = (Spheroid.wgs84().a, Spheroid.wgs84().b)
 
 
 @dataclass(frozen=True)
 class Located:
-    """Positions of photos.
+    """Positions of n photos with the system of each.
 
-    Attributes
-    ----------
-    records
-        Of the n photos.
-    systems
-        The system of each position.
-    xyz
-        (n, 3) longitude (degrees) or easting, latitude or northing, height.
-    sd
-        (n, 3) standard deviations of east, north and height, metres; NaN without.
+    `xyz` are (n, 3) longitude (degrees) or easting, latitude or northing, height;
+    `sd` are (n, 3) standard deviations of east, north and height, metres; NaN without.
     """
 
     records: tuple[PhotoRecord, ...]
@@ -56,16 +57,12 @@ class Located:
         return [each.flight if each.rtk else "" for each in self.records]
 
     def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[str]]:
-        """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it.
-
-        Raises
-        ------
-        InputError
-            As :func:`photogram.formats.crs.to_frame`.
-        """
+        """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it."""
         from photogram.formats.crs import to_frame
 
-        xyz, turned, remarks = np.empty_like(self.xyz), covariances_of(self.sd), list[str]()
+        turned = np.zeros((len(self.sd), 3, 3))
+        turned[:, range(3), range(3)] = self.sd**2
+        xyz, remarks = np.empty_like(self.xyz), list[str]()
         for crs in dict.fromkeys(self.systems):
             own = np.array([each == crs for each in self.systems])
             xyz[own], turned[own], said = to_frame(crs, self.xyz[own], turned[own], frame)
@@ -76,11 +73,6 @@ class Located:
         """Return (n, 3) longitudes, latitudes (degrees), heights above the ellipsoid (WGS 84), and (n, 3) sd.
 
         What already is so stays as it stands.
-
-        Raises
-        ------
-        InputError
-            As :func:`photogram.formats.crs.to_frame`.
         """
         if set(self.systems) <= {ELLIPSOIDAL}:
             return self.xyz, self.sd
@@ -92,31 +84,13 @@ class Located:
         return xyz, np.where(np.isnan(self.sd), np.nan, sd)
 
 
-def covariances_of(sd: Floats) -> Floats:
-    """Return (n, 3, 3) covariances of uncorrelated components."""
-    found = np.zeros((len(sd), 3, 3))
-    found[:, range(3), range(3)] = sd**2
-    return found
-
-
 def located(
     records: Sequence[PhotoRecord], crs: str | None = None, sd: Sequence[float] | None = None
 ) -> Located:
-    """Return the positions of photos that have one.
+    """Return the positions of photos that have one; heights have to be of one kind.
 
-    Parameters
-    ----------
-    records
-        What is known of the photos.
-    crs
-        The system of positions whose source does not say it, or not what heights are above.
-    sd
-        Standard deviations where no source has any: one number or three, metres.
-
-    Raises
-    ------
-    InputError
-        Heights of two kinds, or of a kind that nobody says; positions in no system.
+    `crs` is the system of positions whose source does not say it, or not what heights are above; `sd` are
+    standard deviations where no source has any: one number or three, metres.
     """
     known = [each for each in records if each.position is not None]
     said = [each.position for each in known if each.position is not None]
@@ -180,3 +154,41 @@ def _is_above_geoid(system: str) -> bool:
     from photogram.formats.crs import has_geoid_heights
 
     return system not in ("", ELLIPSOIDAL) and has_geoid_heights(system)
+
+
+def gnss_files(
+    metadata: Metadata, path: Path, crs: str | None = None, sd: Sequence[float] | None = None
+) -> dict[Path, bytes]:
+    """Return a table `gnss` of a plain project, and `gnss_groups` beside it where positions need it."""
+    known = located(list(metadata.photos.values()), crs, sd)
+    if not known.records:
+        raise InputError("holds no positions of photos", file=metadata.directory)
+    files = {path: csv_text(_positions(known), [_COMMENT])}
+    flights = list(dict.fromkeys(each for each in known.flights if each))
+    if flights:
+        files[path.with_name(GROUPS)] = csv_text(_groups(flights))
+    return files
+
+
+def _positions(known: Located) -> dict[str, Any]:
+    """Return the columns: names of photos without their folders, where that is enough."""
+    xyz, sd = known.geographic()
+    names = {each.photo: PurePosixPath(each.photo).name for each in known.records}
+    often = Counter(names.values())
+    return {
+        "photo": [photo if often[name] > 1 else name for photo, name in names.items()],
+        **dict(zip(("longitude", "latitude", "height"), xyz.T, strict=True)),
+        **dict(zip(deviation_columns(AXES), sd.T, strict=True)),
+        "group": known.flights,
+        "source": [each.position.source if each.position else "" for each in known.records],
+        "sd_source": [each.deviations.source if each.deviations else "" for each in known.records],
+    }
+
+
+def _groups(flights: Sequence[str]) -> dict[str, Any]:
+    """Return the columns of what positions of a flight have in common."""
+    count = len(flights)
+    columns: dict[str, Any] = {"group": list(flights), "shift": ["true"] * count}
+    for kind, deviation in (("lever", LEVER_SD), ("shift", SHIFT_SD)):
+        columns |= {f"sd_{kind}_{axis}": [deviation] * count for axis in AXES}
+    return columns

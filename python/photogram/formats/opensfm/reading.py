@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.io.tree import Tree, read_json, unknown
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
@@ -41,13 +41,7 @@ def place_of(path: Path) -> Path | None:
 
 
 def read(path: Path, wishes: Wishes) -> Project:
-    """Read the largest model of a file, or the one that is asked for, with its tracks.
-
-    Raises
-    ------
-    InputError
-        A file that is missing or no JSON, a camera of a type that is not known, a track of another width.
-    """
+    """Read the largest model of a file, or the one that is asked for, with its tracks."""
     folder = place_of(path)
     if folder is None:
         raise InputError(f"holds no {MODEL}", file=path)
@@ -65,10 +59,11 @@ def read(path: Path, wishes: Wishes) -> Project:
     of_photo = np.array([camera_rows[shot["camera"].value] for shot in shots.values()], dtype=np.int64)
     rotations, translations = _poses(shots)
     points = dict(model.get("points", {}).items())
-    lacks = (
-        [] if (folder / TRACKS).is_file() else [f"no {TRACKS} beside it: no image measurements (--images)"]
-    )
-    photos, tracks, xy = _tracks(folder / TRACKS, names, list(points), messages) if not lacks else _NO_TRACKS
+    there = (folder / TRACKS).is_file()
+    photos, tracks, xy = _tracks(folder / TRACKS, names, list(points), messages) if there else _NO_TRACKS
+    colours = {
+        name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)] for name, each in points.items()
+    }
     scales = np.array([max(size) for size in sizes], dtype=float)[of_photo[photos]]
     middles = np.array(sizes, dtype=float)[of_photo[photos]] / 2
     return assembled(
@@ -87,14 +82,9 @@ def read(path: Path, wishes: Wishes) -> Project:
         image_xy=middles + scales[:, np.newaxis] * xy,
         observations=_gps(shots, wishes, messages),
         frame=_frame(model),
-        lacks=lacks,
+        lacks=[] if there else [f"no {TRACKS} beside it: no image measurements (--images)"],
         messages=[*messages, *_beside(folder)],
-        details={
-            "colours": {
-                name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)]
-                for name, each in points.items()
-            }
-        },
+        details={"colours": colours},
     )
 
 
@@ -118,10 +108,8 @@ def _cameras(cameras: Tree) -> tuple[list[Camera], list[Size]]:
     found, sizes = [], []
     for name, each in cameras.items():
         width, height = each["width"].whole(1), each["height"].whole(1)
-        try:
+        with at_place(each):
             found.append(_camera(name, each, width, height))
-        except InputError as error:
-            raise (error if error.file else each.error(error.message)) from None
         sizes.append((width, height))
     return found, sizes
 
@@ -191,9 +179,8 @@ def _gps(shots: dict[str, Tree], wishes: Wishes, messages: list[Message]) -> lis
         if level:
             sd[2] = NO_HEIGHT
         found.append(Position(name, position, sd=sd))
-    messages.append(
-        Message(f"{len(found)} GPS positions are observations, by their gps_dop or --sd gnss=...")
-    )
+    text = f"{len(found)} GPS positions are observations, by their gps_dop or --sd gnss=..."
+    messages.append(Message(text))
     return found
 
 
@@ -209,7 +196,7 @@ def _frame(model: Tree) -> Frame:
 
 def _tracks(
     path: Path, names: list[str], points: list[str], messages: list[Message]
-) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], np.ndarray[tuple[int], np.dtype[np.int64]], Floats]:
+) -> tuple[Indices, Indices, Floats]:
     """Return photo, point and (m, 2) normalised coordinates of the observations that the model has."""
     lines = read_lines(path)
     width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
@@ -221,13 +208,12 @@ def _tracks(
     point_rows = {name: row for row, name in enumerate(points)}
     photos, tracks, xy = [], [], []
     left = 0
-    for record in range(first, len(lines)):
-        line = lines[record]
+    for record, line in enumerate(lines[first:], first + 1):
         if not line:
             continue
         cells = line.split("\t")
         if len(cells) != width:
-            raise Place(path, record + 1, line).error(f"has {len(cells)} fields between tabs, not {width}")
+            raise Place(path, record, line).error(f"has {len(cells)} fields between tabs, not {width}")
         photo, point = photo_rows.get(cells[0]), point_rows.get(cells[1])
         if photo is None or point is None:
             left += 1
@@ -235,18 +221,13 @@ def _tracks(
         try:
             xy.append((finite_number(cells[3]), finite_number(cells[4])))
         except ValueError as error:
-            raise Place(path, record + 1, line).error(str(error)) from None
+            raise Place(path, record, line).error(str(error)) from None
         photos.append(photo)
         tracks.append(point)
     if left:
-        messages.append(
-            Message(f"{left} observations are of photos or points that the reconstruction does not have")
-        )
-    return (
-        np.array(photos, dtype=np.int64),
-        np.array(tracks, dtype=np.int64),
-        np.array(xy, dtype=float).reshape(-1, 2),
-    )
+        text = f"{left} observations are of photos or points that the reconstruction does not have"
+        messages.append(Message(text))
+    return np.array(photos, dtype=np.int64), np.array(tracks, dtype=np.int64), np.reshape(xy, (-1, 2))
 
 
 def _beside(folder: Path) -> list[Message]:

@@ -49,13 +49,7 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the two files, and the list of control of a block that has a place on the earth.
-
-    Raises
-    ------
-    InputError
-        Cameras that the package does not have, pictures of unknown size, no poses.
-    """
+    """Return the two files, and the list of control of a block that has a place on the earth."""
     block = project.block
     cameras, which = known_cameras(block)
     sizes = sizes_of(project)
@@ -86,7 +80,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         "shots": shots,
         "points": {
             block.point_ids[row]: {
-                "color": [float(each) for each in colours.get(block.point_ids[row], (0, 0, 0))],
+                "color": list(map(float, colours.get(block.point_ids[row], (0, 0, 0)))),
                 "coordinates": positions[row].tolist(),
             }
             for row in np.flatnonzero(placed).tolist()
@@ -137,38 +131,33 @@ def _control(project: Project) -> bytes:
 
 
 def _camera(camera: Camera, size: Size) -> dict[str, Any]:
-    width, height = size
-    scale = max(size)
-    common: dict[str, Any] = {"width": width, "height": height}
-    values = camera.parameters
+    (width, height), scale = size, max(size)
+    found: dict[str, Any] = {"width": width, "height": height}
     if camera.model == "equirectangular":
-        return {**common, "projection_type": "spherical"}
-
-    def normalised(fx: float, fy: float, cx: float, cy: float) -> dict[str, float]:
-        return {
-            "focal_x": fx / scale,
-            "focal_y": fy / scale,
-            "c_x": (cx - width / 2) / scale,
-            "c_y": (cy - height / 2) / scale,
-        }
-
+        return {**found, "projection_type": "spherical"}
     if camera.model in ("opencv_fisheye", "radial_fisheye", "simple_radial_fisheye") and camera.unit == "px":
+        kind, values = "fisheye_opencv", camera.parameters
         fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
+        cx, cy = values["cx"], values["cy"]
         terms = {name: values.get(name, 0.0) for name in ("k1", "k2", "k3", "k4")}
         terms["k1"] = values.get("k", terms["k1"])
-        return {
-            **common,
-            "projection_type": "fisheye_opencv",
-            **normalised(fx, fy, values["cx"], values["cy"]),
-            **terms,
-        }
-    lens = lens_of(camera, size)
-    if lens is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
-        raise InputError(
-            f"the camera {camera.title} has the model {camera.model}, which OpenSfM does not have"
-        )
-    terms = {name: getattr(lens, name) for name in ("k1", "k2", "p1", "p2", "k3")}
-    return {**common, "projection_type": "brown", **normalised(lens.fx, lens.fy, lens.cx, lens.cy), **terms}
+    else:
+        kind, lens = "brown", lens_of(camera, size)
+        if lens is None or not lens.is_plain("k1", "k2", "k3", "p1", "p2"):
+            raise InputError(
+                f"the camera {camera.title} has the model {camera.model}, which OpenSfM does not have"
+            )
+        fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
+        terms = {name: getattr(lens, name) for name in ("k1", "k2", "p1", "p2", "k3")}
+    return {
+        **found,
+        "projection_type": kind,
+        "focal_x": fx / scale,
+        "focal_y": fy / scale,
+        "c_x": (cx - width / 2) / scale,
+        "c_y": (cy - height / 2) / scale,
+        **terms,
+    }
 
 
 def _tracks(project: Project, sizes: Any, which: list[int], shots: set[int]) -> bytes:

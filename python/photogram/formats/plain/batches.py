@@ -17,8 +17,7 @@ import numpy as np
 
 from photogram.adjustment.first_features import started
 from photogram.arguments.types import Floats, Indices
-from photogram.distributed.counts import Counts, counted_work
-from photogram.distributed.cut import Incidence, Tree, cut, homes, joined
+from photogram.distributed.cut import Counts, Incidence, Tree, counted_work, cut, homes, joined
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.parts import AtHome, Names, Part, assembled_part
 from photogram.distributed.run import Manifest, divided, places_of
@@ -35,7 +34,7 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.project import ASSUMED_SD, Project
 from photogram.network.block import checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
-from photogram.network.observations.position import with_epochs
+from photogram.network.observations.photos import with_epochs
 
 __all__ = ["Streamed", "streamable"]
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Floats
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.clocks import clock_columns, clocks
@@ -23,11 +22,11 @@ from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import quoted
 from photogram.network.block import Block
-from photogram.network.geometry import Spheroid
+from photogram.network.geometry import Cartesian, Spheroid
+from photogram.network.motion import about
 from photogram.network.moving_photos import Lines, Timed
 from photogram.network.trajectories import Clock, Readout, Trajectory
 from photogram.network.unknowns import Sensor
-from photogram.network.whereabouts import about
 
 __all__ = ["line_times_table", "moving_columns", "placed", "read_timed"]
 

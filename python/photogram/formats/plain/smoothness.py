@@ -16,7 +16,7 @@ from photogram.formats.plain.trajectories import trajectory_rows
 from photogram.formats.plain.trajectories_written import shared_trajectories
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness
-from photogram.network.observations.smoothness import smoothness_of
+from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Trajectory
 
 __all__ = ["lost_smoothness", "read_smoothness", "smoothness_table"]

@@ -56,7 +56,9 @@ def read_project(path: Path, wishes: Wishes) -> Project:
 
 def project_of(calibration: Start, path: Path | None = None) -> Project:
     """Return a calibration as a project, whose pixels count from the upper-left corner of the first."""
-    block, lacks = from_corner(calibration.block()), []
+    middle = calibration.block()
+    cameras = [shifted(each) for each in middle.cameras]
+    block, lacks = middle.replace(cameras=cameras, image_xy=middle.image_xy + MIDDLE), []
     if calibration.sd0 is None:
         lacks.append("no standard deviations of corners: 1 px is assumed (--sd images=...)")
     return Project(
@@ -100,14 +102,7 @@ def _unused(calibration: Start) -> Unused:
 
 
 def calibration_of(project: Project) -> Calibration:
-    """Return the calibration that a project with a board is.
-
-    Raises
-    ------
-    InputError
-        A project without a board, points that are not those of the board, cameras that are not in pixels,
-        photos on other trajectories than those of views, observations of which a calibration knows nothing.
-    """
+    """Return the calibration that a project with a board is, of cameras in pixels."""
     block = project.block
     if not project.boards:
         raise InputError("has no board: a table of boards says what its control is", file=project.path)
@@ -192,16 +187,8 @@ def _bend(block: Block) -> tuple[tuple[float, float], Floats]:
 def _corners(project: Project, number: Indices, stands: Indices, sd0: float) -> tuple[Corners, Indices]:
     """Return the corners of a project, and (V,) the photo of each view.
 
-    Parameters
-    ----------
-    project
-        The project.
-    number
-        (n,) the number of the board's point of each point.
-    stands
-        (P,) the photo whose pose is that of the view of each photo.
-    sd0
-        The standard deviation of a corner of level 0.
+    `number` is (n,) the number of the board's point of each point, `stands` (P,) the photo whose pose is that
+    of the view of each photo, `sd0` the standard deviation of a corner of level 0.
     """
     block = project.block
     assert block.photo_cameras is not None
@@ -289,11 +276,6 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
     sd = np.zeros((len(board.places), 3))
     sd[number] = block.point_sd
     return board.replace(point_sd=sd)
-
-
-def from_corner(block: Block) -> Block:
-    """Return a block whose pixels count from the middle of the first as one that counts from its corner."""
-    return block.replace(cameras=[shifted(each) for each in block.cameras], image_xy=block.image_xy + MIDDLE)
 
 
 def adjusted_project(calibrated: Calibrated) -> Project:

@@ -17,13 +17,7 @@ __all__ = ["lost_beside_cameras", "rig_of_project"]
 
 
 def rig_of_project(project: Project) -> Rig:
-    """Return the cameras of a project whose images are pixels, and where those on frames are to camera 0.
-
-    Raises
-    ------
-    InputError
-        No cameras, but principal distances.
-    """
+    """Return the cameras of a project whose images are pixels, and where those on frames are to camera 0."""
     block = project.block
     if not block.cameras:
         raise InputError("has principal distances, and no cameras", file=project.path)

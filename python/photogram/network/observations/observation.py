@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import ClassVar
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.arrays import is_covariance, names, number, shaped, shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.moving_photos import Moment
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Unknown, rotation
@@ -25,6 +25,7 @@ __all__ = [
     "moments",
     "observation_rows",
     "of_records",
+    "with_unknowns",
 ]
 
 Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
@@ -70,8 +71,12 @@ class Observation:
     """What its components are called: rotations are in radians, all others in the linear unit."""
     LOCAL: ClassVar[bool] = False
     """Whether in geographic space these are east, north and up."""
+    _PER: ClassVar[str] = ""
+    """What follows the units of its components: `/s` of rates."""
     MISSING: ClassVar[bool] = False
     """Whether NaN stands for components that were not observed."""
+    _POSITIVE: ClassVar[bool] = False
+    """Whether its first value, a length, must be positive."""
 
     points: tuple[str, ...] = field(init=False, repr=False)
     photos: tuple[str, ...] = field(init=False, repr=False)
@@ -102,6 +107,9 @@ class Observation:
         if not use.any():
             raise InputError(f"{self.name} has no component that was observed")
         self._set("precision", self._covariance(use))
+        if self._POSITIVE and not self.observed[0] > 0:
+            name = self.VALUES[0][0]
+            raise InputError(f"{name} of {self.name} is not positive: {getattr(self, name)}")
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
@@ -144,7 +152,9 @@ class Observation:
 
     def units(self, linear_unit: str) -> tuple[str, ...]:
         """Return the units of its components; nothing for plain numbers."""
-        return tuple("rad" if name in ROTATIONS else linear_unit for name in self.own_components)
+        return tuple(
+            ("rad" if name in ROTATIONS else linear_unit) + self._PER for name in self.own_components
+        )
 
     @property
     def own_components(self) -> tuple[str, ...]:
@@ -206,6 +216,13 @@ class Observation:
         return matrix
 
 
+def with_unknowns(observation: Observation, others: Mapping[int, Unknown]) -> Observation:
+    """Return an observation with other common unknowns in the place of some, by the identity of these."""
+    fields = zip(observation.UNKNOWNS, observation.unknowns if observation.UNKNOWNS else (), strict=True)
+    changes: dict[str, Any] = {name: others[id(own)] for (name, _), own in fields if id(own) in others}
+    return replace(observation, **changes) if changes else observation
+
+
 def moments(observations: Sequence[Observation]) -> list[Moment]:
     """Return the different times on trajectories that observations are of."""
     return list({each.name: each for each in _moments(observations)}.values())
@@ -247,12 +264,7 @@ def observation_rows(
 ) -> list[tuple[list[int], Group]]:
     """Return observations kind by kind: their rows among the given ones, and what the core takes.
 
-    Times on trajectories stand behind the photos.
-
-    Raises
-    ------
-    InputError
-        A point or photo that is not there.
+    Times on trajectories stand behind the photos. InputError: a point or photo that is not there.
     """
     if not observations:
         return []

@@ -1,4 +1,4 @@
-"""Smooth trajectories: sums of their coefficients that are zero."""
+"""Observations of common unknowns alone: priors, bases of rigs, knots of lenses, smooth trajectories."""
 
 from __future__ import annotations
 
@@ -11,11 +11,104 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import shaped, shown
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.cameras import Camera
+from photogram.network.knots import Knot
 from photogram.network.observations.observation import Observation, all_trajectories
 from photogram.network.trajectories import Coefficient, Trajectory
-from photogram.network.unknowns import Unknown
+from photogram.network.unknowns import Sensor, Unknown
 
-__all__ = ["Smoothness", "smoothness_of", "with_smoothness"]
+__all__ = ["Base", "Prior", "Smoothness", "smoothness_of", "with_knots", "with_smoothness"]
+
+
+@dataclass(frozen=True, eq=False)
+class Prior(Observation):
+    """What was observed of a common unknown as one observation with its full covariance.
+
+    Parameters
+    ----------
+    unknown
+        The unknown; its own standard deviations are infinite.
+    sd
+        (k,) standard deviations of its unknowns, rotations in radians.
+    covariance
+        (k, k) their covariance matrix, in place of `sd`.
+    value
+        (k,) what was observed of them, in the place of what the unknown is given; not of rotations.
+
+    Raises
+    ------
+    InputError
+        What is no unknown, both or none of `sd` and `covariance`, or such as give no weight.
+    """
+
+    KIND = "prior"
+    UNKNOWNS = (("unknown", Unknown),)
+    NEEDS = frozenset({"unknown"})
+
+    unknown: Unknown
+    sd: ArrayLike | None = None
+    covariance: ArrayLike | None = None
+    value: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.value is None:
+            return
+        count = len(self.unknown.components)
+        value = shaped(f"value of {self.name}", self.value, (count,))
+        if not np.isfinite(value).all() or count > 3:
+            raise InputError(f"value of {self.name} is not finite, or of rotations: {value.tolist()}")
+        self._set("value", value)
+        self._set("observed", value - self.unknown.position[:count])
+
+    @property
+    def label(self) -> str:
+        """Those of one type stand together."""
+        return f"prior, {self.unknown.KIND}" + ("" if self.value is None else ", observed")
+
+    def units(self, linear_unit: str) -> tuple[str, ...]:
+        """Those of the unknown."""
+        return self.unknown.units(linear_unit)
+
+    @property
+    def own_components(self) -> tuple[str, ...]:
+        """Those of the unknown."""
+        return self.unknown.components
+
+
+@dataclass(frozen=True, eq=False)
+class Base(Observation):
+    """The distance between two sensors on a frame, or of one from the frame itself.
+
+    The norm of c_2 - c_1; a base that was measured gives a rig its scale.
+
+    Parameters
+    ----------
+    first
+        The first sensor; None for that which stands for the frame.
+    second
+        The second sensor.
+    length
+        Observed, in the linear unit of the object space.
+    sd
+        Its standard deviation in the same unit.
+
+    Raises
+    ------
+    InputError
+        What is no sensor, values that are not finite, a standard deviation that gives no weight.
+    """
+
+    KIND = "base"
+    UNKNOWNS = (("first", Sensor), ("second", Sensor))
+    NEEDS = frozenset({"second"})
+    VALUES = (("length", ()),)
+    COMPONENTS = ("length",)
+
+    first: Sensor | None
+    second: Sensor
+    length: float
+    sd: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,3 +197,20 @@ def with_smoothness(
     for trajectory in all_trajectories(trajectories, observations):
         found += [each for each in smoothness_of(trajectory) if not known.issuperset(each.unknowns)]
     return tuple(found)
+
+
+def with_knots(observations: Sequence[Observation], cameras: Sequence[Camera]) -> tuple[Observation, ...]:
+    """Return observations with those of the weighted knots of cameras: each is zero, radially and across.
+
+    Those of knots of other cameras go.
+    """
+    own = [knot for camera in cameras for knot in camera.knot_unknowns]
+    there = {id(each) for each in own}
+    found = [
+        each
+        for each in observations
+        if not (isinstance(each, Prior) and isinstance(each.unknown, Knot) and id(each.unknown) not in there)
+    ]
+    observed = {id(each.unknown) for each in found if isinstance(each, Prior)}
+    weighted = [each for each in own if each.covariance is not None and id(each) not in observed]
+    return (*found, *(Prior(each, covariance=each.covariance, value=np.zeros(2)) for each in weighted))

@@ -1,0 +1,291 @@
+"""What jigsaw writes of an adjustment: `bundleout.txt`, `images.csv`, `points.csv` and `residuals.csv`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.formats.isis.network import POINT_TYPES
+from photogram.formats.isis.outcome import Outcome
+from photogram.formats.isis.parameters import KM, Parameter, parameters
+from photogram.formats.isis.settings import PARAMETERS, Settings
+from photogram.io.csv_text import csv_text
+
+__all__ = ["jigsaw_files"]
+
+_WORDS = {"first": "ANGLES", "second": "VELOCITIES", "third": "ACCELERATIONS", "all": "ALL", "none": "NONE"}
+_AXES = ("Latitude", "Longitude", "Radius")
+_CELLS = ("initial", "correction", "final", "apriori sigma", "adj sigma")
+_POINT_HEADS = [
+    ("", "Point", "Label"),
+    ("", "Point", "Status"),
+    ("", "Accepted", "Measures"),
+    ("", "Rejected", "Measures"),
+    ("", "Residual", "RMS"),
+    *(("3-d", axis, unit) for axis, unit in zip(_AXES, ("(dd)", "(dd)", "(km)"), strict=True)),
+    *(("Sigma", axis, "(m)") for axis in _AXES),
+    *(("Correction", axis, "(m)") for axis in _AXES),
+    *(("Coordinate", axis, "(km)") for axis in "XYZ"),
+    *(("Sigma", axis, "(m)") for axis in "XYZ"),
+]
+_RESIDUAL_HEADS = [
+    ("", "Point", "Label"),
+    ("", "Image", "Filename"),
+    ("", "Image", "Serial Number"),
+    ("x image", "coordinate", "(mm)"),
+    ("y image", "coordinate", "(mm)"),
+    ("Measured", "Sample", "(pixels)"),
+    ("Measured", "Line", "(pixels)"),
+    ("sample", "residual", "(pixels)"),
+    ("line", "residual", "(pixels)"),
+    ("Residual Vector", "Magnitude", "(pixels)"),
+    ("", "", "Rejected"),
+]
+_PARAMETER = "{:>6} {:>14}{:>22}{:>22}{:>22}{:>18}{:>18}"
+
+
+def jigsaw_files(outcome: Outcome) -> Mapping[str, bytes]:
+    """Return the files by their names."""
+    parts = (_head, _settings, _results, _image_summary, _images, _points_summary, _points)
+    return {
+        "images.csv": _table_of_images(outcome),
+        "points.csv": _table_of_points(outcome),
+        "residuals.csv": _table_of_residuals(outcome),
+        "bundleout.txt": "".join(f"{line}\n" for part in parts for line in part(outcome)).encode(),
+    }
+
+
+def _rms(residuals: Floats) -> Floats:
+    """Return (3,) root mean squares of (n, 2) residuals: of samples, of lines, of both; NaN without any."""
+    if not len(residuals):
+        return np.full(3, np.nan)
+    squares = (residuals**2).mean(axis=0)
+    return np.sqrt([squares[0], squares[1], squares.mean()])
+
+
+def _apriori(own: Parameter) -> str:
+    """Return a standard deviation a priori as jigsaw has it: FREE, N/A where it is known, or a number."""
+    return "N/A" if own.apriori == 0 else repr(own.apriori) if np.isfinite(own.apriori) else "FREE"
+
+
+def _table(heads: Sequence[Sequence[str]], columns: Sequence[Any]) -> bytes:
+    """Return a table with a header of several lines; `heads` are those of each column."""
+    lines = [",".join(line) for line in zip(*heads, strict=True)]
+    _, rows = csv_text({str(k): column for k, column in enumerate(columns)}).split(b"\n", 1)
+    return ("\n".join(lines) + "\n").encode() + rows
+
+
+def _table_of_images(outcome: Outcome) -> bytes:
+    used = outcome.result.used_images
+    trajectories = outcome.result.trajectories
+    found = {
+        image: {
+            (each.name, each.power): each
+            for each in parameters(image, trajectories[image.solving.trajectory.name])
+        }
+        for image in outcome.contents.different
+        if image.solving.trajectory.name in trajectories
+    }
+    # Held images have fewer coefficients.
+    names = max((list(own) for own in found.values()), key=len)
+    rows = []
+    for image, own in found.items():
+        mine = outcome.rows[image]
+        cells = [str(image.path), *_rms(outcome.residuals[mine[used[mine]]]).tolist()]
+        rows.append(cells + [cell for name in names for cell in _cells(own.get(name))])
+    heads = [("Image", "Filename"), *(("rms", f"{what} res") for what in ("sample", "line", "total"))]
+    heads += [(f"{name}(t{power})", what) for name, power in names for what in _CELLS]
+    return _table(heads, list(zip(*rows, strict=True)))
+
+
+def _cells(own: Parameter | None) -> list[Any]:
+    """Return the cells of a coefficient; empty ones where an image has none."""
+    if own is None:
+        return [None] * len(_CELLS)
+    adjusted = "N/A" if own.apriori == 0 else repr(own.adjusted)
+    return [own.initial, own.correction, own.final, _apriori(own), adjusted]
+
+
+def _table_of_points(outcome: Outcome) -> bytes:
+    network, block = outcome.contents.network, outcome.result.block
+    used = np.flatnonzero(outcome.result.used_points)
+    rows = outcome.point_rows[used]
+    rejected = np.bincount(network.point_of_measure[outcome.rejected], minlength=len(network.points))
+    taken = block.image_points[outcome.result.used_images]
+    places = outcome.latitudes[used]
+    columns = [
+        [network.points.ids[row] for row in rows.tolist()],
+        [POINT_TYPES[code].upper() for code in network.points.types[rows].tolist()],
+        np.bincount(taken, minlength=len(block.point_ids))[used],
+        rejected[rows],
+        outcome.point_rms[used],
+        *np.rad2deg(places[:, :2]).T,
+        places[:, 2] / KM,
+        *outcome.local_sigmas[used].T,
+        *outcome.corrections[used].T,
+        *(outcome.xyz[used] / KM).T,
+        *np.sqrt(np.maximum(np.einsum("nkk->nk", outcome.covariances[used]), 0.0)).T,
+    ]
+    return _table(_POINT_HEADS, columns)
+
+
+def _table_of_residuals(outcome: Outcome) -> bytes:
+    """Return measures that took part, then those that were rejected, which have no residuals."""
+    network, images = outcome.contents.network, {each.serial: each for each in outcome.contents.different}
+    measures, used = network.measures, outcome.result.used_images
+    rejected = np.flatnonzero(outcome.rejected)
+    rows = np.concatenate([outcome.measure_rows[used], rejected])
+    serials = [measures.serials[row] for row in measures.serial[rows].tolist()]
+    found = np.column_stack([outcome.focal, outcome.residuals])[used]
+    found = np.vstack([found, np.full((len(rejected), 4), np.nan)])
+    columns = [
+        [network.points.ids[row] for row in network.point_of_measure[rows].tolist()],
+        [str(images[serial].path) for serial in serials],
+        serials,
+        *found[:, :2].T,
+        measures.sample[rows],
+        measures.line[rows],
+        *found[:, 2:].T,
+        np.hypot(*found[:, 2:].T),
+        [""] * (len(rows) - len(rejected)) + ["*"] * len(rejected),
+    ]
+    return _table(_RESIDUAL_HEADS, columns)
+
+
+def _title(text: str) -> list[str]:
+    return ["", text, "=" * len(text), ""]
+
+
+def _facts(facts: Mapping[str, object]) -> list[str]:
+    return [f"{name:>40}: {value}" for name, value in facts.items()]
+
+
+def _head(outcome: Outcome) -> Iterator[str]:
+    network = outcome.contents.network
+    yield from _title("JIGSAW: BUNDLE ADJUSTMENT")
+    yield from _facts(
+        {
+            "Network Id": network.network_id or "",
+            "Network Filename": outcome.contents.path,
+            "Network Description": network.description or "",
+            "Target": network.target or "",
+            "Linear Units": "kilometers",
+            "Angular Units": "decimal degrees",
+        }
+    )
+
+
+def _settings(outcome: Outcome) -> Iterator[str]:
+    yield from _title("INPUT: SETTINGS")
+    yield from _facts({name: _setting(outcome.contents.settings, name) for name in PARAMETERS})
+
+
+def _setting(settings: Settings, name: str) -> str:
+    """Return the value of a setting as jigsaw is told it."""
+    parameter = PARAMETERS[name]
+    value = getattr(settings, parameter.field)
+    if parameter.place is not None:
+        value = value[parameter.place]
+    if isinstance(value, bool):
+        return "YES" if value else "NO"
+    if parameter.field == "positions" and value == "first":
+        return "POSITION"
+    return "NONE" if value is None else _WORDS.get(value, str(value).upper())
+
+
+def _results(outcome: Outcome) -> Iterator[str]:
+    result, network = outcome.result, outcome.contents.network
+    used, rejected = int(result.used_images.sum()), int(outcome.rejected.sum())
+    coefficients = [each.given.coefficients for each in result.trajectories.values()]
+    given = [each.deviations for own in coefficients for part in own for each in part]
+    sd = np.concatenate([np.zeros(0), *given])
+    points = result.block.point_sd[result.used_points]
+    weighted = int(((points > 0) & np.isfinite(points)).sum()) + 3 * len(result.block.observations)
+    variance = result.variance_of_unit_weight
+    yield from _title("JIGSAW: RESULTS")
+    yield from _facts(
+        {
+            "Images": len(outcome.contents.different),
+            "Points": int(result.used_points.sum()),
+            "Total Measures": used + rejected,
+            "Total Observations": 2 * (used + rejected),
+            "Good Observations": 2 * used,
+            "Rejected Observations": 2 * rejected,
+            "Constrained Point Parameters": weighted,
+            "Constrained Image Parameters": int(((sd > 0) & np.isfinite(sd)).sum()),
+            "Unknowns": int((sd > 0).sum() + (points > 0).sum()),
+            "Degrees of Freedom": f"{result.degrees_of_freedom:g}",
+            "Iterations": len(result.iterations),
+            "Status": result.status,
+            "Sigma0": "N/A" if variance is None else f"{np.sqrt(variance):.10f}",
+            "Ignored Points": int(network.points.ignore.sum()),
+        }
+    )
+
+
+def _image_summary(outcome: Outcome) -> Iterator[str]:
+    used = outcome.result.used_images
+    yield from _title("IMAGE MEASURES SUMMARY")
+    yield f"{'Measures':>9}{'rms sample':>14}{'rms line':>14}{'rms':>14}  Image Serial Number"
+    for image in outcome.contents.different:
+        mine = outcome.rows[image][used[outcome.rows[image]]]
+        sizes = "".join(f"{each:14.6f}" for each in _rms(outcome.residuals[mine]))
+        yield f"{len(mine):9d}{sizes}  {image.serial}"
+
+
+def _images(outcome: Outcome) -> Iterator[str]:
+    yield from _title("IMAGE EXTERIOR ORIENTATION")
+    trajectories = outcome.result.trajectories
+    for image in outcome.contents.different:
+        yield f"Image Full File Name: {image.path}"
+        yield f"Image Serial Number: {image.serial}"
+        yield _PARAMETER.format("Image", "", "Initial", "Total", "Final", "Initial", "Final")
+        yield _PARAMETER.format("", "", "Value", "Correction", "Value", "Accuracy", "Accuracy")
+        for own in parameters(image, trajectories[image.solving.trajectory.name]):
+            unit = own.unit if own.power == 0 else f"{own.unit}/t^{own.power}"
+            values = [f"{value:.10f}" for value in (own.initial, own.correction, own.final)]
+            sigma = "N/A" if own.apriori == 0 else f"{own.adjusted:.10f}"
+            yield _PARAMETER.format(own.name, f"({unit})", *values, _apriori(own), sigma)
+        yield ""
+
+
+def _points_summary(outcome: Outcome) -> Iterator[str]:
+    yield from _title("POINTS SUMMARY")
+    yield (
+        f"{'Label':<32}{'Status':>12}{'Rays':>6}{'RMS':>12}{'Latitude':>16}{'Longitude':>16}{'Radius':>16}"
+        f"{'Sigma lat':>14}{'Sigma lon':>14}{'Sigma rad':>14}"
+    )
+    yield f"{'':<66}{'(dd)':>12}{'(dd)':>16}{'(km)':>16}{'(m)':>14}{'(m)':>14}{'(m)':>14}"
+    for name, status, row in _rows_of_points(outcome):
+        latitude, longitude, radius = outcome.latitudes[row]
+        sigmas = "".join(f"{each:14.6f}" for each in outcome.local_sigmas[row])
+        yield (
+            f"{name:<32}{status:>12}{outcome.result.point_rays[row]:6d}{outcome.point_rms[row]:12.6f}"
+            f"{np.rad2deg(latitude):16.10f}{np.rad2deg(longitude):16.10f}{radius / KM:16.8f}{sigmas}"
+        )
+
+
+def _rows_of_points(outcome: Outcome) -> Iterator[tuple[str, str, int]]:
+    """Yield name, status and row of the points that took part."""
+    types = outcome.contents.network.points.types
+    for row in np.flatnonzero(outcome.result.used_points).tolist():
+        status = POINT_TYPES[types[outcome.point_rows[row]]].upper()
+        yield outcome.result.block.point_ids[row], status, row
+
+
+def _points(outcome: Outcome) -> Iterator[str]:
+    yield from _title("POINTS DETAIL")
+    units = np.array([np.rad2deg(1.0), np.rad2deg(1.0), 1 / KM])
+    for name, status, row in _rows_of_points(outcome):
+        yield f"Label: {name}"
+        yield f"Status: {status}"
+        yield f"Rays: {outcome.result.point_rays[row]}"
+        yield f"{'':>14}{'Initial':>20}{'Correction (m)':>18}{'Final':>20}{'Sigma (m)':>16}"
+        before, after = outcome.before[row] * units, outcome.latitudes[row] * units
+        columns = (before, outcome.corrections[row], after, outcome.local_sigmas[row])
+        for axis, *own in zip(_AXES, *columns, strict=True):
+            yield "{:>14}{:20.10f}{:18.6f}{:20.10f}{:16.8f}".format(axis.upper(), *own)
+        yield ""
