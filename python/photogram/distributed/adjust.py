@@ -53,6 +53,7 @@ from photogram.network.datum import (
     check_datum,
 )
 from photogram.network.films import Scan
+from photogram.results.block_files import STANDS
 from photogram.results.result import Result
 
 __all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
