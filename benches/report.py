@@ -65,8 +65,8 @@ def measured(size: str, points: float, maps: bool, into: Path) -> Iterator[tuple
 def pictures(result: Result, into: Path, size: str) -> Iterator[list[str]]:
     """Give name, time and size of each picture as a PNG file, and of the same in the report."""
     from photogram.plots import figures
-    from photogram.results.page.pictures import drawings
-    from photogram.show.inline import inlined
+    from photogram.results.page.network import drawings
+    from photogram.show.html import inlined
     from photogram.show.pictures import files
 
     for name, drawing in drawings(result).items():

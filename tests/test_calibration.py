@@ -9,8 +9,7 @@ from example_scripts import load
 from photogram import Block, Camera, adjust
 from photogram.network.geometry import project
 from photogram.results.calibration import calibrations
-from photogram.results.distortion import distortion_curve
-from photogram.results.lens_field import lens_field
+from photogram.results.distortion import distortion_curve, lens_field
 from shared_data import SHARED
 
 FREE = np.inf

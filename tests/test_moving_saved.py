@@ -91,7 +91,7 @@ def test_columns_of_scanners_say_what_they_are(tmp_path):
 
 
 def test_damaged_coefficients_are_refused(tmp_path):
-    from photogram.results.trajectory_files import KeptTrajectory
+    from photogram.results.block_files import KeptTrajectory
 
     own = scanned().trajectories[0]
     kept = KeptTrajectory.of(own)

@@ -56,8 +56,7 @@ if TYPE_CHECKING:
     from photogram.results.model_tests import compare, score_test, terms_test
     from photogram.results.result import Result
     from photogram.results.snooping_result import Snooped
-    from photogram.results.statement.making import statement
-    from photogram.results.statement.statement import Statement
+    from photogram.results.statement.statement import Statement, statement
     from photogram.results.variance_function import VarianceFunction
     from photogram.stellar.cameras import camera_from
 
@@ -158,7 +157,7 @@ _HOMES = {
     "Simulation": "network.simulation",
     "Snooped": "results.snooping_result",
     "Statement": "results.statement.statement",
-    "statement": "results.statement.making",
+    "statement": "results.statement.statement",
     "Spheroid": "network.geometry",
     "__version__": "_photocore",
     "adjust": "adjustment.adjustment",

@@ -21,9 +21,9 @@ from photogram.results import datum as datums
 from photogram.results import patterns
 from photogram.results.features import KINDS as FORMS
 from photogram.results.features_report import through
+from photogram.results.findings import PLURALS
 from photogram.results.fixed_tests import HELD
 from photogram.results.group_sums import observables
-from photogram.results.group_tests import PLURALS
 from photogram.results.result import adjusted
 from photogram.results.statement import sources, translation
 from photogram.results.statement.texts import LANGUAGES, Texts, table_of

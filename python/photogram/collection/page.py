@@ -6,8 +6,7 @@ import numpy as np
 
 from photogram.collection.report import size_of
 from photogram.collection.result import AdjustedCollection
-from photogram.results.page.parts import network_page, size_section
-from photogram.results.page.pictures import drawings
+from photogram.results.page.network import drawings, network_page, size_section
 from photogram.results.page.tables import control_section, stations_section
 from photogram.show.methods import page_of
 from photogram.show.page import Fact, Page, Section, significant

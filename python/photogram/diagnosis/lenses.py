@@ -14,7 +14,7 @@ from photogram.diagnosis.findings import Finding
 from photogram.diagnosis.trials import put_right
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.results.lenses import usual_parameters
+from photogram.results.fixed_tests import usual_parameters
 from photogram.results.result import Result
 from photogram.show.methods import findings_of
 from photogram.statistics.evidence import Evidence

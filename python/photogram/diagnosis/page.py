@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import Any
 
 from photogram.diagnosis.findings import Diagnosis, Figure, Finding, Listing, Names, Section
-from photogram.results.page.pictures import drawings
+from photogram.results.page.network import drawings
 from photogram.show.judgement import judged, verdict_table
 from photogram.show.methods import page_of
 from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text

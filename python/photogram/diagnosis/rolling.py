@@ -22,9 +22,8 @@ from photogram.network.block import Block
 from photogram.network.motion import timed_photos
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
-from photogram.results.fixed_tests import as_adjusted, is_suspected, station_partials
+from photogram.results.fixed_tests import as_adjusted, is_suspected, lens_partials, station_partials
 from photogram.results.group_sums import factored
-from photogram.results.lenses import lens_partials
 from photogram.results.result import Result
 from photogram.results.scores import Scores
 from photogram.statistics.limits import externally_studentized

@@ -53,8 +53,8 @@ from photogram.network.datum import (
     check_datum,
 )
 from photogram.network.films import Scan
+from photogram.results.block_files import STANDS
 from photogram.results.result import Result
-from photogram.results.trajectory_files import STANDS
 
 __all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
 

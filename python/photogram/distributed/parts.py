@@ -27,7 +27,7 @@ from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
 from photogram.network.subset import IMAGES, PHOTOS
 from photogram.network.unknowns import Unknown
-from photogram.results.trajectory_files import CLASSES, STANDS
+from photogram.results.block_files import CLASSES, STANDS
 
 __all__ = [
     "IN_TABLES",

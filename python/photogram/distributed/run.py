@@ -33,8 +33,8 @@ from photogram.network.observations import Observation
 from photogram.network.observations.photos import with_epochs
 from photogram.network.trajectories import Spline, Trajectory
 from photogram.network.unknowns import Unknown
+from photogram.results.block_files import KeptTrajectory
 from photogram.results.iteration import Iteration
-from photogram.results.trajectory_files import KeptTrajectory
 
 __all__ = [
     "Course",

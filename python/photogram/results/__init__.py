@@ -5,7 +5,7 @@ WAYS = {
     "columns_of": ("tables",),
     "document_of": ("document",),
     "files_of": ("block_files",),
-    "findings_of": ("findings", "snooping_verdict"),
+    "findings_of": ("findings", "snooping_result"),
     "page_of": {
         "Result": ("page.block",),
         "Snooped": ("page.snooping",),
@@ -13,7 +13,7 @@ WAYS = {
     },
     "pictured": ("picture_data",),
     "report_of": ("report",),
-    "statement_of": ("statement.making",),
+    "statement_of": ("statement.statement",),
     "terms_of": ("tables",),
 }
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.io.parquet import Column, Repeated, Sheet
+from photogram.io.structure import Stand
 from photogram.io.writing import Content
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, Undetermined
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -18,11 +22,23 @@ from photogram.network.core_arrays import CoreOptions
 from photogram.network.films import Film, Pattern, Readings, Reseau
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
+from photogram.network.lens import Lens
 from photogram.network.motion import scanners
+from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
 from photogram.network.rigs import Mount
+from photogram.network.trajectories import (
+    Angles,
+    Basis,
+    Coefficient,
+    Polynomial,
+    PositionAxes,
+    Spline,
+    Table,
+    Trajectory,
+)
 from photogram.network.unknowns import Unknown
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.datum import ResultDatum
@@ -43,11 +59,10 @@ from photogram.results.result_files import (
     written,
 )
 from photogram.results.tables import TABLES
-from photogram.results.trajectory_files import CLASSES, STANDS
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.methods import files_of
 
-__all__ = ["KIND", "block_files", "read_block_result"]
+__all__ = ["CLASSES", "KIND", "STANDS", "KeptTrajectory", "block_files", "read_block_result"]
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
@@ -118,18 +133,11 @@ def block_files(result: Result) -> dict[str, Content]:
         "datum": str(result.datum),
         "degrees_of_freedom": result.degrees_of_freedom,
     }
-    parts = _parts(block, result)
-    return written(result, KIND, "block", parts, leading, tables, block.frame, summary, STANDS)
+    return written(result, KIND, "block", _parts(block), leading, tables, block.frame, summary, STANDS)
 
 
 def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
-    """Return the result of a block that a folder keeps.
-
-    Raises
-    ------
-    InputError
-        Files that are missing, damaged or contradict each other.
-    """
+    """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
     saved = read_saved(
         folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
     )
@@ -138,7 +146,9 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     for kind in ("photo", "point"):
         sheet = saved.sheets[f"{kind}s"]
         own = sheet.names(kind)
-        names[kind] = own.names if (own.rows == np.arange(len(own))).all() else _spelt(own)
+        names[kind] = (
+            own.names if (own.rows == np.arange(len(own))).all() else [own.names[k] for k in own.rows]
+        )
         given[f"{kind}_ids"] = names[kind]
         given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
     parts = _parts_of(
@@ -158,7 +168,7 @@ def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
     return Result(**members, **own_arrays, block=block, state=saved.state())
 
 
-def _parts(block: Block, result: Result) -> dict[str, list[Part]]:
+def _parts(block: Block) -> dict[str, list[Part]]:
     observed = [
         name for name in ("positions", "attitudes") if getattr(block, f"photo_{name}_observed") is not None
     ]
@@ -238,12 +248,56 @@ def _camera_column(block: Block) -> list[Column]:
     return [Column("camera", Repeated(names, block.photo_cameras), "", "name of the camera")]
 
 
-def _spelt(column: Repeated) -> list[str]:
-    return [column.names[row] for row in column.rows.tolist()]
-
-
 def _below(base: type) -> Iterator[type]:
     subclasses: list[type] = base.__subclasses__()
     for each in subclasses:
         yield each
         yield from _below(each)
+
+
+@dataclass(frozen=True, eq=False)
+class KeptTrajectory(Stand):
+    """What stands for a trajectory: what makes it, and the coefficients that it has made.
+
+    A trajectory that is made again has coefficients of its own, and is given back those that others share.
+    """
+
+    name: str
+    table: Table
+    position: Basis | None
+    rotation: Basis | None
+    body: tuple[Floats, Floats] | None
+    position_axes: PositionAxes
+    angles: Angles
+    coefficients: tuple[tuple[Coefficient, ...], tuple[Coefficient, ...]]
+
+    @classmethod
+    def of(cls, given: Any) -> KeptTrajectory:
+        """Return what stands for a trajectory."""
+        own = (given.name, given.table, given.position, given.rotation, given.body)
+        return cls(*own, given.position_axes, given.angles, given.coefficients)
+
+    def original(self) -> Trajectory:
+        """Return the trajectory.
+
+        Raises
+        ------
+        InputError
+            Others than its coefficients.
+        """
+        own_parts = (self.table, self.position, self.rotation, self.body)
+        made = Trajectory(self.name, *own_parts, self.position_axes, self.angles)
+        own, kept = (
+            [[each.title for each in part] for part in both]
+            for both in (made.coefficients, self.coefficients)
+        )
+        if own != kept:
+            raise InputError(f"the trajectory {self.name} has not the coefficients that stand with it")
+        object.__setattr__(made, "coefficients", self.coefficients)
+        return made
+
+
+CLASSES = (KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed)
+"""Classes that a document of a block with trajectories may name."""
+STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
+"""What is written in the place of others."""

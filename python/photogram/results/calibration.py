@@ -17,12 +17,13 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.block import ATTITUDE_COLUMNS, position_columns
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.distortion import INTERIOR
 from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
 from photogram.results.result import Result
+from photogram.results.scores import quadratic
+from photogram.results.selection import photo_components
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 
@@ -129,6 +130,11 @@ class GroupTest:
     def significant(self) -> bool:
         """Whether they differ from zero at the level of 5 percent."""
         return self.probability < LEVEL
+
+    @property
+    def outcome(self) -> str:
+        """The same in words."""
+        return "significant" if self.significant else "not significant"
 
 
 @dataclass(frozen=True)
@@ -252,16 +258,12 @@ def _calibration(result: Result, camera: AdjustedCamera, covariances: Covariance
     return Calibration(camera, parameters, groups, correlations, poses, terms, _removable(parameters))
 
 
-def _a_posteriori(result: Result) -> bool:
-    return result.unit_variance != "unity" and result.variance_of_unit_weight is not None
-
-
 def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
     name, given = camera.names[k], float(camera.given.values[k])
     value, sd = float(camera.values[k]), float(camera.sd[k])
     reference = given if name in INTERIOR else 0.0
     t = (value - reference) / sd if sd > 0 else math.nan
-    freedom = float(result.degrees_of_freedom) if _a_posteriori(result) else math.inf
+    freedom = result.freedom_of_scale
     probability = math.erfc(abs(t) / math.sqrt(2)) if math.isinf(freedom) else _photocore.student(t, freedom)
     own = camera.information[k] * camera.cofactors[k, k]
     return ParameterTest(
@@ -281,15 +283,10 @@ def _parameter(result: Result, camera: AdjustedCamera, k: int) -> ParameterTest:
 
 def _group(result: Result, camera: AdjustedCamera, names: tuple[str, ...]) -> GroupTest:
     rows = [camera.names.index(name) for name in names]
-    p, q = camera.values[rows], camera.covariance[np.ix_(rows, rows)]
-    scale = np.sqrt(np.diag(q))
-    whitened = np.linalg.solve(q / np.outer(scale, scale), p / scale)
-    value = float(p / scale @ whitened) / len(rows)
-    if _a_posteriori(result):
-        probability = _photocore.fisher(value, len(rows), result.degrees_of_freedom)
-    else:
-        probability = _photocore.chi_square(value * len(rows), len(rows))
-    return GroupTest(names, value, probability)
+    value = quadratic(camera.covariance[np.ix_(rows, rows)], camera.values[rows]) / len(rows)
+    if math.isinf(result.freedom_of_scale):
+        return GroupTest(names, value, _photocore.chi_square(value * len(rows), len(rows)))
+    return GroupTest(names, value, _photocore.fisher(value, len(rows), result.degrees_of_freedom))
 
 
 def _families(camera: AdjustedCamera) -> list[tuple[str, ...]]:
@@ -325,16 +322,15 @@ def _poses(result: Result, camera: AdjustedCamera, covariances: Covariances) -> 
     with np.errstate(invalid="ignore", divide="ignore"):
         table = np.abs(found / np.outer(camera.sd[rows], result.photo_sd.ravel()))
     table = table.reshape(len(rows), -1, 6)
-    components = [*position_columns(result.block), *ATTITUDE_COLUMNS]
     pairs = []
     for row, k in zip(table, rows, strict=True):
-        for column, component in enumerate(components):
+        for column, component in enumerate(photo_components(result.block)):
             order = np.argsort(-np.nan_to_num(row[:, column]), kind="stable")
             above = order[np.nan_to_num(row[order, column]) > CORRELATED]
             if above.size:
                 photos = tuple(result.block.photo_ids[photo] for photo in above.tolist())
-                name = component.removesuffix("_deg")
-                pairs.append(PoseCorrelation(camera.names[k], name, photos, float(row[above[0], column])))
+                largest = float(row[above[0], column])
+                pairs.append(PoseCorrelation(camera.names[k], component, photos, largest))
     return tuple(sorted(pairs, key=lambda pair: -pair.coefficient))
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from photogram.plots.distortion import draw_curves, rows_of
 from photogram.plots.panels import Where, handed_out, panels, placed
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.distortion import DistortionCurve, distortion_curve
-from photogram.results.lens_field import LensField, lens_field
+from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.picture_data import curves_of
 from photogram.results.result import Result
 from photogram.show.pictures import arrows, round_length

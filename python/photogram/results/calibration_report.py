@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from photogram.network.cameras import Camera
 from photogram.results.calibration import Calibration, ParameterTest, calibrations
-from photogram.results.distortion import DistortionCurve, distortion_curve
-from photogram.results.lens_field import LensField, lens_field
+from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.result import Result
+from photogram.show.quantity import members
 from photogram.show.sections import Section
 
-__all__ = ["calibration_members", "calibration_sections", "outcome"]
+__all__ = ["calibration_members", "calibration_sections", "law_of", "outcome", "values_written"]
 
 LISTED = 20
 """Cameras that a report describes in full; the table of cameras and the JSON document have all."""
@@ -55,9 +56,18 @@ def _section(result: Result, found: Calibration) -> Section:
     return f"Calibration of {camera.name}", [*lines, *([""] if remarks else []), *remarks]
 
 
+def law_of(result: Result) -> str:
+    """Return the distribution of the tests of parameters."""
+    return "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
+
+
+def values_written(camera: Camera) -> str:
+    """Return the parameters of a camera that are not zero."""
+    return ", ".join(f"{name} {value:.8g}" for name, value in camera.parameters.items() if value != 0)
+
+
 def _parameter_lines(result: Result, found: Calibration) -> list[str]:
-    law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
-    heads = ("value", "sd", "change", f"t ({law})", "probability", "R", "redundancy", "gain")
+    heads = ("value", "sd", "change", f"t ({law_of(result)})", "probability", "R", "redundancy", "gain")
     lines = [f"{'parameter':<16}" + "".join(f"{head:>15}" for head in heads) + "  verdict"]
     for each in found.parameters:
         name = f"{each.name} {each.unit}".strip()
@@ -92,8 +102,7 @@ def _group_lines(found: Calibration) -> list[str]:
         return []
     lines = ["", f"{'terms together':<31}{'F':>15}{'probability':>15}"]
     return lines + [
-        f"{', '.join(each.names):<31}{each.test_value:>15.2f}{each.probability:>15.4f}"
-        f"  {'significant' if each.significant else 'not significant'}"
+        f"{', '.join(each.names):<31}{each.test_value:>15.2f}{each.probability:>15.4f}  {each.outcome}"
         for each in found.groups
     ]
 
@@ -128,16 +137,9 @@ def _curve_lines(curve: DistortionCurve, unit: str) -> list[str]:
     ]
     inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
     for k in np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int)).tolist():
-        values = (
-            curve.values[k],
-            curve.sd[k],
-            curve.sd_mapping[k],
-            curve.balanced[k],
-            curve.sd_balanced[k],
-        )
-        lines.append(
-            f"{curve.radii[k]:>15.4f}" + "".join(f"{factor * float(value):>15.3f}" for value in values)
-        )
+        columns = (curve.values, curve.sd, curve.sd_mapping, curve.balanced, curve.sd_balanced)
+        cells = "".join(f"{factor * float(column[k]):>15.3f}" for column in columns)
+        lines.append(f"{curve.radii[k]:>15.4f}{cells}")
     return lines
 
 
@@ -159,54 +161,28 @@ def calibration_members(result: Result) -> list[dict[str, Any]]:
 
 def _member(result: Result, found: Calibration) -> dict[str, Any]:
     curve, field = distortion_curve(result, found.camera), lens_field(result, found.camera)
+    tested = ("test_value", "probability", "significant")
     return {
         "camera": found.camera.name,
-        "parameters": [_members(each, _PARAMETER) for each in found.parameters],
-        "groups": [_members(each, ("names", *_TESTED)) for each in found.groups],
+        "parameters": [
+            members(each, "name", "unit", "value", "sd", "change", *tested)
+            | members(each, "multiple_correlation", "from_prior", "gain")
+            for each in found.parameters
+        ],
+        "groups": [members(each, "names", *tested) for each in found.groups],
         "correlations": [vars(each) for each in found.correlations],
         "pose_correlations": [vars(each) for each in found.poses],
         "terms": [
-            _members(each, ("names", "statistic", "probability", "worth_keeping"))
-            | {"largest_effect_sd": each.effect}
+            members(each, "names", "statistic", "probability", "worth_keeping", largest_effect_sd="effect")
             for each in found.terms
         ],
         "removable": found.removable,
         "remarks": found.remarks(),
-        "distortion": None if curve is None else _curve_member(curve),
-        "field": None if field is None else _field_member(field),
-    }
-
-
-_TESTED = ("test_value", "probability", "significant")
-_PARAMETER = (
-    *("name", "unit", "value", "sd", "change", *_TESTED),
-    *("multiple_correlation", "from_prior", "gain"),
-)
-
-
-def _members(each: object, names: Sequence[str]) -> dict[str, Any]:
-    return {name: getattr(each, name) for name in names}
-
-
-def _field_member(field: LensField) -> dict[str, Any]:
-    return {
-        "terms": list(field.names),
-        "position": field.positions.tolist(),
-        "vector": field.vectors.tolist(),
-        "covariance": field.covariances.tolist(),
-    }
-
-
-def _curve_member(curve: DistortionCurve) -> dict[str, Any]:
-    return {
-        "direction": curve.direction,
-        "observed_radius": curve.observed,
-        "balanced_at": curve.balanced_at,
-        "balanced_distance": curve.balanced_distance,
-        "radius": curve.radii.tolist(),
-        "distortion": curve.values.tolist(),
-        "sd": curve.sd.tolist(),
-        "sd_of_mapping": curve.sd_mapping.tolist(),
-        "balanced": curve.balanced.tolist(),
-        "balanced_sd": curve.sd_balanced.tolist(),
+        "distortion": curve
+        and members(curve, "direction", observed_radius="observed")
+        | members(curve, "balanced_at", "balanced_distance", radius="radii", distortion="values")
+        | members(curve, "sd", sd_of_mapping="sd_mapping")
+        | members(curve, "balanced", balanced_sd="sd_balanced"),
+        "field": field
+        and members(field, terms="names", position="positions", vector="vectors", covariance="covariances"),
     }

@@ -80,18 +80,10 @@ def check_points(
 ) -> CheckPoints:
     """Return the check points of an adjusted block with their tests.
 
-    Parameters
-    ----------
-    network, block
-        The result, and what was adjusted.
-    differences, kinds
-        (n, 3) adjusted minus given coordinates, and (n,) kinds of all points.
-    second
-        Degrees of freedom with which the variance of unit weight was estimated; infinite where it is known.
-    untested
-        Why nothing is tested.
-    whole
-        Whether the normal equations may be asked for the covariances of points with each other.
+    `differences` are (n, 3) adjusted minus given coordinates, `kinds` (n,) those of all points; `second` are
+    the degrees of freedom with which the variance of unit weight was estimated, infinite where it is known;
+    `untested` says why nothing is tested, `whole` whether the normal equations may be asked for the
+    covariances of points with each other.
     """
     rows = np.flatnonzero(network.used_points & (kinds == "check"))
     given, assumed = _given(block, rows, differences[rows])
@@ -124,7 +116,7 @@ def _agreement(
         found.differences,
         network.point_cofactors[found.rows],
         survey,
-        name=partial(_named, found.names),
+        name=lambda place: found.names[place[0]],
         apart=partial(_apart, found.differences, point_axes(block)),
     )
     if not whole:
@@ -156,10 +148,6 @@ def point_kinds(block: Block) -> NDArray[np.str_]:
     held = np.isfinite(block.point_sd).any(axis=1)
     known = np.isfinite(block.point_positions).any(axis=1)
     return np.where(held, "control", np.where(known, "check", "pass"))
-
-
-def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:
-    return names[place[0]]
 
 
 def _apart(differences: Floats, axes: tuple[Axis, ...], place: tuple[int, ...], sd: Floats) -> str:

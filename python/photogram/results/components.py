@@ -21,13 +21,7 @@ if TYPE_CHECKING:
 
     from photogram.plots.panels import Where
 
-__all__ = [
-    "VarianceComponents",
-    "component_lines",
-    "component_sections",
-    "statement",
-    "statement_lines",
-]
+__all__ = ["VarianceComponents", "component_lines", "component_sections", "statement", "statement_lines"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,28 +132,20 @@ def _columns(found: VarianceComponents, what: str) -> dict[str, Any]:
 def _document(found: VarianceComponents) -> bytes:
     """Return the components as JSON (UTF-8)."""
     estimate = found.estimate
-    columns = _columns(found, "component")
-    names = list(columns)
-    equality = estimate.equality
+    columns, equality = _columns(found, "component"), estimate.equality
+    rows = zip(*columns.values(), strict=True)
+    of_equality = ("likelihood_ratio", "degrees_of_freedom", "probability")
+    of_step = ("factors", "squares", "redundancy")
     return json.to_json(
         {
             "program": f"photogram {_photocore.__version__}",
             "verdict": found.verdict.document(),
             "converged": estimate.converged,
             "level": estimate.level,
-            "components": [dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)],
-            "helmert_matrix": estimate.matrix.tolist(),
-            "all_equal": None
-            if equality is None
-            else {
-                "likelihood_ratio": equality[0],
-                "degrees_of_freedom": equality[1],
-                "probability": equality[2],
-            },
-            "steps": [
-                {"factors": factors.tolist(), "squares": squares.tolist(), "redundancy": redundancy.tolist()}
-                for factors, squares, redundancy in estimate.steps
-            ],
+            "components": [dict(zip(columns, row, strict=True)) for row in rows],
+            "helmert_matrix": estimate.matrix,
+            "all_equal": equality and dict(zip(of_equality, equality, strict=True)),
+            "steps": [dict(zip(of_step, step, strict=True)) for step in estimate.steps],
             "messages": estimate.messages,
         }
     )

@@ -13,7 +13,7 @@ from photogram.network.trajectories import Basis, Coefficient, Polynomial, Traje
 from photogram.results.result import Result
 from photogram.results.trajectories import corrections
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.quantity import Axis, Quantity
+from photogram.show.quantity import Axis, Quantity, of_each
 
 __all__ = ["POSES", "Course", "courses", "courses_table", "notable", "notable_courses"]
 
@@ -124,27 +124,17 @@ def courses_table(every: Sequence[Course], linear_unit: str) -> list[Quantity]:
     axes = (Axis.of("position", linear_unit), Axis.turned("rotation"))
     of = np.array([("position", "rotation").index(each.what) for each in every], dtype=np.int64)
 
-    def names(attribute: str, head: str) -> Quantity:
-        return Quantity(
-            np.array([getattr(each, attribute) for each in every], object), kind="name", head=head
-        )
-
-    def numbers(attribute: str, head: str, decimals: int) -> Quantity:
-        values = np.array([getattr(each, attribute) for each in every], dtype=float)
-        return Quantity(values, head=head, decimals=decimals, label=attribute)
-
-    largest = np.array([each.largest for each in every], dtype=float)
-    components = np.array([axes[k].name for k in of], dtype=object)
+    numbers = (("count", "Coefficients", 0), ("first", "From s", 3), ("last", "To s", 3))
     return [
-        names("trajectory", "Trajectory"),
-        Quantity(components, axes, "name", head="Of", of=of),
-        names("basis", "Basis"),
-        numbers("count", "Coefficients", 0),
-        numbers("first", "From s", 3),
-        numbers("last", "To s", 3),
-        Quantity(largest, axes, "deviation", head="Largest correction", figures=4, of=of, label="largest"),
-        numbers("at", "At s", 3),
-        numbers("tested", "Largest |w|", 2),
+        of_each(every, "trajectory", kind="name", head="Trajectory"),
+        Quantity(np.array([axes[k].name for k in of], dtype=object), axes, "name", head="Of", of=of),
+        of_each(every, "basis", kind="name", head="Basis"),
+        *(of_each(every, name, head=head, decimals=count, label=name) for name, head, count in numbers),
+        of_each(
+            every, "largest", axes, "deviation", head="Largest correction", figures=4, of=of, label="largest"
+        ),
+        of_each(every, "at", head="At s", decimals=3, label="at"),
+        of_each(every, "tested", head="Largest |w|", decimals=2, label="tested"),
     ]
 
 

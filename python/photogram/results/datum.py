@@ -10,11 +10,12 @@ import numpy as np
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, listed
-from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
+from photogram.messages import Message, counted, listed
+from photogram.network.block import ATTITUDE_COLUMNS, Block
 from photogram.network.datum import DatumRow, InnerConstraints
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
 from photogram.results.covariance import Failure
+from photogram.results.selection import photo_components
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockNetwork, BlockSolution
@@ -59,20 +60,12 @@ class ResultDatum:
     """As the core knows it."""
 
     def __str__(self) -> str:
-        counts = [
-            f"{len(names)} {kind}{'s' if len(names) != 1 else ''}"
-            for kind, names in (
-                ("point", self.points),
-                ("photo", self.photos),
-                ("attitude", self.attitudes),
-            )
-            if names
-        ]
         if self.kind == "minimum constraints":
             return f"minimum constraints: held are {held_lines(self.held)}"
         if self.kind == "inner constraints":
-            scale = ", scale included" if self.scale else ""
-            return f"inner constraints over {' and '.join(counts)}{scale}"
+            parts = (("point", self.points), ("photo", self.photos), ("attitude", self.attitudes))
+            counts = [counted(len(names), kind) for kind, names in parts if names]
+            return f"inner constraints over {' and '.join(counts)}{', scale included' if self.scale else ''}"
         if self.kind == "relative":
             return f"relative to {listed([*self.photos, *self.points])}"
         if self.kind == "minimal control":
@@ -94,13 +87,10 @@ class ResultDatum:
 
     def document(self) -> dict[str, Any]:
         """Return what the JSON document says of it."""
-        held = [{"photo": photo, "unknown": unknown} for photo, unknown in self.held]
         return {
             "kind": self.kind,
-            "held": held,
-            "points": list(self.points),
-            "photos": list(self.photos),
-            "attitudes": list(self.attitudes),
+            "held": [{"photo": photo, "unknown": unknown} for photo, unknown in self.held],
+            **{name: list(getattr(self, name)) for name in ("points", "photos", "attitudes")},
             "scale": self.scale,
         }
 
@@ -131,7 +121,7 @@ def datum_of(
     held
         What is held of the block that this one is a part of; None: what the core has held.
     """
-    names = [name.removesuffix("_deg") for name in (*position_columns(block), *ATTITUDE_COLUMNS)]
+    names = photo_components(block)
     own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
     if row is None:
         given = "minimal control" if solution.minimal_control else "observations"

@@ -1,4 +1,4 @@
-"""The radial distortion of an adjusted camera, with what is known of it.
+"""The distortion of an adjusted camera, radial and other, with what is known of it.
 
 A curve dr(r) of the radial terms k, its partials J = d(dr)/dk and the block Q of their cofactors give the
 band s(r) = sigma0 sqrt(J Q J'). What a user measures with includes the principal distance c. A forward camera
@@ -7,6 +7,10 @@ maps a ray to r + dr, which moves by J dk + (r / c) dc; a backward one maps a me
 (J, -r / c) with the block of k and c. Balanced, a part B r that c may take over is subtracted so that the
 curve vanishes at r0: J - r w with w = J(r0) / r0; the principal distance is then c / (1 + B), c (1 + B) where
 the lens is forward.
+
+What the other terms do to image positions (decentring, affinity and shear, the sets of Ebner and Gruen, thin
+prisms) stands on a grid: with the terms p, their partials J at a position and the block Q of their cofactors,
+the vector there has the covariance sigma0^2 J Q J'.
 """
 
 from __future__ import annotations
@@ -27,10 +31,12 @@ __all__ = [
     "INTERIOR",
     "RADIAL",
     "DistortionCurve",
+    "LensField",
     "added_along",
     "curve_deviations",
     "distortion_curve",
     "largest_radius",
+    "lens_field",
     "own_images",
     "radial_curve",
     "radial_part",
@@ -102,7 +108,9 @@ def largest_radius(result: Result, camera: AdjustedCamera) -> float:
     if not len(xy):
         return 0.0
     if _is_backward(camera.camera):
-        return float(np.hypot(*(xy - _principal_point(camera.camera)).T).max())
+        names = ("xp", "yp") if "xp" in camera.names else ("cx", "cy")
+        principal_point = [camera.camera.parameters.get(name, 0.0) for name in names]
+        return float(np.hypot(*(xy - principal_point).T).max())
     rays = camera.camera.rays(xy)
     ideal = _ideal(camera.camera, rays)
     return camera.camera.scale * float(np.max(ideal[np.isfinite(ideal)], initial=0.0))
@@ -221,14 +229,79 @@ def _ideal(camera: Camera, rays: Floats) -> Floats:
     return np.arctan2(across, -rays[:, 2]) if _is_fisheye(camera) else across / -rays[:, 2]
 
 
-def _principal_point(camera: Camera) -> Floats:
-    names = ("xp", "yp") if "xp" in camera.names else ("cx", "cy")
-    return np.array([camera.parameters.get(name, 0.0) for name in names])
-
-
 def _is_backward(camera: Camera) -> bool:
     return camera.direction == "backward"
 
 
 def _is_fisheye(camera: Camera) -> bool:
     return "fisheye" in camera.model.lower()
+
+
+GRID = 9
+"""Positions along either side of the observed part of the image."""
+
+
+@dataclass(frozen=True, eq=False)
+class LensField:
+    """Vectors at n positions, in the unit of image coordinates.
+
+    Attributes
+    ----------
+    names
+        The terms.
+    positions
+        (n, 2) image positions.
+    vectors
+        (n, 2) what the terms add: to measured coordinates where the lens is backward, else to ideal ones.
+    covariances
+        (n, 2, 2) of the vectors.
+    """
+
+    names: tuple[str, ...]
+    positions: Floats
+    vectors: Floats
+    covariances: Floats
+
+    @property
+    def largest(self) -> int:
+        """Where the longest vector is."""
+        return int(np.argmax(np.hypot(*self.vectors.T)))
+
+
+def lens_field(result: Result, camera: AdjustedCamera) -> LensField | None:
+    """Return the vectors of a camera; None without such terms, or without images."""
+    names = tuple(
+        name
+        for k, name in enumerate(camera.names)
+        if name not in INTERIOR | camera.camera.constants
+        and not RADIAL.fullmatch(name)
+        and (camera.values[k] != 0 or k in camera.estimated)
+    )
+    xy = own_images(result, camera)
+    if not names or not len(xy):
+        return None
+    sides = [np.linspace(low, high, GRID) for low, high in zip(xy.min(axis=0), xy.max(axis=0), strict=True)]
+    positions = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
+    own = camera.camera
+    rays = None if own.direction == "backward" else own.rays(positions)
+
+    def at(changes: dict[str, float]) -> Floats:
+        changed = own.replace(parameters={**own.parameters, **changes})
+        if rays is None:
+            return _photocore.camera_correct(changed.model, changed.values, positions)
+        return changed.project(rays)
+
+    partials = np.empty((len(positions), 2, len(names)))
+    rows = [camera.names.index(name) for name in names]
+    for column, (name, k) in enumerate(zip(names, rows, strict=True)):
+        step = 0.01 * (camera.sd[k] or abs(camera.values[k]))
+        value = own.parameters[name]
+        partials[:, :, column] = (at({name: value + step}) - at({name: value - step})) / (2 * step)
+    return LensField(
+        names=names,
+        positions=positions,
+        vectors=at({}) - at(dict.fromkeys(names, 0.0)),
+        covariances=np.einsum(
+            "nai,ij,nbj->nab", partials, camera.covariance[np.ix_(rows, rows)], partials, optimize=True
+        ),
+    )

@@ -15,11 +15,11 @@ from photogram.results.film_report import fiducial_members, film_members, scanne
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import control, images, iterations, photos, points, stations, terms_of
 from photogram.results.report import problems_of
-from photogram.results.result import Result, SumsByKind
+from photogram.results.result import Result
 from photogram.results.tables import camera_parameters, check_points, observations
 from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.methods import document_of
-from photogram.show.quantity import Quantity, Table, chosen, records
+from photogram.show.quantity import Quantity, Table, chosen, members, records
 
 __all__ = ["block_members", "network_members", "to_json"]
 
@@ -66,9 +66,13 @@ def network_members(result: AdjustedNetwork, photo_members: Table = ()) -> dict[
 
 def block_members(result: Result) -> dict[str, Any]:
     """Return the members of the document of an adjusted block."""
-    sums = result.sums_of_squares
+    covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
+    of_photos = (
+        Quantity(covariances[:, place, place], member="position_covariance"),
+        Quantity(covariances[:, turn, turn], member="attitude_covariance"),
+    )
     return {
-        **network_members(result, _of_photos(result)),
+        **network_members(result, of_photos),
         "title": result.block.title,
         "units": _units(result),
         "conventions": {
@@ -85,47 +89,41 @@ def block_members(result: Result) -> dict[str, Any]:
         "refraction": asdict(result.block.refraction) if result.block.refraction else None,
         "problems": problems_of(result),
         "initial_weighted_sum_of_squares": result.initial_weighted_sum_of_squares,
-        "weighted_sum_of_squares": _by_kind(sums),
-        "redundancy": None if result.redundancies is None else _by_kind(result.redundancies),
+        "weighted_sum_of_squares": members(result.sums_of_squares, *_SUMS),
+        "redundancy": result.redundancies and members(result.redundancies, *_SUMS),
         "unit_variance": result.unit_variance,
         "global_test": _global_test(result),
-        **(
-            {"cameras": _cameras(result), "calibrations": calibration_members(result)}
-            if result.cameras
-            else {}
-        ),
-        **({"unknowns": _unknowns(result)} if result.unknowns else {}),
-        **(_films(result) if result.films else {}),
-        **({} if result.features is None else {"features": features_document(result.features)}),
+        **_of_some(result),
         "observations_beside_images": _beside_images(result),
         "check_points": records(check_points(result)),
         "dropped_points": [{"id": name, "reason": reason} for name, reason in result.dropped.items()],
     }
 
 
-def _films(result: Result) -> dict[str, Any]:
-    return {
-        "films": film_members(result),
-        "fiducials": fiducial_members(result),
-        "scanners": scanner_members(result),
-    }
+def _of_some(result: Result) -> dict[str, Any]:
+    """Return the members on what only some blocks have."""
+    found: dict[str, Any] = {}
+    if result.cameras:
+        found |= {"cameras": _cameras(result), "calibrations": calibration_members(result)}
+    if result.unknowns:
+        found["unknowns"] = _unknowns(result)
+    if result.films:
+        found |= {"films": film_members(result), "fiducials": fiducial_members(result)}
+        found["scanners"] = scanner_members(result)
+    if result.features is not None:
+        found["features"] = features_document(result.features)
+    return found
 
 
-def _by_kind(sums: SumsByKind) -> dict[str, float]:
-    return {
-        "camera": sums.camera,
-        "ground": sums.ground,
-        "plates": sums.plates,
-        "observations": sums.observations,
-        "total": sums.total,
-    }
+_SUMS = ("camera", "ground", "plates", "observations", "total")
 
 
 def _units(result: Result) -> dict[str, str]:
-    linear = result.block.linear_unit
-    geographic, unit = result.block.geographic, result.block.image_unit
+    linear, unit = result.block.linear_unit, result.block.image_unit
+    geographic, mixed = result.block.geographic, f"longitude deg, latitude deg, height {linear}"
+    position = mixed if geographic else linear
     return {
-        "position": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        "position": position,
         "water_level": linear,
         "position_covariance": f"longitude rad, latitude rad, height {linear}; products"
         if geographic
@@ -134,34 +132,21 @@ def _units(result: Result) -> dict[str, str]:
         "attitude_covariance": "rad^2",
         "covariance": "products of the units of position_covariance and rad",
         f"residual_{unit}": unit,
-        "position_difference": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
-        "position_sd": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
-        "attitude_difference_rad": "rad",
-        "attitude_sd_rad": "rad",
-        "difference": f"longitude deg, latitude deg, height {linear}" if geographic else linear,
+        **dict.fromkeys(("position_difference", "position_sd"), position),
+        **dict.fromkeys(("attitude_difference_rad", "attitude_sd_rad"), "rad"),
+        "difference": position,
         "operations": "multiply-adds, each time the phase is carried out",
         "seconds": "s",
     }
 
 
-def _of_photos(result: Result) -> list[Quantity]:
-    covariances, place, turn = result.photo_covariances, slice(0, 3), slice(3, 6)
-    return [
-        Quantity(covariances[:, place, place], member="position_covariance"),
-        Quantity(covariances[:, turn, turn], member="attitude_covariance"),
-    ]
-
-
 def _cameras(result: Result) -> list[dict[str, Any]]:
     return [
         {
-            "name": each.name,
-            "model": each.camera.model,
-            "image_unit": each.camera.unit,
-            "photos": each.photos,
-            "images": each.images,
+            **members(each, "name", model="camera.model", image_unit="camera.unit"),
+            **members(each, "photos", "images"),
             "parameters": records(camera_parameters([each])),
-            "covariance": each.covariance.tolist(),
+            "covariance": each.covariance,
         }
         for each in result.cameras
     ]
@@ -169,22 +154,9 @@ def _cameras(result: Result) -> list[dict[str, Any]]:
 
 def _unknowns(result: Result) -> list[dict[str, Any]]:
     return [
-        {
-            "kind": each.kind,
-            "name": each.name,
-            "position": each.position.tolist(),
-            "matrix": each.attitude.tolist(),
-            "observations": each.observations,
-            "components": list(each.components),
-            "units": list(each.units),
-            "sd_given": each.given.deviations.tolist(),
-            "value": each.values.tolist(),
-            "change": each.change.tolist(),
-            "sd": each.sd.tolist(),
-            "redundancy": each.redundancy.tolist(),
-            "standardized": each.standardized.tolist(),
-            "covariance": each.covariance.tolist(),
-        }
+        members(each, "kind", "name", "position", matrix="attitude")
+        | members(each, "observations", "components", "units", sd_given="given.deviations", value="values")
+        | members(each, "change", "sd", "redundancy", "standardized", "covariance")
         for each in result.unknowns
     ]
 
@@ -207,10 +179,5 @@ def _global_test(result: Result) -> dict[str, Any] | None:
     test = result.global_test
     if test is None:
         return None
-    return {
-        "variance": test.variance,
-        "limits": test.limits,
-        "level": test.level,
-        "probability": test.probability,
-        "rejected": "high" if test.rejected_high else "low" if test.rejected_low else None,
-    }
+    rejected = "high" if test.rejected_high else "low" if test.rejected_low else None
+    return members(test, "variance", "limits", "level", "probability") | {"rejected": rejected}

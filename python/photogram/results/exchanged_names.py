@@ -82,26 +82,11 @@ class Exchange:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Problems:
-    """Points to be fitted to some images each: `problem` says which image is of which."""
-
-    problem: Indices
-    rows: Indices
-    count: int
-
-
 def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
     """Find exchanged names among the images that a snooped network does without.
 
-    Parameters
-    ----------
-    block
-        The network with all its images, photos where the adjustment without gross errors has put them.
-    used
-        (m,) the images that take part in it.
-    variance
-        Its variance of unit weight.
+    `block` has all images, with photos where the adjustment without gross errors has put them; (m,) `used`
+    take part in that, and `variance` is its variance of unit weight.
     """
     plain, seen = seen_without_lenses(block)
     mounted = {each.photo for each in block.mounts}
@@ -126,10 +111,10 @@ def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Ex
             one, other = sorted((int(plain.image_points[i]), int(plain.image_points[j])))
             photo = int(plain.image_photos[i])
             passing.setdefault((one, other), []).append((left, as_named, dimension, photo))
-    return _told(plain, passing)
+    return _surest(plain, passing)
 
 
-def _told(
+def _surest(
     block: Block, passing: dict[tuple[int, int], list[tuple[float, float, int, int]]]
 ) -> list[Exchange]:
     """Return the pairs, the surest first; a point is in one of them."""
@@ -179,9 +164,8 @@ class _Fit:
         of_images = [np.append(self._others(image), place) for image, place in wanted]
         sizes = [len(each) for each in of_images]
         problem, rows = np.repeat(np.arange(len(wanted)), sizes), np.concatenate(of_images)
-        problems = _Problems(problem, rows, len(wanted))
         points = self.block.image_points[[image for image, _ in wanted]]
-        squares = self._squares(problems, points)
+        squares = self._squares(problem, rows, points)
         held = np.isfinite(self._prior_sd(points)).sum(axis=1)
         dimensions = 2 * np.array(sizes) + held - 3
         return list(zip(squares.tolist(), dimensions.tolist(), strict=True))
@@ -202,10 +186,12 @@ class _Fit:
             return np.full(sd.shape, np.inf)
         return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
 
-    def _squares(self, problems: _Problems, points: Indices) -> Floats:
-        """(n,) least sums of squares; infinite where rays do not meet before the cameras."""
-        block, rays, count = self.block, self.rays, problems.count
-        rows, own = problems.rows, problems.problem
+    def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
+        """(n,) least sums of squares of (n,) points; infinite where rays do not meet before the cameras.
+
+        Images `rows` are those of the points `own` among these.
+        """
+        block, rays, count = self.block, self.rays, len(points)
         sd = block.image_sd[rows]
 
         def total(values: Floats) -> Floats:

@@ -93,12 +93,9 @@ class Feature:
         """What the test says of the deviations, in words; empty where there is none."""
         if self.probability is None:
             return ""
-        more = self.probability < LEVEL
-        return (
-            "the form deviates: more than standard deviations of points explain"
-            if more
-            else "no deviation of form is proved: standard deviations of points explain all"
-        )
+        if self.probability < LEVEL:
+            return "the form deviates: more than standard deviations of points explain"
+        return "no deviation of form is proved: standard deviations of points explain all"
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,10 +147,7 @@ class Features:
                 each.name,
                 each.kind,
                 len(each.points),
-                own.name,
-                own.unit,
-                own.value,
-                own.sd,
+                *(own.name, own.unit, own.value, own.sd),
                 self.k,
                 own.expanded,
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from photogram.messages import listed
 from photogram.results.features import Feature, Features, Quantity, directions
 from photogram.show.page import decimals_of, fixed
+from photogram.show.quantity import members
 from photogram.show.sections import Section
 
 __all__ = ["features_document", "features_sections", "through", "written"]
@@ -66,38 +66,22 @@ def _line(feature: Feature, quantity: Quantity) -> str:
 
 def features_document(features: Features) -> dict[str, Any]:
     """Return what the JSON document says of features."""
-    return {
-        "k": features.k,
-        "coverage": features.coverage,
-        "remarks": list(features.remarks),
-        "features": [_member(each) for each in features],
-    }
+    own = members(features, "k", "coverage", "remarks")
+    return own | {"features": [_member(each) for each in features]}
 
 
 def _member(feature: Feature) -> dict[str, Any]:
-    across: Sequence[str] = directions(feature.kind)
-    rows = zip(feature.deviations.tolist(), feature.deviation_sd.tolist(), strict=True)
-    tested = feature.statistic is not None
+    across = directions(feature.kind)
+    named = [*across, *(f"sd_{name}" for name in across)]
+    numbers = np.hstack([feature.deviations, feature.deviation_sd]).tolist()
+    form = members(feature, "statistic", "freedom", "probability", sentence="form")
     return {
-        "name": feature.name,
-        "kind": feature.kind,
-        "points": list(feature.points),
+        **members(feature, "name", "kind", "points"),
         "quantities": [vars(each) for each in feature.quantities],
-        "covariance": feature.covariance.tolist(),
+        "covariance": feature.covariance,
         "deviations": [
-            {"point": point, **dict(zip(across, own, strict=True)), **_named("sd_", across, sd)}
-            for point, (own, sd) in zip(feature.points, rows, strict=False)
+            {"point": point, **dict(zip(named, row, strict=True))}
+            for point, row in zip(feature.points, numbers, strict=False)
         ],
-        "form": {
-            "statistic": feature.statistic,
-            "freedom": feature.freedom,
-            "probability": feature.probability,
-            "sentence": feature.form,
-        }
-        if tested
-        else None,
+        "form": form if feature.statistic is not None else None,
     }
-
-
-def _named(prefix: str, names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
-    return {prefix + name: value for name, value in zip(names, values, strict=True)}

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.network.films import Scanner
 from photogram.network.observations import FILM
 from photogram.results.film_pictures import MarkResiduals, mark_residuals
 from photogram.results.result import Result
 from photogram.show.lines import field, stacked, table_lines
-from photogram.show.quantity import Axis, Quantity
+from photogram.show.quantity import Axis, Quantity, members
 
 __all__ = [
     "fiducial_members",
@@ -26,10 +25,7 @@ __all__ = [
 ]
 
 _UNITS = ("mm", "mm", "rad", "", "", "")
-_SAID = (
-    *(Axis("scale x"), Axis("scale y")),
-    *(Axis.of("between axes", "rad"), Axis.of("rotation", "rad")),
-)
+_SAID = (*(Axis("scale x"), Axis("scale y")), *(Axis.of("between axes", "rad"), Axis.of("rotation", "rad")))
 _DEVICE = (Axis.of("Sx", ""), Axis.of("Sy", ""), Axis.of("alpha", "rad"))
 _MM = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
 
@@ -44,31 +40,19 @@ def film_table(result: Result) -> list[Quantity]:
     largest = [
         np.fmax.reduce(residuals.tests[residuals.photos == row], initial=-np.inf, dtype=float) for row in rows
     ]
-    tests = np.where(np.isfinite(largest), largest, np.nan)
     return [
         _photos(result),
-        Quantity(
-            result.film[rows], axes, "value", "value", "value", "{} of the film", "value", "{}", figures=7
-        ),
-        Quantity(result.film_sd[rows], axes, "deviation", "sd", "sd", "sd of {}", "sd", head="sd {}"),
-        Quantity(read, kind="number", name="marks", member="marks", head="Marks", decimals=0),
-        Quantity(
-            *([" ".join(lost[row]) for row in rows], (), "name", "lost", "lost"),
-            about="marks read on other photos",
-            head="Lost",
-        ),
-        Quantity(
-            *(tests, (), "number", "largest_T", "largest_T"),
-            about="largest T of a mark, two coordinates together",
-            head="Largest T",
-            decimals=2,
-        ),
+        Quantity(result.film[rows], axes, "value", label="value", head="{}", figures=7),
+        Quantity(result.film_sd[rows], axes, "deviation", label="sd", head="sd {}"),
+        Quantity(read, head="Marks", decimals=0),
+        Quantity([" ".join(lost[row]) for row in rows], kind="name", name="lost", head="Lost"),
+        Quantity(np.where(np.isfinite(largest), largest, np.nan), head="Largest T", decimals=2),
     ]
 
 
 def _photos(result: Result) -> Quantity:
     names = [result.block.photo_ids[row] for row, _ in result.films]
-    return Quantity(names, kind="name", name="photo", about="name of the photo", head="Photo")
+    return Quantity(names, kind="name", head="Photo")
 
 
 def _lost(result: Result, residuals: MarkResiduals) -> dict[int, list[str]]:
@@ -102,21 +86,15 @@ def form_table(result: Result) -> list[Quantity]:
     names = [f"{which}{k}" for which in "xy" for k in range(3)]
     matrix = tuple(Axis.of(f"{name[0]} a{name[1]}", unit if name[1] == "0" else "") for name in names)
     said = np.array([[each.scale_x, each.scale_y, each.between_axes, each.rotation] for each in forms])
+    said_sd = np.array([each.sd for each in forms])
+    matrices, sd = (np.array([getattr(each, what) for each in forms]) for what in ("matrix", "matrix_sd"))
     return [
         _photos(result),
-        Quantity(_rows([each.matrix for each in forms]), matrix, "value", label="a", head="{}", figures=9),
-        Quantity(_rows([each.matrix_sd for each in forms]), matrix, "deviation", label="sd", head="sd {}"),
+        Quantity(matrices.reshape(-1, 6), matrix, "value", label="a", head="{}", figures=9),
+        Quantity(sd.reshape(-1, 6), matrix, "deviation", label="sd", head="sd {}"),
         Quantity(said.reshape(-1, 4), _SAID, "value", label="value", head="{}", decimals=7),
-        Quantity(
-            *(np.array([each.sd for each in forms]).reshape(-1, 4), _SAID, "deviation"),
-            label="sd",
-            head="sd {}",
-        ),
+        Quantity(said_sd.reshape(-1, 4), _SAID, "deviation", label="sd", head="sd {}"),
     ]
-
-
-def _rows(matrices: list[Floats]) -> Floats:
-    return np.array(matrices).reshape(-1, 6)
 
 
 def mark_table(result: Result) -> list[Quantity]:
@@ -137,19 +115,13 @@ def mark_table(result: Result) -> list[Quantity]:
         )
     )
     return [
-        Quantity(list(marks), kind="name", name="fiducial", member="fiducial", head="Fiducial"),
-        Quantity(counts, member="photos", label="photos", head="Photos", decimals=0),
-        Quantity(given, _MM, "value", member="certificate_mm", label="certificate", head="{}", decimals=4),
-        Quantity(values, _MM, "value", member="value_mm", label="adjusted", head="adjusted {}", decimals=4),
-        Quantity(changes, _MM, "difference", member="change_mm", label="change", head="d {}", decimals=2),
-        Quantity(sd, _MM, "deviation", member="sd_mm", label="sd", head="sd {}", decimals=2),
-        Quantity(
-            *(means, _MM, "difference"),
-            member="mean_residual_mm",
-            label="mean residual",
-            head="mean residual {}",
-            decimals=2,
-        ),
+        Quantity(list(marks), kind="name", head="Fiducial"),
+        Quantity(counts, head="Photos", decimals=0),
+        Quantity(given, _MM, "value", head="{}", decimals=4),
+        Quantity(values, _MM, "value", head="adjusted {}", decimals=4),
+        Quantity(changes, _MM, "difference", head="d {}", decimals=2),
+        Quantity(sd, _MM, "deviation", head="sd {}", decimals=2),
+        Quantity(means, _MM, "difference", head="mean residual {}", decimals=2),
     ]
 
 
@@ -165,7 +137,7 @@ def scanner_table(result: Result) -> list[Quantity]:
         for what in ("values", "change", "sd")
     )
     return [
-        Quantity([each.name for each in every], kind="name", name="scanner", head="Scanner"),
+        Quantity([each.name for each in every], kind="name", head="Scanner"),
         Quantity(values, _DEVICE, "value", label="value", head="{}", decimals=8),
         Quantity(changes, _DEVICE, "difference", label="change", head="d {}"),
         Quantity(sd, _DEVICE, "deviation", label="sd", head="sd {}"),
@@ -206,51 +178,37 @@ def _mark_lines(result: Result) -> list[str]:
 
 def film_members(result: Result) -> list[dict[str, object]]:
     """Return the films of photos for documents: values, cofactors, the form of six numbers, the side."""
-    values, sd, cofactors, forms = result.film, result.film_sd, result.film_cofactors, result.film_forms
     *_, marks, lost, largest = film_table(result)
+    arrays = {"film": result.film, "sd": result.film_sd, "film_cofactors": result.film_cofactors}
+    forms = result.film_forms.values()
     return [
         {
             "photo": result.block.photo_ids[row],
-            "components": list(FILM),
-            "film": values[row].tolist(),
-            "sd": sd[row].tolist(),
-            "film_cofactors": cofactors[row].tolist(),
-            "affine": {name: _plain(value) for name, value in vars(form).items()},
+            "components": FILM,
+            **{name: values[row] for name, values in arrays.items()},
+            "affine": vars(form),
             "marks": marks.values[k],
             "lost": lost.values[k].split(),
-            "largest_T": float(largest.values[k]),
-            "mirrored": film.mirrored,
-            "scanner": film.scanner.name,
+            "largest_T": largest.values[k],
+            **members(film, "mirrored", scanner="scanner.name"),
         }
-        for k, ((row, film), form) in enumerate(zip(result.films, forms.values(), strict=True))
+        for k, ((row, film), form) in enumerate(zip(result.films, forms, strict=True))
     ]
-
-
-def _plain(value: Floats | float) -> object:
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def fiducial_members(result: Result) -> list[dict[str, object]]:
     """Return the marks of cameras for documents: certificate and adjusted, covariance, readings."""
     residuals, photos = mark_residuals(result), result.block.photo_ids
+    columns = residuals.photos, residuals.marks, residuals.xy, residuals.tests
+    readings: dict[str, list[dict[str, object]]] = {}
+    for photo, mark, xy, test in zip(*columns, strict=True):
+        readings.setdefault(mark, []).append({"photo": photos[photo], "residual_mm": xy, "T": test})
     return [
         {
             "fiducial": name,
-            "certificate_mm": each.given.position[:2].tolist(),
-            "value_mm": each.values.tolist(),
-            "sd_mm": each.sd.tolist(),
-            "covariance_mm2": each.covariance.tolist(),
-            "readings": [
-                {"photo": photos[photo], "residual_mm": xy, "T": test}
-                for photo, mark, xy, test in zip(
-                    residuals.photos.tolist(),
-                    residuals.marks,
-                    residuals.xy.tolist(),
-                    residuals.tests.tolist(),
-                    strict=True,
-                )
-                if mark == name
-            ],
+            "certificate_mm": each.given.position[:2],
+            **members(each, value_mm="values", sd_mm="sd", covariance_mm2="covariance"),
+            "readings": readings.get(name, []),
         }
         for name, each in result.fiducials.items()
     ]
@@ -262,14 +220,9 @@ def scanner_members(result: Result) -> list[dict[str, object]]:
     return [
         {
             "scanner": each.name,
-            "pitch_mm": counted[id(each.given)].pitch,
-            "origin": list(counted[id(each.given)].origin),
-            "rows_down": counted[id(each.given)].down,
+            **members(counted[id(each.given)], pitch_mm="pitch", origin="origin", rows_down="down"),
             "components": ["Sx", "Sy", "alpha_rad"],
-            "calibration": each.given.position.tolist(),
-            "value": each.values.tolist(),
-            "sd": each.sd.tolist(),
-            "covariance": each.covariance.tolist(),
+            **members(each, calibration="given.position", value="values", sd="sd", covariance="covariance"),
         }
         for each in _scanners(result)
         if id(each.given) in counted

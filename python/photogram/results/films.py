@@ -1,4 +1,4 @@
-"""Films of photos and their fiducial marks after an adjustment; `films_told` makes tables of them."""
+"""Films of photos and their fiducial marks after an adjustment; `film_report` makes tables of them."""
 
 from __future__ import annotations
 

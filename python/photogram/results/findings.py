@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,19 +11,19 @@ import numpy as np
 from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined, counted
 from photogram.results.axes import point_axes
-from photogram.results.fixed_tests import held_tested
-from photogram.results.group_tests import groups_tested
-from photogram.results.lenses import fall_by_lens, how_to_calibrate
+from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
+from photogram.results.network_trial import KINDS, OBSERVATION
 from photogram.results.observation_rows import tested_singly
 from photogram.results.patterns import CameraImages, patterns
+from photogram.results.reliability_summary import ReliabilitySummary
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["HARMFUL", "block_findings", "has_redundancy", "network_findings", "unseen"]
+__all__ = ["HARMFUL", "block_findings", "groups_tested", "has_redundancy", "network_findings", "unseen"]
 
 ROBUST = "a robust loss changes the weights"
 """Why there is no global test with one."""
@@ -49,22 +50,19 @@ def network_findings(
     systematic: Sequence[Systematic],
     labels: Sequence[str] = (),
 ) -> Findings:
-    """Return the tests that every network has.
+    """Return the tests that every network has: with those of what is held, and of patterns.
 
-    Parameters
-    ----------
-    result
-        The adjusted network.
-    held, systematic
-        The tests of what is held, and of patterns.
-    labels
-        Of the observations beside images, in the order of the core.
+    `labels` are those of the observations beside images, in the order of the core.
     """
     unit_weight = None if result.KNOWN else result.sum_and_freedom
     return Findings(
         status=result.status,
         observations=[
-            *_tested(result, labels, unit_weight),
+            *(
+                tested_singly(result)
+                if result.reliability_summary is None  # a loss has changed the weights
+                else groups_tested(result.reliability_summary, labels, unit_weight)
+            ),
             *(each if unit_weight is None else by_f(each, *unit_weight) for each in held),
         ],
         degrees_of_freedom=result.degrees_of_freedom,
@@ -84,10 +82,7 @@ def block_findings(result: Result) -> Findings:
     intersected = not result.photo_given_sd.any()
     labels = [each.label for each in observations_of_core(result.block)]
     found = network_findings(
-        result,
-        [] if intersected else held_tested(result),
-        [] if intersected else _patterns(result),
-        labels,
+        result, [] if intersected else held_tested(result), [] if intersected else _patterns(result), labels
     )
     return replace(
         found,
@@ -137,14 +132,6 @@ def left_open(result: AdjustedNetwork) -> list[str]:
         if name in DISTANCES and sd > UNKNOWN * abs(value)
     ]
     return said or lengths
-
-
-def _tested(
-    result: AdjustedNetwork, labels: Sequence[str], unit_weight: tuple[float, float] | None
-) -> list[Tested]:
-    """Return the tests of groups; of single coordinates where a loss has changed the weights."""
-    summary = result.reliability_summary
-    return tested_singly(result) if summary is None else groups_tested(summary, labels, unit_weight)
 
 
 def _set_aside(result: Result) -> Removed | None:
@@ -210,3 +197,44 @@ def unseen(result: AdjustedNetwork) -> list[str]:
         f"errors of {hidden} of {redundancy.size} image coordinates would not show in their residuals"
         f" (redundancy below {TESTABLE:g})"
     ]
+
+
+PLURALS = {
+    "image": "images",
+    "control": "control points",
+    "position": "positions of photos",
+    "attitude": "attitudes of photos",
+    "camera": "cameras",
+    "unknown": "common unknowns",
+}
+"""What the kinds are called; those of observations beside images have labels."""
+
+
+def groups_tested(
+    summary: ReliabilitySummary, labels: Sequence[str] = (), unit_weight: tuple[float, float] | None = None
+) -> list[Tested]:
+    """Return the tests of all groups, kind by kind.
+
+    `labels` are those of the observations beside images, in the order of the core, `unit_weight` the weighted
+    sum of squares and the degrees of freedom where that is estimated; None where it is known.
+    """
+    suspects, tests = summary.suspects, summary.tests
+    testable = summary.testable
+    found = []
+    for kind, name in enumerate(KINDS):
+        own = np.flatnonzero(suspects.kinds == kind)
+        parts = [(PLURALS.get(name, name), own)]
+        if kind == OBSERVATION:
+            named = np.array(labels, dtype=object)[suspects.subjects[own]]
+            parts = [(f"observations of the kind {each}", own[named == each]) for each in sorted(set(labels))]
+        for what, groups in parts:
+            if not testable[groups].any():
+                continue
+            values = np.where(testable[groups], tests.statistic[groups], math.nan)
+            tested = Tested(what, values, _named(summary, groups), "T", tests.rank[groups].astype(np.float64))
+            found.append(tested if unit_weight is None else by_f(tested, *unit_weight))
+    return found
+
+
+def _named(summary: ReliabilitySummary, groups: np.ndarray) -> Callable[[tuple[int, ...]], str]:
+    return lambda place: summary.suspects.name(int(groups[place[0]]))

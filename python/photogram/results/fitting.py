@@ -30,11 +30,7 @@ __all__ = ["features", "with_features"]
 
 
 def features(
-    result: Result,
-    definitions: Mapping[str, Definition],
-    *,
-    k: float = 2.0,
-    coverage: float | None = None,
+    result: Result, definitions: Mapping[str, Definition], *, k: float = 2.0, coverage: float | None = None
 ) -> Features:
     """Fit features to adjusted points: distances, lines, planes, circles, spheres, cylinders.
 

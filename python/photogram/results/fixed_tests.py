@@ -1,4 +1,4 @@
-"""What is held and may be wrong: fixed stations and fixed points, tested by scores.
+"""What is held and may be wrong: fixed stations and points, and lenses, tested by scores.
 
 They are no observations: an error of theirs lies in no residual of its own, and good observations around are
 named for it. B the partials of the images by the held coordinates, in standard deviations, and ~v the
@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
+from photogram.network.cameras import Camera
 from photogram.network.directions import seen_without_lenses
+from photogram.network.motion import focal_images
 from photogram.network.rays import Rays
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
@@ -29,11 +31,15 @@ __all__ = [
     "SUSPECTED",
     "Held",
     "as_adjusted",
+    "fall_by_lens",
     "held_remark",
     "held_tested",
     "held_tests",
+    "how_to_calibrate",
     "is_suspected",
+    "lens_partials",
     "station_partials",
+    "usual_parameters",
 ]
 
 HELD = "held values"
@@ -74,14 +80,8 @@ def held_tests(
 ) -> list[Tested]:
     """Return the tests of what is held, T each, where residuals are too large and covariances there.
 
-    Parameters
-    ----------
-    result
-        The adjusted network.
-    suspected_by
-        What is to be tested, by (m,) the weighted squares of the images.
-    partials_of
-        (p, m, 2) of the images by the unknowns of their photos, to which each has its places.
+    `suspected_by` says what is to be tested, by (m,) the weighted squares of the images; `partials_of` gives
+    (p, m, 2) partials of these by the unknowns of their photos, to which each has its places.
     """
     if result.loss or not is_suspected(result):
         return []
@@ -118,14 +118,9 @@ def is_suspected(result: AdjustedNetwork) -> bool:
 
 
 def held_remark(found: Sequence[Tested], largest: float) -> list[str]:
-    """Say of what is held that it explains more than anything that was taken out.
+    """Say that what is held explains more than anything that was taken out.
 
-    Parameters
-    ----------
-    found
-        Its tests, in the adjustment of everything.
-    largest
-        The largest T of what was taken out.
+    `found` are its tests, in the adjustment of everything, `largest` is the largest T of what was taken out.
     """
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
@@ -147,10 +142,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
     of_points = np.bincount(block.image_points, of_images, points)
     mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
     rows: list[tuple[float, Held]] = []
-    for what, sd, shift in (
-        ("position", given[:, :3], 0),
-        ("attitude", given[:, 3:], 3),
-    ):
+    for what, sd, shift in (("position", given[:, :3], 0), ("attitude", given[:, 3:], 3)):
         held = np.asarray(sd == 0)
         if shift or block.geographic:  # Partials are by other axes than those of the components.
             held = held & held.all(axis=1, keepdims=True)
@@ -224,3 +216,64 @@ def _turn(axis: int, angle: float) -> Floats:
     j, k = (axis + 1) % 3, (axis + 2) % 3
     generator[j, k], generator[k, j] = -angle, angle
     return np.eye(3) + generator
+
+
+_USUAL = ("f", "fx", "fy", "c", "cx", "cy", "xp", "yp", "k", "k1", "k2", "p1", "p2", "a1", "a2")
+"""Principal distance and point, two radial and two tangential terms, under the names of all models."""
+
+
+def fall_by_lens(result: Result, images: Bools) -> float:
+    """Return by how much the weighted sum of squares would fall with a lens of their own for (m,) `images`.
+
+    Rao's score (:mod:`photogram.results.scores`) of radial and tangential terms, principal point and distance
+    about the middle of the frame, whatever the model of the camera has; of the radial terms alone where
+    unknowns take up others. 0 where it is not known.
+    """
+    if result.loss or not result.WHOLE or not is_suspected(result):
+        return 0.0
+    block, own = result.block, images & result.used_images
+    columns = lens_partials(result, own)
+    used = result.used_images[:, np.newaxis]
+    residuals: Floats = np.where(used, result.residuals / block.image_sd, 0.0)
+    factor = factored(result)
+    for count in (len(columns), 4, 2):
+        if (found := score(factor, columns[:count], residuals)) is not None:
+            return found
+    return 0.0
+
+
+def lens_partials(result: Result, own: Bools) -> Floats:
+    """(7, m, 2) partials of the images that are `own` by what a lens may have, in standard deviations."""
+    block = result.block
+    xy = focal_images(block)[own]
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    x, y = ((xy - (low + high) / 2) / max(float((high - low).max()) / 2, 1e-300)).T
+    r2, zero, one = x * x + y * y, np.zeros_like(x), np.ones_like(x)
+    terms = [
+        *((x * r2, y * r2), (x * r2**2, y * r2**2)),
+        *((r2 + 2 * x * x, 2 * x * y), (2 * x * y, r2 + 2 * y * y)),
+        *((x, y), (one, zero), (zero, one)),
+    ]
+    columns = np.zeros((len(terms), *block.image_xy.shape))
+    columns[:, own] = np.array(terms).transpose(0, 2, 1) / block.image_sd[own]
+    return columns
+
+
+def usual_parameters(camera: Camera) -> list[str]:
+    """Return the parameters of a camera that are held and commonly are not known."""
+    held = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+    return [
+        name
+        for name in camera.names
+        if name.lower() in _USUAL and held[name] == 0 and name not in camera.constants
+    ]
+
+
+def how_to_calibrate(block: Block) -> str:
+    """Return the option that estimates the cameras of a block, as words; nothing where nothing is left."""
+    if not any(len(camera.names) > 1 for camera in block.cameras):
+        return "a camera with distortion in place of the principal distance, and --self-calibrate all"
+    names = dict.fromkeys(
+        "f" if name in ("fx", "fy") else name for camera in block.cameras for name in usual_parameters(camera)
+    )
+    return f"--self-calibrate {','.join(names)}" if names else ""

@@ -26,6 +26,7 @@ from photogram.network.motion import on_shared
 from photogram.network.observations import moments
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
+from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
@@ -143,8 +144,9 @@ class GroupSums(Shown, Brief):
     @property
     def rejected(self) -> list[GroupSum]:
         """Groups whose residuals are larger or smaller than their standard deviations allow."""
-        tested = [each for each in self.groups if each.test is not None]
-        return [each for each in tested if each.test and (each.test.rejected_high or each.test.rejected_low)]
+        return [
+            each for each in self.groups if each.test and (each.test.rejected_high or each.test.rejected_low)
+        ]
 
     def __getitem__(self, name: str) -> GroupSum:
         """Return the group of a name."""
@@ -208,12 +210,7 @@ class Left:
         (G + 1,) observations, weighted sums of squares, sums of redundancy numbers.
     """
 
-    def __init__(
-        self,
-        result: AdjustedNetwork,
-        grouping: Grouping,
-        probing: Probing,
-    ) -> None:
+    def __init__(self, result: AdjustedNetwork, grouping: Grouping, probing: Probing) -> None:
         self.result, self.grouping, self._probing = result, grouping, probing
         total, freedom = result.sum_and_freedom
         counts, squares, redundancy = sums_of(result, grouping)
@@ -280,8 +277,6 @@ def observables(network: object) -> Observables:
 @observables.register
 def block_observables(block: Block) -> Observables:
     """Return what a block has observations of."""
-    held = np.isfinite(block.point_sd).any(axis=1)
-    known = np.isfinite(block.point_positions).any(axis=1)
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
     observed = (sd > 0) & np.isfinite(sd)
     # What is given of a photo with a trajectory of its own is given of common unknowns.
@@ -294,7 +289,7 @@ def block_observables(block: Block) -> Observables:
         photo_cameras=photo_cameras,
         camera_names=names,
         strips=lambda: _strips(block),
-        point_classes=np.where(held, "control", np.where(known, "check", "pass")),
+        point_classes=point_kinds(block),
         photo_observed=observed,
         stations=("positions",) * 3 + ("attitudes",) * 3,
         commons=len(block.unknowns),
@@ -371,11 +366,9 @@ def _spread(result: AdjustedNetwork, grouping: Grouping, counts: Indices, probin
     """Return (G,) s_g; the groups beyond some share columns."""
     options = probing.options(int(counts.sum()))
     g = grouping.count
-    if g > TOGETHER:
-        _, squares, _ = factored(result).group_squares(grouping.core(), classes=TOGETHER, **options)
-        return squares
-    _, squares, _ = factored(result).group_squares(grouping.core(), classes=None, **options)
-    return np.asarray(np.diag(squares.reshape(g + 1, g)))
+    classes = TOGETHER if g > TOGETHER else None
+    _, squares, _ = factored(result).group_squares(grouping.core(), classes=classes, **options)
+    return squares if classes else np.asarray(np.diag(squares.reshape(g + 1, g)))
 
 
 check_arguments(globals(), ["group_sums"])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.unadjusted import Given
 from photogram.statistics.components import GroupsOf
 
@@ -130,24 +130,14 @@ class Grouping:
 
 
 def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
-    """Return groups of the observations of a network.
+    """Return groups of the observations of a network; refuse other bases, and labels that do not fit.
 
-    Parameters
-    ----------
-    of
-        What the network has observations of.
-    groups
-        `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more together), or
-        `component` (x and y, plan and height of control, positions and attitudes of stations): all but `kind`
-        and `component` part the images only, the rest goes by kind. Several of these: a group for each
-        combination. Or labels of one's own: a mapping with arrays of `images` (m,) or (m, 2), `control` (n,)
-        or (n, 3), `stations` (P,) or (P, k), `observations` (o,); what has no label (None or an empty text)
-        keeps its weight, and parts that are not named go by kind.
-
-    Raises
-    ------
-    InputError
-        A basis that there is not, labels that do not fit.
+    Groups are by `kind`, `camera`, `strip`, `photo`, `point class`, `rays` (of the point; five and more
+    together), or `component` (x and y, plan and height of control, positions and attitudes of stations): all
+    but `kind` and `component` part the images only, the rest goes by kind. Several of these: a group for each
+    combination. Or they are labels of one's own: a mapping with arrays of `images` (m,) or (m, 2), `control`
+    (n,) or (n, 3), `stations` (P,) or (P, k), `observations` (o,); what has no label (None or an empty text)
+    keeps its weight, and parts that are not named go by kind.
     """
     if isinstance(groups, Mapping):
         labels = _own(of, groups)
@@ -226,21 +216,18 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
         raise InputError(f"labels are of {', '.join(PARTS)}, not {shown(sorted(map(str, unknown))[0])}")
     by_kind = _by(of, ["kind"])
     parts = {"images": "images", "control": "points", "stations": "photos", "observations": "observations"}
-    found = {}
+    found: dict[str, _Labels] = {}
     for name, part in parts.items():
-        default: _Labels = getattr(by_kind, part)
-        if name not in given:
-            found[part] = default
-            continue
-        labels = np.asarray(given[name], dtype=object)
-        if labels.shape == default.shape[:1] and default.ndim == 2:
-            labels = np.repeat(labels[:, np.newaxis], default.shape[1], axis=1)
-        if labels.shape != default.shape:
-            raise InputError(
-                f"labels of {name} have the shape {labels.shape}, not {default.shape[:1]} or {default.shape}"
-            )
-        found[part] = np.vectorize(_text, otypes=[object])(labels) if labels.size else labels
-    return _Labelled(**found, parents=by_kind.parents)
+        if name in given:
+            default: _Labels = getattr(by_kind, part)
+            labels = np.asarray(given[name], dtype=object)
+            if labels.shape == default.shape[:1] and default.ndim == 2:
+                labels = np.repeat(labels[:, np.newaxis], default.shape[1], axis=1)
+            if labels.shape != default.shape:
+                shapes = f"{default.shape[:1]} or {default.shape}"
+                raise InputError(f"labels of {name} have the shape {labels.shape}, not {shapes}")
+            found[part] = np.vectorize(_text, otypes=[object])(labels) if labels.size else labels
+    return replace(by_kind, **found)
 
 
 def _text(label: object) -> str:

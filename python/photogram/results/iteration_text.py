@@ -14,15 +14,7 @@ __all__ = ["iteration_lines", "iteration_table"]
 
 
 def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
-    """Return numbers, sums after the corrections, largest changes, damping; first the start, if it is given.
-
-    Parameters
-    ----------
-    iterations
-        In their order.
-    start
-        Weighted sum of squares before the first.
-    """
+    """Return numbers, sums after the corrections, largest changes, damping; first the start, if given."""
     first = [] if start is None else [(0, start, np.nan, np.nan)]
     rows = [(i.number, i.weighted_sum_of_squares, i.largest_change, i.damping) for i in iterations]
     number, squares, change, damping = np.array([*first, *rows]).reshape(-1, 4).T

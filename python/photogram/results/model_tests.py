@@ -212,18 +212,14 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
     if not np.isfinite(q).all():
         raise InputError("the result has no covariances")
     statistic = quadratic(q, found.values[rows])
-    freedom = _freedom(result)
+    freedom = result.freedom_of_scale
     scale = result.covariance_scale if math.isfinite(freedom) else 1.0
     effect = _largest_effect(result, found, rows)
     return _tested(found.name, names, statistic, freedom, scale, effect)
 
 
 def score_test(
-    result: Result,
-    names: Sequence[str] = (),
-    *,
-    camera: str | None = None,
-    partials: ArrayLike | None = None,
+    result: Result, names: Sequence[str] = (), *, camera: str | None = None, partials: ArrayLike | None = None
 ) -> TermsTest:
     """Test terms that are held, or effects that the model has not, without adjusting with them (Rao).
 
@@ -267,7 +263,7 @@ def score_test(
     statistic = score(factored(result), b, v)
     if statistic is None:
         raise InputError(f"the unknowns of the block take up {', '.join(names)}: nothing can be tested")
-    freedom = _freedom(result) - k
+    freedom = result.freedom_of_scale - k
     omega = result.covariance_scale * (freedom + k) - statistic
     scale = max(omega, 1e-12 * statistic) / freedom if 0 < freedom < math.inf else 1.0
     return _tested(title, names, statistic, freedom, scale, math.nan)
@@ -298,7 +294,7 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
     first = all_results[0]
     for name, other in zip(names[1:], all_results[1:], strict=True):
         _check_same(names[0], first, name, other)
-    taken = all(math.isinf(_freedom(each)) for each in all_results) if known is None else known
+    taken = all(math.isinf(each.freedom_of_scale) for each in all_results) if known is None else known
     models = [_model(name, result, taken) for name, result in results.items()]
     nested = []
     for small in names:
@@ -401,12 +397,6 @@ def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:
         if name not in camera.names:
             raise InputError(f"the camera {camera.name} has no parameter {shown(name)}")
     return [camera.names.index(name) for name in names]
-
-
-def _freedom(result: Result) -> float:
-    """Return the degrees of freedom of the unit variance; infinite where that is known."""
-    posterior = result.unit_variance != "unity" and result.variance_of_unit_weight is not None
-    return float(result.degrees_of_freedom) if posterior else math.inf
 
 
 def _tested(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import MISSING
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -205,8 +206,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         """Take over what the core found: under the same names, but for what is put otherwise in `found`."""
         found["initial_weighted_sum_of_squares"] = solution.initial_sum_of_squares
         found["iterations"] = [Iteration(*row) for row in solution.iterations]
-        same = {each.name: getattr(solution, each.name) for each in fields(cls) if each.name not in found}
-        return cls(**found, **same)
+        given = [each.name for each in fields(cls) if each.name not in found and each.default is MISSING]
+        return cls(**found, **{name: getattr(solution, name) for name in given})
 
     @property
     def geographic(self) -> bool:

@@ -66,12 +66,7 @@ class NetworkTrial:
     """
 
     def __init__(
-        self,
-        core: _photocore.NetworkTrial,
-        suspects: Suspects,
-        supported: Bools,
-        rough: float,
-        exact: float,
+        self, core: _photocore.NetworkTrial, suspects: Suspects, supported: Bools, rough: float, exact: float
     ) -> None:
         self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
         self.deviations: Floats = core.suspects.deviations
@@ -179,7 +174,11 @@ class NetworkTrial:
         found = []
         for group, point in zip(groups, points, strict=True):
             own: tuple[list[int], Floats, Floats] = next(on_points) if point >= 0 else ([], None, None)  # type: ignore[assignment]
-            found.append(self._without_out(*own) if own[0] else self._alone(group))
+            if own[0]:
+                found.append(self._without_out(*own))
+            else:
+                residuals = np.nan_to_num(self._tests["residual"][self.suspects.rows(group)])
+                found.append(([group], residuals, self.own_block(group)))
         return found
 
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
@@ -198,10 +197,6 @@ class NetworkTrial:
         response[out] = 0.0
         response[:, out] = 0.0
         return groups, np.where(out, 0.0, residuals), response
-
-    def _alone(self, group: int) -> tuple[list[int], Floats, Floats]:
-        rows = self.suspects.rows(group)
-        return [group], np.nan_to_num(self._tests["residual"][rows]), self.own_block(group)
 
     def own_block(self, group: int) -> Floats:
         """Return R of a group."""

@@ -20,14 +20,7 @@ from photogram.results.network_tables import terms_of
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
-from photogram.statistics.patterns import (
-    SPEAKING,
-    Fit,
-    frame_pattern,
-    group_patterns,
-    normality,
-    regression,
-)
+from photogram.statistics.patterns import SPEAKING, Fit, frame_pattern, group_patterns, normality, regression
 from photogram.statistics.reliability import TESTABLE
 
 __all__ = ["CameraImages", "patterns"]
@@ -71,16 +64,9 @@ def patterns(
 ) -> list[Systematic]:
     """Return the tests of patterns of a network, where there is enough to test.
 
-    Parameters
-    ----------
-    cameras
-        With the photos of each.
-    axes
-        What the coordinates of stations and points are called, the height last; none where they mean nothing
-        on the ground.
-    fall
-        By how much the weighted sum of squares would fall with a lens for (m,) images of a camera; asked for
-        where the pattern is large.
+    `axes` are what the coordinates of stations and points are called, the height last; none where they mean
+    nothing on the ground. `fall` gives by how much the weighted sum of squares would fall with a lens for
+    (m,) images of a camera; it is asked for where the pattern is large.
     """
     used = chosen(result.used_images & finite_rows(result.redundancy))
     w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)[used]

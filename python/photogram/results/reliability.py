@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Inseparable", "Moved", "Reliability", "reliability_of"]
 
-FEW = 50
-"""Degrees of freedom below which an estimated unit weight makes errors notably harder to find."""
 SEPARATED = 1.6448536269514722
 """Of the normal distribution, 95 percent on one side."""
 SEARCHED = 100
@@ -264,8 +262,7 @@ class Reliability:
         """
         testable = self.redundancy > TESTABLE
         norm = np.where(testable & np.isfinite(self.external), self.external, -math.inf)
-        group_of = np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
-        best = 0.0
+        group_of, best = self.row_groups(), 0.0
         found: list[Moved] = []
         for row in np.argsort(-norm, kind="stable")[:count].tolist():
             if not norm[row] > best:
@@ -380,12 +377,9 @@ class Reliability:
             )
         count = int(self.untestable.sum())
         if count:
-            lines.append(f"{count} groups are checked by no other observation, {self._named_untestable()}")
+            first = ", ".join(map(self.suspects.name, np.flatnonzero(self.untestable)[:3].tolist()))
+            lines.append(f"{count} groups are checked by no other observation, such as {first}")
         return lines
-
-    def _named_untestable(self) -> str:
-        first = np.flatnonzero(self.untestable)[:3].tolist()
-        return "such as " + ", ".join(self.suspects.name(group) for group in first)
 
     def document(self) -> dict[str, Any]:
         """Return what JSON documents have: every row with its unit."""

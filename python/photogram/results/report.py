@@ -16,7 +16,7 @@ from photogram.network.knots import Knot
 from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
-from photogram.results.calibration_report import calibration_sections
+from photogram.results.calibration_report import calibration_sections, values_written
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
 from photogram.results.film_report import film_lines
@@ -33,13 +33,7 @@ from photogram.results.observation_rows import (
     tested_observations,
 )
 from photogram.results.result import Result
-from photogram.results.tables import (
-    check_points,
-    observed_components,
-    redundancy_by_kind,
-    unheld,
-    unknowns,
-)
+from photogram.results.tables import check_points, observed_components, redundancy_by_kind, unheld, unknowns
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, stacked, table_lines
 from photogram.show.methods import report_of
@@ -62,6 +56,7 @@ __all__ = [
     "problems_of",
     "reliability_lines",
     "report",
+    "rms_of",
     "size_of",
     "summary",
     "suspects_section",
@@ -97,10 +92,7 @@ def details(result: Result) -> list[Section]:
             "Control as observations: adjusted minus given, redundancy, standardized difference",
             control_lines(result),
         ),
-        (
-            "Components of control that are not held: adjusted minus given",
-            _unheld(result),
-        ),
+        ("Components of control that are not held: adjusted minus given", _unheld(result)),
         (
             "Stations as observations: adjusted minus given, redundancy, standardized difference",
             observed_lines(stations(result), "photo"),
@@ -170,20 +162,14 @@ def problems_of(result: AdjustedNetwork) -> list[str]:
 
 def _adjustment(result: Result) -> list[str]:
     sums, variance = result.sums_of_squares, result.variance_of_unit_weight
-    basis = {
-        "free": "rule of 1987",
-        "constrained": "all weighted values",
-        "unity": "set to 1",
-        "redundancy": "redundancy numbers",
-    }[result.unit_variance]
+    own = root = "undefined"
+    if variance is not None:
+        own, root = f"{variance:.6f} ({_BASIS[result.unit_variance]})", f"{math.sqrt(variance):.6f}"
     rows = [
         ("status", result.status),
         ("iterations", f"{len(result.iterations)}"),
-        ("variance of unit weight", f"{variance:.6f} ({basis})" if variance is not None else "undefined"),
-        (
-            "standard deviation of unit weight",
-            f"{math.sqrt(variance):.6f}" if variance is not None else "undefined",
-        ),
+        ("variance of unit weight", own),
+        ("standard deviation of unit weight", root),
         ("degrees of freedom", f"{result.degrees_of_freedom:.8g}"),
         ("weighted sum of squares, photos", f"{sums.camera:.6f}"),
         ("weighted sum of squares, control", f"{sums.ground:.6f}"),
@@ -196,6 +182,14 @@ def _adjustment(result: Result) -> list[str]:
         *size_of(result),
     ]
     return [f"{name:<35} {value}" for name, value in rows]
+
+
+_BASIS = {
+    "free": "rule of 1987",
+    "constrained": "all weighted values",
+    "unity": "set to 1",
+    "redundancy": "redundancy numbers",
+}
 
 
 def size_of(result: Result) -> list[tuple[str, str]]:
@@ -225,7 +219,7 @@ def _residuals(result: Result) -> list[str]:
     used = result.used_images
     (axis, _) = image_axes(result.block.image_unit)
     unit, factor = axis.small, axis.factor
-    rms = [_rms(result.residuals[used][:, axis]) * factor for axis in (0, 1)]
+    rms = [rms_of(result.residuals[used][:, axis]) * factor for axis in (0, 1)]
     lines = [
         f"rms of image residuals              {value:.3f} {unit} in {name}"
         for value, name in zip(rms, "xy", strict=True)
@@ -243,7 +237,7 @@ def _residuals(result: Result) -> list[str]:
         ("check points", check_points(result)),
     ):
         differences = labelled(table, "difference").values
-        values = [_rms(column[np.isfinite(column)]) for column in differences.T]
+        values = [rms_of(column[np.isfinite(column)]) for column in differences.T]
         if np.isfinite(differences).any():
             lines.append(f"{f'rms of {what}':<36}{', '.join(_differences(result, values))}")
     return lines
@@ -373,8 +367,7 @@ def _photos(result: Result) -> list[str]:
 
 def _held_cameras(result: Result) -> list[str]:
     return [
-        f"{each.name:<16}{each.camera.model}, {each.photos} photos: "
-        + ", ".join(f"{name} {value:.8g}" for name, value in each.camera.parameters.items() if value != 0)
+        f"{each.name:<16}{each.camera.model}, {each.photos} photos: {values_written(each.camera)}"
         for each in result.cameras
         if each.given.is_held
     ]
@@ -417,7 +410,8 @@ def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
     return "bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)", figures
 
 
-def _rms(values: Floats) -> float:
+def rms_of(values: Floats) -> float:
+    """Return the root mean square of some values; NaN of none."""
     return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
 
 

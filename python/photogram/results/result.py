@@ -32,9 +32,13 @@ from photogram.results.datum import (
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observation_kinds import ObservedKind, observed_kinds
-from photogram.results.restart import restarted_motion
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
-from photogram.results.trajectories import AdjustedTrajectory, adjusted_trajectories, project
+from photogram.results.trajectories import (
+    AdjustedTrajectory,
+    adjusted_trajectories,
+    project,
+    restarted_motion,
+)
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.show.methods import statement_of
 from photogram.statistics.limits import GlobalTest, global_test
@@ -179,10 +183,6 @@ class Result(OnFilm, AdjustedNetwork):
             block=block.kept(),
             messages=messages,
             loss=options.loss,
-            hints=(),
-            exchanged=(),
-            set_aside=(),
-            features=None,
             options=options,
             datum=datum,
             sums_of_squares=SumsOfSquares(*solution.sums_of_squares),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -83,20 +84,17 @@ class Part:
 
     def columns(self, result: AdjustedNetwork) -> list[Column]:
         """Return its columns; none where the array is None."""
-        values = result
-        for name in self.field.split("."):
-            values = getattr(values, name)
-        array: Any = values
+        array: Any = attrgetter(self.field)(result)
         if array is None:
             return []
         if self.form == "matrix":
             triangles = packed(array) * result.covariance_scale
             return [Column(self.prefix, triangles, _products(self.units), self.description, self.names)]
-        if self.form == "list" and not len(array):
-            return []
         if self.form == "list":
-            cells, units = _rows_first(array), " ".join(self.units)
-            return [Column(self.prefix, cells, units, self.description, self.names)]
+            if not len(array):
+                return []
+            cells = array.transpose(1, 0, 2).reshape(array.shape[1], -1)
+            return [Column(self.prefix, cells, " ".join(self.units), self.description, self.names)]
         parts = array.T if array.ndim == 2 else [array]
         return [
             Column(self.prefix + name, part, unit, self.description.format(name))
@@ -108,9 +106,9 @@ class Part:
         if self.form == "matrix":
             k = len(self.names)
             return unpacked(_divided(sheet.numbers(self.prefix, k * (k + 1) // 2), scale))
-        if self.form == "list" and self.prefix not in sheet.columns:
-            return np.zeros((0, sheet.rows, len(self.names)))
         if self.form == "list":
+            if self.prefix not in sheet.columns:
+                return np.zeros((0, sheet.rows, len(self.names)))
             cells = sheet.numbers(self.prefix, -len(self.names))
             return np.ascontiguousarray(cells.reshape(len(cells), -1, len(self.names)).transpose(1, 0, 2))
         own = [self.prefix + name for name in self.names]
@@ -128,11 +126,6 @@ def _divided(products: np.ndarray, scale: float) -> np.ndarray:
         beside = np.nextafter(near, direction)
         found = np.where((found * scale != products) & (beside * scale == products), beside, found)
     return found
-
-
-def _rows_first(array: np.ndarray) -> np.ndarray:
-    """Return (P, i k) of (i, P, k)."""
-    return array.transpose(1, 0, 2).reshape(array.shape[1], -1)
 
 
 def _products(units: Sequence[str]) -> str:
@@ -276,26 +269,10 @@ def written(
 ) -> dict[str, Content]:
     """Return the files of a result.
 
-    Parameters
-    ----------
-    result
-        The result.
-    kind
-        What reads it again.
-    given
-        The field that holds what was adjusted.
-    parts
-        Of the tables `photos`, `points` and `images`.
-    leading
-        Columns that stand before these: names.
-    tables
-        Further tables, which are for people alone.
-    frame
-        Where on the earth its coordinates are.
-    summary
-        What a reader wants first.
-    stands
-        What is written for objects of some classes.
+    `kind` says what reads it again, `given` is the field that holds what was adjusted. `parts` are those of
+    the tables `photos`, `points` and `images`, `leading` the columns before them: names; `tables` are further
+    ones, for people alone. `frame` is where on the earth its coordinates are, `summary` what a reader wants
+    first, and `stands` what is written for objects of some classes.
     """
     unknowns, *state = result.state.__getnewargs__()
     about = _about(result, frame)
@@ -362,13 +339,7 @@ def _about(result: AdjustedNetwork, frame: Frame) -> dict[str, str]:
 
 
 def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any]) -> Saved:
-    """Read the tables of a folder.
-
-    Raises
-    ------
-    InputError
-        One of them is missing, damaged, or of another result.
-    """
+    """Read the tables of a folder; refuse one that is missing, damaged, or of another result."""
     tables = document["tables"]
     for name in dict.fromkeys((*_READ, *tables)):
         check_seal(folder / f"{name}.parquet", tables.get(name), SUMMARY)
@@ -377,13 +348,7 @@ def read_saved(folder: Path, classes: Iterable[type], document: Mapping[str, Any
 
 
 def read_summary(folder: Path) -> Mapping[str, Any]:
-    """Read the document of a folder.
-
-    Raises
-    ------
-    InputError
-        It is not there, or is that of another program or version.
-    """
+    """Read the document of a folder; refuse none, and that of another program or version."""
     path = folder / SUMMARY
     try:
         document = orjson.loads(read_bytes(path))
@@ -400,13 +365,7 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
 
 
 def rows_of(names: Repeated, known: Sequence[str], path: Path) -> np.ndarray:
-    """Return which of the known names each row of a column has.
-
-    Raises
-    ------
-    InputError
-        A name that is not known.
-    """
+    """Return which of the known names each row of a column has; refuse others."""
     places = {name: row for row, name in enumerate(known)}
     try:
         codes = np.array([places[name] for name in names.names], dtype=np.int64)

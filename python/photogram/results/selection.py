@@ -105,13 +105,7 @@ class Adjusted:
     numbered: bool = False
 
     def selected(self, selection: Selection) -> Selected:
-        """Return what a selection names.
-
-        Raises
-        ------
-        InputError
-            A kind or name that is not there, or that is no name.
-        """
+        """Return what a selection names; refuse a kind or name that is not there, or that is no name."""
         items = [selection] if isinstance(selection, tuple) and isinstance(selection[0], str) else selection
         rows: list[tuple[str, int]] = []
         labels: list[tuple[str, str, str]] = []

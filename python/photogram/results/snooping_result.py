@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +13,11 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Judged, Paged
+from photogram.show.methods import Judged, Paged, findings_of
+from photogram.show.quantity import members
 from photogram.show.sections import Section, composed, headline, verdict_sections
 from photogram.show.summary import Brief, Rows, few
+from photogram.statistics.findings import Findings, Removed
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome, Settings
@@ -23,7 +26,7 @@ from photogram.statistics.snooping.suspects import Standing, Suspects
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Snooped"]
+__all__ = ["LN10", "Snooped", "estimated_errors", "rivals_of", "snooped_findings"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -109,27 +112,14 @@ class Snooped(Brief, Judged, Paged):
             "before": _standing(outcome.before),
             "after": _standing(outcome.standing),
             "rounds": [
-                {
-                    "number": each.number,
-                    "status": each.status,
-                    "weighted_sum_of_squares": each.weighted_sum_of_squares,
-                    "degrees_of_freedom": each.degrees_of_freedom,
-                    "limit_p": each.limit,
-                    "removed": list(each.removed),
-                    "returned": list(each.returned),
-                    "remarks": list(each.remarks),
-                }
+                members(each, "number", *_STANDING, limit_p="limit")
+                | members(each, "removed", "returned", "remarks")
                 for each in outcome.rounds
             ],
             "log": [_member(entry) for entry in self.log],
             "exchanged_names": [
-                {
-                    "photos": list(each.photos),
-                    "points": list(each.points),
-                    "T_as_named": each.as_named,
-                    "T_exchanged": each.exchanged,
-                    "dimension": each.dimension,
-                }
+                members(each, "photos", "points", T_as_named="as_named", T_exchanged="exchanged")
+                | {"dimension": each.dimension}
                 for each in self.exchanged
             ],
             "remarks": outcome.remarks,
@@ -145,7 +135,8 @@ class Snooped(Brief, Judged, Paged):
         return [*verdict_sections(self.verdict), *self._own()]
 
     def _own(self) -> list[Section]:
-        return [("Data snooping", self._head()), ("Taken out, in order", self._log())]
+        lines = [line for entry in self.log for line in _lines(entry)] or ["nothing"]
+        return [("Data snooping", self._head()), ("Taken out, in order", lines)]
 
     def report(self) -> str:
         """Return the report: that of the network without what was taken out, then the log of that."""
@@ -171,9 +162,6 @@ class Snooped(Brief, Judged, Paged):
             lines.append(f"the unit variance holds after removal of {out} groups: it is biased low by little")
         return lines
 
-    def _log(self) -> list[str]:
-        return [line for entry in self.log for line in _lines(entry)] or ["nothing"]
-
 
 _COLUMNS = (
     *("round", "kind", "name", "component", "unit", "error", "error_sd"),
@@ -182,88 +170,53 @@ _COLUMNS = (
 )
 
 
-def _rows(entry: Removal) -> list[tuple[Any, ...]]:
-    rivals = "; ".join(f"{rival.name} ({rival.odds:.3g} : 1)" for rival in entry.rivals)
-    log_p = entry.prediction_log_probability
-    after = math.nan if log_p is None else log_p / _LN10
+def _rows(entry: Removal) -> list[dict[str, Any]]:
+    """Return the rows of the table: what the document has, but for what each component has of its own."""
+    member = _member(entry)
+    log_p = member["prediction_log10_p"]
+    common = member | {
+        "rivals": rivals_of(entry.rivals, 3),
+        "consequences": "; ".join(entry.consequences),
+        "prediction_T": math.nan if entry.prediction is None else entry.prediction,
+        "prediction_log10_p": math.nan if log_p is None else log_p,
+        "kept": entry.kept,
+    }
+    names = ("component", "unit", "error", "error_sd", "predicted_error")
     predicted = entry.prediction_error or (math.nan,) * len(entry.rows)
-    return [
-        (
-            entry.round,
-            entry.kind,
-            entry.name,
-            component,
-            unit,
-            error,
-            sd,
-            entry.dimension,
-            entry.first_statistic,
-            entry.statistic,
-            entry.fisher,
-            entry.log_probability / _LN10,
-            entry.limit,
-            entry.redundancy,
-            rivals,
-            "; ".join(entry.consequences),
-            other,
-            math.nan if entry.prediction is None else entry.prediction,
-            after,
-            entry.returned,
-            entry.kept,
-        )
-        for component, unit, error, sd, other in zip(
-            entry.components, entry.units, entry.error, entry.error_sd, predicted, strict=True
-        )
-    ]
+    rows = zip(entry.components, entry.units, entry.error, entry.error_sd, predicted, strict=True)
+    return [common | dict(zip(names, row, strict=True)) for row in rows]
 
 
-_LN10 = math.log(10)
-
-
-def _probability(logarithm: float) -> float:
-    return math.exp(logarithm) if not math.isnan(logarithm) else math.nan
+LN10 = math.log(10)
 
 
 def _member(entry: Removal) -> dict[str, Any]:
-    after = entry.prediction_log_probability
+    log_p, after = entry.log_probability, entry.prediction_log_probability
     return {
-        "round": entry.round,
-        "kind": entry.kind,
-        "name": entry.name,
-        "components": list(entry.components),
-        "units": list(entry.units),
-        "dimension": entry.dimension,
-        "first_T": entry.first_statistic,
-        "T": entry.statistic,
-        "F": entry.fisher,
-        "p": _probability(entry.log_probability),
-        "log10_p": entry.log_probability / _LN10,
-        "limit_p": entry.limit,
-        "estimated_error": list(entry.error),
-        "estimated_error_sd": list(entry.error_sd),
+        **members(entry, "round", "kind", "name", "components", "units", "dimension"),
+        **members(entry, first_T="first_statistic", T="statistic", F="fisher"),
+        "p": math.nan if math.isnan(log_p) else math.exp(log_p),
+        "log10_p": log_p / LN10,
+        **members(entry, limit_p="limit", estimated_error="error", estimated_error_sd="error_sd"),
         "redundancy": entry.redundancy,
-        "rivals": [_rival(rival) for rival in entry.rivals],
-        "consequences": list(entry.consequences),
-        "prediction_T": entry.prediction,
-        "prediction_log10_p": None if after is None else after / _LN10,
-        "predicted_error": list(entry.prediction_error),
-        "returned": entry.returned,
+        "rivals": [
+            members(rival, "name", T="statistic") | members(rival, "dimension", "odds")
+            for rival in entry.rivals
+        ],
+        **members(entry, "consequences", prediction_T="prediction"),
+        "prediction_log10_p": None if after is None else after / LN10,
+        **members(entry, predicted_error="prediction_error", returned="returned"),
         "kept": entry.kept or None,
     }
 
 
-def _rival(rival: Rival) -> dict[str, Any]:
-    return {"name": rival.name, "T": rival.statistic, "dimension": rival.dimension, "odds": rival.odds}
+_STANDING = ("status", "weighted_sum_of_squares", "degrees_of_freedom")
 
 
 def _standing(standing: Standing) -> dict[str, Any]:
     f = standing.degrees_of_freedom
-    return {
-        "status": standing.status,
-        "weighted_sum_of_squares": standing.weighted_sum_of_squares,
-        "degrees_of_freedom": f,
-        "variance_of_unit_weight": standing.weighted_sum_of_squares / f if f > 0 else None,
-    }
+    variance = standing.weighted_sum_of_squares / f if f > 0 else None
+    return members(standing, *_STANDING) | {"variance_of_unit_weight": variance}
 
 
 def _said(standing: Standing) -> str:
@@ -276,6 +229,20 @@ def _said(standing: Standing) -> str:
     return f"{test.variance:.4f} with {freedom} degrees of freedom, expected {expected}: {said}"
 
 
+def rivals_of(rivals: Iterable[Rival], figures: int) -> str:
+    """Return what else may be wrong in the place of what was taken out, with so many figures of the odds."""
+    return "; ".join(f"{rival.name} ({rival.odds:.{figures}g} : 1)" for rival in rivals)
+
+
+def estimated_errors(entry: Removal) -> str:
+    """Return by how much the components of what was taken out are wrong."""
+    rows = zip(entry.components, entry.error, entry.units, entry.error_sd, strict=True)
+    return ", ".join(
+        f"{component} {error:.4g} {unit} (sd {sd:.2g})".replace("  ", " ")
+        for component, error, unit, sd in rows
+    )
+
+
 def _lines(entry: Removal) -> list[str]:
     """Write an entry of the log: what, why, how large, what else it may be, what went with it."""
     if entry.kept:
@@ -284,17 +251,11 @@ def _lines(entry: Removal) -> list[str]:
         state = f"round {entry.round}, returned in round {entry.returned}"
     else:
         state = f"round {entry.round}"
-    errors = ", ".join(
-        f"{component} {error:.4g} {unit} (sd {sd:.2g})".replace("  ", " ")
-        for component, error, unit, sd in zip(
-            entry.components, entry.error, entry.units, entry.error_sd, strict=True
-        )
-    )
-    lines = [f"{entry.name}: {state}"]
+    errors, lines = estimated_errors(entry), [f"{entry.name}: {state}"]
     if not math.isnan(entry.log_probability):
         lines.append(
             f"    T {entry.statistic:.2f} ({entry.first_statistic:.2f} at first sight), dimension"
-            f" {entry.dimension}, F {entry.fisher:.2f}, log10 p {entry.log_probability / _LN10:.1f}"
+            f" {entry.dimension}, F {entry.fisher:.2f}, log10 p {entry.log_probability / LN10:.1f}"
             f" (limit {math.log10(entry.limit):.1f})"
         )
     if errors:
@@ -306,6 +267,24 @@ def _lines(entry: Removal) -> list[str]:
     if entry.prediction is not None and entry.prediction_log_probability is not None:
         lines.append(
             f"    against the rest: T {entry.prediction:.2f}, log10 p"
-            f" {entry.prediction_log_probability / _LN10:.1f}"
+            f" {entry.prediction_log_probability / LN10:.1f}"
         )
     return lines
+
+
+@findings_of.register(Snooped)
+def snooped_findings(found: Snooped) -> Findings:
+    """Return the findings on the network without gross errors, and what was taken out."""
+    kept = [f"suspect, but kept: {entry.name} ({entry.kept})" for entry in found.log if entry.kept]
+    rest = findings_of(found.result)
+    return replace(
+        rest,
+        snooped=Removed(
+            [_member(entry) for entry in found.removed],
+            images=found.share_removed("image"),
+            control=found.share_removed("control"),
+            rivals=found.rivals,
+            exchanged=[each.sentence for each in found.exchanged],
+        ),
+        remarks=[*rest.remarks, *kept],
+    )

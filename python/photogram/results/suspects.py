@@ -29,13 +29,7 @@ ANGLES = ("omega", "phi", "kappa")
 
 
 def block_suspects(block: Block, core: _photocore.NetworkSuspects, *, parts: bool = True) -> Suspects:
-    """Return the groups of observations of a block as the core has them.
-
-    Parameters
-    ----------
-    parts
-        Whether a part of a control point or of a station may go alone.
-    """
+    """Return the groups of observations of a block as the core has them; `parts` of some may go alone."""
     return _Named(block, core, parts).suspects()
 
 
@@ -71,11 +65,7 @@ class _Named(NamedSuspects):
         axes = ("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z")
         plan = "rad" if block.geographic else block.linear_unit
         super().__init__(
-            block,
-            core,
-            apart=parts,
-            components=(axes, axes, ANGLES),
-            lengths=(plan, plan, block.linear_unit),
+            block, core, apart=parts, components=(axes, axes, ANGLES), lengths=(plan, plan, block.linear_unit)
         )
         self.block = block
         self.observations = observations_of_core(block)
@@ -110,7 +100,8 @@ class _Named(NamedSuspects):
         if observation.moment is not None:
             return self._flown(observation.moment.trajectory)
         if isinstance(observation, Smoothness):
-            return self._flown_with(observation)
+            own = self._of_coefficients.get(id(observation.unknowns[0]))
+            return np.zeros(0, dtype=np.int64) if own is None else self._flown(own)
         seen = [self.photos_of_point(self.point_row[name]) for name in observation.points]
         own = np.array([self.photo_row[name] for name in observation.photos], dtype=np.int64)
         return np.unique(np.concatenate([own, *seen]))
@@ -118,11 +109,6 @@ class _Named(NamedSuspects):
     def _flown(self, trajectory: Trajectory) -> Indices:
         """Return the photos on a trajectory."""
         return self._on_trajectories.get(id(trajectory), np.zeros(0, dtype=np.int64))
-
-    def _flown_with(self, observation: Observation) -> Indices:
-        """Return the photos on the trajectory whose coefficients an observation is of."""
-        own = self._of_coefficients.get(id(observation.unknowns[0]))
-        return np.zeros(0, dtype=np.int64) if own is None else self._flown(own)
 
     @cached_property
     def _on_trajectories(self) -> dict[int, Indices]:

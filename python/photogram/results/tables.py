@@ -268,17 +268,8 @@ def _each(every: Sequence[Any], what: str) -> Any:
     return np.repeat(np.array([*map(attrgetter(what), every)], dtype=object), counts)
 
 
-def _features(result: Result) -> list[Quantity]:
-    """Return value, standard deviation, k and U of each quantity of features."""
-    return _told((result.features or Features(())).columns())
-
-
-def _feature_deviations(result: Result) -> list[Quantity]:
-    """Return distances of points from their features, in each direction."""
-    return _told((result.features or Features(())).deviation_columns())
-
-
-def _told(columns: Mapping[str, Any]) -> list[Quantity]:
+def _quantities(columns: Mapping[str, Any]) -> list[Quantity]:
+    """Return named columns of features as quantities."""
     return [
         Quantity(values, kind=kind, name=name, about=about)
         for name, values in columns.items()
@@ -292,7 +283,7 @@ TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
     "observation": lambda result: observed_components(result.kinds.values()),
     "camera": lambda result: camera_parameters(result.cameras),
     "unknown": lambda result: unknowns(result.unknowns),
-    "feature": _features,
-    "deviation": _feature_deviations,
+    "feature": lambda result: _quantities((result.features or Features(())).columns()),
+    "deviation": lambda result: _quantities((result.features or Features(())).deviation_columns()),
 }
 """The tables by the kind of things that have their rows."""

@@ -125,12 +125,7 @@ def _(result: Result) -> Determined:
 def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestPoint]:
     """Return the points of the largest ratios, and those nearest to a station, the worst first.
 
-    Parameters
-    ----------
-    result
-        With cofactors; without them there are none.
-    count
-        How many, at the most.
+    None without cofactors.
     """
     network = determined(result)
     cofactors = network.point_cofactors

@@ -11,14 +11,9 @@ ARCSEC = math.pi / 648000.0
 
 
 def degrees_minutes_seconds(angle: float, decimals: int) -> tuple[int, int, float]:
-    """Split the size of an angle in radians; it is rounded as a whole, so that no 60 appears.
+    """Split the size of an angle in radians, its sign left out, with so many decimals of the seconds.
 
-    Parameters
-    ----------
-    angle
-        Radians; the sign is left to the caller.
-    decimals
-        Decimals of the seconds to round to.
+    It is rounded as a whole, so that no 60 appears.
     """
     scale: int = 10**decimals
     minutes, units = divmod(round(math.degrees(abs(angle)) * 3600 * scale), 60 * scale)

@@ -41,16 +41,10 @@ def unit_written(unit: str) -> str:
 
 
 def page_table(caption: str, table: Quantities, note: str = "", by: Floats | None = None) -> Table:
-    """Return a table of quantities; those without a head are left out.
+    """Return a table of quantities, a column for each component, or one where each row is of one component.
 
-    Parameters
-    ----------
-    caption, note
-        Of the table on the page.
-    table
-        A column for each of their components, or one where each row is of one component.
-    by
-        Deviations (r, k) that say how many decimals the components have: two figures of the median.
+    Those without a head are left out. `by` are deviations (r, k) that say how many decimals the components
+    have: two figures of the median.
     """
     written = [pair for each in table if each.head for pair in _columns(each, by)]
     rows = zip(*(cells for _, cells in written), strict=True)
@@ -61,7 +55,11 @@ def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Writt
     """Return the columns of a quantity with their cells."""
     if each.of is not None and each.kind == "name":
         mixed = _mixed(each)
-        return [(Column(each.head, text=True), [_component(each.axes[k], mixed) for k in each.of.tolist()])]
+        names = [
+            f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
+            for axis in each.axes
+        ]
+        return [(Column(each.head, text=True), [names[k] for k in each.of.tolist()])]
     if not each.axes:
         return [(_column(each, each.head, "", None), _with_marks(_cells(each), each.marked))]
     if each.of is not None:
@@ -88,18 +86,9 @@ def long_table(
 ) -> list[Table]:
     """Return a table with a row for each component that is there, those of the largest tests; none without.
 
-    Parameters
-    ----------
-    caption
-        Of the table on the page.
-    table
-        What it has; quantities without a head are left out.
-    tests
-        (n, k) test values, infinite where there is none, NaN where the component is not there.
-    by
-        Deviations (r, k) that say how many decimals values and differences have.
-    what
-        What rows are called where they are not all.
+    `tests` are (n, k) test values, infinite where there is none, NaN where the component is not there, `by`
+    (r, k) deviations that say how many decimals values and differences have; `what` rows are called where
+    they are not all.
     """
     places = np.argwhere(~np.isnan(tests))
     if not len(places):
@@ -114,10 +103,6 @@ def long_table(
 
 def _mixed(each: Quantity) -> bool:
     return len({axis.small for axis in each.axes}) > 1
-
-
-def _component(axis: Axis, mixed: bool) -> str:
-    return f"{axis.name}, {unit_written(axis.small)}" if mixed and axis.small else axis.name
 
 
 def _column(each: Quantity, head: str, unit: str, decimals: int | None) -> Column:

@@ -11,7 +11,7 @@ from photogram.show.cells import page_table, unit_written
 from photogram.show.lines import field, table_lines
 from photogram.show.page import Drawing, Part, Section, Table, decimals_of
 from photogram.show.pictures import new_figure
-from photogram.show.quantity import Axis, Quantity, component, of_each, records
+from photogram.show.quantity import Axis, Quantity, component, members, of_each, records
 from photogram.show.style import FAINT, INK, MARKED, in_style
 
 if TYPE_CHECKING:
@@ -159,37 +159,20 @@ def control_charts(history: History, title: str) -> Figure:
 def history_document(history: History) -> dict[str, object]:
     """Return a history as plain values for a JSON document."""
     own = history.series
-    occasions = [
-        [None if change.at is None else history.occasions[change.at] for change in each.changes]
-        for each in own
-    ]
     changes = [
         [
-            {
-                "kind": change.kind,
-                "size": change.size,
-                "sd": change.sd,
-                "t": change.statistic,
-                "log10_p": change.log10_p,
-                "occasion": occasion,
-                "sentence": change.sentence,
-            }
-            for change, occasion in zip(each.changes, when, strict=True)
+            members(change, "kind", "size", "sd", t="statistic", log10_p="log10_p")
+            | {"occasion": None if change.at is None else history.occasions[change.at]}
+            | {"sentence": change.sentence}
+            for change in each.changes
         ]
-        for each, when in zip(own, occasions, strict=True)
+        for each in own
     ]
     more = [of_each(own, name) for name in ("name", "unit", "values", "sd", "model", "off", "off_sd")]
     table = [*more, *series(history), of_each(own, "steps", member="steps_t")]
     return {
-        "occasions": history.occasions,
-        "times": history.times,
-        "tests": history.tests,
-        "level": history.level,
-        "limit": history.limit,
-        "constancy": {
-            "variance": history.constancy.variance,
-            "degrees_of_freedom": history.constancy.degrees_of_freedom,
-            "probability": history.constancy.probability_above,
-        },
+        **members(history, "occasions", "times", "tests", "level", "limit"),
+        "constancy": members(history.constancy, "variance", "degrees_of_freedom")
+        | {"probability": history.constancy.probability_above},
         "series": records([*table, Quantity(changes, member="changes")]),
     }

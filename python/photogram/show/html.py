@@ -1,23 +1,27 @@
-"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`."""
+"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`.
+
+Pictures of few things stand in it as vectors, those of many as dots.
+"""
 
 from __future__ import annotations
 
+import base64
+import io
 import math
 import re
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from photogram import _photocore
-from photogram.show.inline import inlined
-from photogram.show.page import Cell, Column, Drawing, Layers, Page, Part, Section, Table
+from photogram.show.page import Cell, Column, Drawing, Layers, Page, Part, Picture, Section, Table
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-__all__ = ["page_html"]
+__all__ = ["inlined", "page_html"]
 
 LONG = 16
 """Characters of a word that a table may break; shorter ones give the least width of their column."""
@@ -26,10 +30,7 @@ LONG = 16
 def page_html(page: Page) -> bytes:
     """Return a page as an HTML file (UTF-8) that needs no network and no other file.
 
-    Raises
-    ------
-    ModuleNotFoundError
-        jinja2 or matplotlib is missing: `pip install 'photogram[report]'`.
+    It takes jinja2 and matplotlib (`pip install 'photogram[report]'`).
     """
     environment = _environment()
     sections = [drawn for section in page.sections if (drawn := _drawn(section)).parts]
@@ -128,3 +129,56 @@ def _drawn(section: Section) -> Section:
         else:
             parts.append(part)
     return replace(section, parts=parts)
+
+
+LARGEST = 600_000
+"""Bytes of a picture of vectors at most: one that has more after all becomes dots."""
+DPI = 170
+"""Dots an inch of the others: sharp on paper and on fine screens."""
+
+
+def inlined(drawing: Drawing) -> Picture | None:
+    """Draw a picture; None where it has nothing to show. It needs matplotlib, of `photogram[report]`."""
+    from photogram.show.style import styled
+
+    # Ticks are made when a figure is saved; identifiers are the same in every run.
+    with styled({"svg.hashsalt": drawing.name}):
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+        figure = drawing.draw()
+        if figure is None:
+            return None
+        width, height = figure.get_size_inches()
+        content = io.StringIO()
+        canvas: Any = FigureCanvasSVG(figure)  # without types; savefig would draw all of it twice
+        canvas.print_svg(content, metadata={"Date": None, "Creator": None})
+        markup = _embedded(content.getvalue(), drawing, width)
+        if len(markup) > LARGEST:
+            dots = io.BytesIO()
+            figure.savefig(dots, format="png", dpi=DPI, metadata={"Software": None})
+            data = base64.b64encode(dots.getvalue()).decode()
+            markup = (
+                f'<img src="data:image/png;base64,{data}" alt="{_quoted(drawing.title)}"'
+                f' width="{96 * width:.0f}" height="{96 * height:.0f}">'
+            )
+    return Picture(drawing.name, drawing.title, drawing.caption, markup)
+
+
+def _embedded(text: str, drawing: Drawing, width: float) -> str:
+    """Return an SVG file as an element of a page: without prologue, with identifiers of its own."""
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
+    head, body = text.split(">", 1)
+    [box] = re.findall(r'viewBox="[^"]*"', head)
+    prefix = f"{drawing.name}-"
+    body = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}\1"', body)
+    body = re.sub(r'((?:xlink:)?href=")#', rf"\1#{prefix}", body)
+    body = re.sub(r"url\(#", f"url(#{prefix}", body)
+    label = f'role="img" aria-label="{_quoted(drawing.title)}"'
+    return f'<svg {box} {label} xmlns:xlink="http://www.w3.org/1999/xlink" width="{96 * width:.0f}">{body}'
+
+
+def _quoted(text: str) -> str:
+    from markupsafe import escape
+
+    return str(escape(text))

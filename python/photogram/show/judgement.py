@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from photogram.show.page import Cell, Column, Judgement, Remarks, Section, Table, Tone
 
 if TYPE_CHECKING:
-    from photogram.statistics.evidence import Test
     from photogram.statistics.verdict import Verdict
 
 __all__ = ["judged", "remarks_section", "signs_of", "tests_section", "verdict_table"]
@@ -38,23 +37,30 @@ def judged(verdict: Verdict, on: str = "") -> Judgement:
 
 def verdict_table(verdict: Verdict) -> Table:
     """Return all tests of a verdict."""
-    columns = (
-        Column("Test", text=True),
-        Column("Statistic", text=True),
-        Column("Value"),
-        Column("At least"),
-        Column("At most"),
-        Column("p", figures=2),
-        Column("Level", figures=2),
-        Column("Tests that share it", decimals=0),
-        Column("Outcome", text=True),
-    )
     note = (
         "p is the probability of a value as far out where nothing is wrong. A test rejects where it is"
         " below its"
         " level. Of every kind of observation the least probable one stands here."
     )
-    return Table("Tests", columns, [_row(each) for each in verdict.tests], note)
+    return Table.of(
+        "Tests",
+        verdict.tests,
+        [
+            (Column("Test", text=True), lambda test: test.name[:1].upper() + test.name[1:]),
+            (Column("Statistic", text=True), lambda test: signs_of(test.statistic)),
+            (Column("Value"), lambda test: test.value),
+            (Column("At least"), lambda test: test.limits[0]),
+            (Column("At most"), lambda test: test.limits[1]),
+            (Column("p", figures=2), lambda test: Cell("< 1e-99", sorts=0.0) if test.p < LEAST else test.p),
+            (Column("Level", figures=2), lambda test: test.level),
+            (Column("Tests that share it", decimals=0), lambda test: test.tests),
+            (
+                Column("Outcome", text=True),
+                lambda test: Cell("passes") if test.accepted else Cell("rejects", tone="look"),
+            ),
+        ],
+        note,
+    )
 
 
 def signs_of(statistic: str) -> str:
@@ -71,24 +77,6 @@ def remarks_section(sentences: Iterable[object]) -> Section:
     """Return the section of what was remarked on; empty, and so not shown, where that is nothing."""
     told = [str(each) for each in sentences]
     return Section("remarks", "Remarks", [Remarks(told)] if told else [])
-
-
-def _row(test: Test) -> list[Cell | str | float | None]:
-    low, high = test.limits
-    p = Cell("< 1e-99", sorts=0.0) if test.p < LEAST else test.p
-    outcome = Cell("passes") if test.accepted else Cell("rejects", tone="look")
-    name = test.name[:1].upper() + test.name[1:]
-    return [
-        name,
-        signs_of(test.statistic),
-        test.value,
-        low,
-        high,
-        p,
-        test.level,
-        test.tests,
-        outcome,
-    ]
 
 
 _STATISTICS = {"s^2": "s²", "A^2": "A²", "c'C^-1c": "c′C⁻¹c"}

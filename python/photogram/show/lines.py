@@ -28,11 +28,7 @@ class Field:
 
 
 def field(
-    quantity: Quantity,
-    width: int,
-    form: str | Sequence[str] = "",
-    head: str = "{name} {unit}",
-    gap: str = "",
+    quantity: Quantity, width: int, form: str | Sequence[str] = "", head: str = "{name} {unit}", gap: str = ""
 ) -> list[Field]:
     """Return a quantity as fields, one for each of its components.
 
@@ -74,13 +70,7 @@ def field(
 
 
 def _numbers(
-    quantity: Quantity,
-    axis: Axis,
-    values: Floats,
-    width: int,
-    forms: Sequence[str],
-    head: str,
-    gap: str,
+    quantity: Quantity, axis: Axis, values: Floats, width: int, forms: Sequence[str], head: str, gap: str
 ) -> Field:
     unit = unit_of(quantity, axis)
     named = f"{gap}{head.format(name=axis.name, unit=unit).strip():>{width}}"
@@ -161,16 +151,8 @@ def stacked(
 ) -> list[str]:
     """Return a table in which each thing has a line for each quantity, under the names of the components.
 
-    Parameters
-    ----------
-    names, head
-        Of the things, and what they are.
-    quantities
-        With the forms in which their numbers are written.
-    first
-        What stands behind the first of the lines.
-    above
-        Heads of the components.
+    `quantities` have the forms in which their numbers are written, `first` stands behind the first of the
+    lines, `above` are heads of the components.
     """
     longest = max((len(str(name)) for name in np.asarray(names.values).tolist()), default=0)
     width = max(10, longest + 1)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
@@ -38,6 +38,8 @@ __all__ = [
     "fixed",
     "significant",
 ]
+
+T = TypeVar("T")
 
 Tone = Literal["", "good", "look", "bad"]
 """How a thing is to be taken: no colour stands without words that say the same."""
@@ -123,6 +125,18 @@ class Table:
     rows: Sequence[Row]
     note: str = ""
     kind: str = field(default="table", init=False)
+
+    @classmethod
+    def of(
+        cls,
+        caption: str,
+        things: Iterable[T],
+        columns: Sequence[tuple[Column, Callable[[T], Cell | str | float | None]]],
+        note: str = "",
+    ) -> Table:
+        """Return a table with a row for each thing: its columns, and what stands in each of a thing."""
+        rows = [[told(each) for _, told in columns] for each in things]
+        return cls(caption, [column for column, _ in columns], rows, note)
 
     def cells(self) -> Iterable[list[tuple[Column, Cell]]]:
         """Return the rows as cells with their columns."""
@@ -319,16 +333,10 @@ def significant(value: float, figures: int = 4) -> str:
 def decimals_of(
     deviations: Floats, *, smallest: bool = False, unknown: int = 4, most: int = MOST_DECIMALS
 ) -> int:
-    """Return with how many decimals values are written whose standard deviations are these.
+    """Return with how many decimals values are written whose standard deviations are these, in their unit.
 
-    Parameters
-    ----------
-    deviations
-        In the unit in which values are written.
-    smallest
-        Whether the smallest of them keeps two significant figures; otherwise the median does.
-    unknown, most
-        Decimals where none is known, and at the most.
+    The smallest of them keeps two significant figures, or the median; `unknown` where none is known, `most`
+    at the most.
     """
     known = np.asarray(deviations, dtype=float)
     known = known[np.isfinite(known) & (known > 0)]

@@ -1,34 +1,47 @@
 """A page as a PDF document on A4; what makes it is the extra `photogram[pdf]`, and matplotlib for pictures.
 
 The first sections stand on the first page as far as they go; sections that are annexes begin on pages of
-their own. Equal pages give equal bytes.
+their own; tables have letters as small as it takes for them to go on a sheet. Equal pages give equal bytes.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-from photogram.errors import InputError
-from photogram.show.page import (
-    Drawing,
-    Facts,
-    Judgement,
-    Layers,
-    Page,
-    Part,
-    Remarks,
-    Section,
-    Table,
-    Text,
-)
-from photogram.show.pdf_tables import BOLD, CLOSE, FONT, INK, RULE, SOFT, TONES, grid
+import matplotlib as mpl
+from reportlab.lib.pagesizes import A4
+from reportlab.lib.styles import ParagraphStyle
+from reportlab.pdfbase.pdfmetrics import registerFont, registerFontFamily, stringWidth
+from reportlab.pdfbase.ttfonts import TTFont
+from reportlab.pdfgen.canvas import Canvas
+from reportlab.platypus import BaseDocTemplate, Frame, LongTable, PageBreak, PageTemplate, Paragraph, Spacer
+from reportlab.platypus import Table as Grid
+
+from photogram.show.page import Drawing, Facts, Judgement, Layers, Page, Part, Remarks, Section, Table, Text
+from photogram.show.style import styled
+from photogram.show.vectors import FigureFlowable
 
 __all__ = ["page_pdf"]
 
+FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
+INK, SOFT, RULE = "#17212b", "#55626e", "#d6dce1"
+TONES = {"good": "#00694a", "look": "#8a5200", "bad": "#a3201a", "": INK}
+SIZES = (6.9, 6.4, 5.9, 5.4, 5.0)
+"""Points of the letters."""
+PADDING = 7.0
+"""Points beside what stands in a cell."""
+CLOSE: Sequence[tuple[Any, ...]] = (
+    ("VALIGN", (0, 0), (-1, -1), "TOP"),
+    ("LEFTPADDING", (0, 0), (-1, -1), 2),
+    ("RIGHTPADDING", (0, 0), (-1, -1), 4),
+    ("TOPPADDING", (0, 0), (-1, -1), 1),
+    ("BOTTOMPADDING", (0, 0), (-1, -1), 1.5),
+)
 MARGIN = 44.0
 """Points at all sides of a sheet."""
 HIGHEST, FRONT = 300.0, 215.0
@@ -36,20 +49,8 @@ HIGHEST, FRONT = 300.0, 215.0
 
 
 def page_pdf(page: Page, *, author: str = "") -> bytes:
-    """Return a page as a PDF document.
-
-    Raises
-    ------
-    InputError
-        reportlab, or matplotlib, which has the fonts, is missing: `pip install 'photogram[pdf]'`.
-    """
-    try:
-        import matplotlib as mpl
-        from reportlab.lib.pagesizes import A4
-        from reportlab.platypus import BaseDocTemplate, Frame, PageTemplate
-    except ModuleNotFoundError:
-        raise InputError("a PDF needs reportlab and matplotlib: pip install 'photogram[pdf]'") from None
-    _fonts(mpl.get_data_path())
+    """Return a page as a PDF document."""
+    _fonts(Path(mpl.get_data_path()) / "fonts" / "ttf")
     content = io.BytesIO()
     document = BaseDocTemplate(
         content,
@@ -65,19 +66,13 @@ def page_pdf(page: Page, *, author: str = "") -> bytes:
     width, height = A4[0] - 2 * MARGIN, A4[1] - 2 * MARGIN
     frame = Frame(MARGIN, MARGIN, width, height, 0, 0, 0, 0, id="sheet")
     document.addPageTemplates(PageTemplate("sheet", [frame], onPage=_foot(page)))
-    document.build(list(_Flow(page, width).story()), canvasmaker=_numbered())
+    document.build(list(_Flow(page, width).story()), canvasmaker=_Numbered)
     return content.getvalue()
 
 
 @cache
-def _fonts(data: str) -> None:
+def _fonts(folder: Path) -> None:
     """Make the fonts known that matplotlib brings along: they have all letters of the languages."""
-    from pathlib import Path
-
-    from reportlab.pdfbase.pdfmetrics import registerFont, registerFontFamily
-    from reportlab.pdfbase.ttfonts import TTFont
-
-    folder = Path(data) / "fonts" / "ttf"
     for name in (FONT, BOLD):
         registerFont(TTFont(name, folder / f"{name}.ttf"))
     registerFontFamily(FONT, normal=FONT, bold=BOLD, italic=FONT, boldItalic=BOLD)
@@ -94,39 +89,46 @@ def _foot(page: Page) -> Any:
     return draw
 
 
-def _numbered() -> Any:
-    """Return a canvas that knows how many pages there are when it numbers them."""
-    from reportlab.pdfgen.canvas import Canvas
+class _Numbered(Canvas):  # type: ignore[misc]
+    """A canvas that knows how many pages there are when it numbers them."""
 
-    class Numbered(Canvas):  # type: ignore[misc]
-        def __init__(self, *given: Any, **more: Any) -> None:
-            super().__init__(*given, **more)
-            self._sheets: list[dict[str, Any]] = []
+    def __init__(self, *given: Any, **more: Any) -> None:
+        super().__init__(*given, **more)
+        self._sheets: list[dict[str, Any]] = []
 
-        def showPage(self) -> None:  # noqa: N802
-            self._sheets.append(dict(self.__dict__))
-            self._startPage()
+    def showPage(self) -> None:  # noqa: N802
+        """Keep the page until all are there."""
+        self._sheets.append(dict(self.__dict__))
+        self._startPage()
 
-        def save(self) -> None:
-            for sheet in self._sheets:
-                self.__dict__.update(sheet)
-                self.setFont(FONT, 7)
-                self.setFillColor(SOFT)
-                self.drawRightString(
-                    self._pagesize[0] - MARGIN, MARGIN / 2, f"{self._pageNumber} / {len(self._sheets)}"
-                )
-                super().showPage()
-            super().save()
+    def save(self) -> None:
+        """Write the pages with their numbers."""
+        for sheet in self._sheets:
+            self.__dict__.update(sheet)
+            self.setFont(FONT, 7)
+            self.setFillColor(SOFT)
+            number = f"{self._pageNumber} / {len(self._sheets)}"
+            self.drawRightString(self._pagesize[0] - MARGIN, MARGIN / 2, number)
+            super().showPage()
+        super().save()
 
-    return Numbered
+
+def _heading(text: str, style: Any, key: str) -> Paragraph:
+    """Return a heading that stands among the bookmarks, too."""
+
+    class Heading(Paragraph):  # type: ignore[misc]
+        def draw(self) -> None:
+            self.canv.bookmarkPage(key)
+            self.canv.addOutlineEntry(self.getPlainText(), key, 0, closed=False)
+            super().draw()
+
+    return Heading(text, style)
 
 
 class _Flow:
     """The page as what flows over sheets."""
 
     def __init__(self, page: Page, width: float) -> None:
-        from reportlab.lib.styles import ParagraphStyle
-
         self._page, self._width, self._front = page, width, True
 
         def style(size: float, **more: Any) -> Any:
@@ -146,8 +148,6 @@ class _Flow:
 
     def story(self) -> Iterator[Any]:
         """Return everything, one after the other."""
-        from reportlab.platypus import PageBreak, Paragraph, Spacer
-
         page = self._page
         if page.title:
             yield Paragraph(escape(page.what), self._what)
@@ -167,9 +167,6 @@ class _Flow:
             yield from self._section(section)
 
     def _judgement(self, judgement: Judgement) -> Iterator[Any]:
-        from reportlab.platypus import Paragraph
-        from reportlab.platypus import Table as Grid
-
         lines = [
             Paragraph(escape(f"{judgement.mark} {judgement.on}".strip()), self._mark[judgement.tone]),
             Paragraph(escape(judgement.headline), self._headline),
@@ -187,12 +184,10 @@ class _Flow:
         yield grid
 
     def _section(self, section: Section) -> Iterator[Any]:
-        from reportlab.platypus import Paragraph
-
         if not section.parts:
             return
         if section.title:
-            yield _Heading(escape(section.title), self._head, section.id)
+            yield _heading(escape(section.title), self._head, section.id)
         if section.intro:
             yield Paragraph(escape(section.intro), self._small)
         if self._front and [type(part) for part in section.parts] == [Remarks, Drawing]:
@@ -203,8 +198,6 @@ class _Flow:
 
     def _beside(self, told: Any, drawing: Any) -> Any:
         """Return sentences with a picture at their side: the first sheet is to hold both."""
-        from reportlab.platypus import Table as Grid
-
         whole = self._width
         columns = (0.52 * whole, 0.48 * whole)
         cells = []
@@ -217,8 +210,6 @@ class _Flow:
         return grid
 
     def _part(self, part: Part, within: str) -> Iterator[Any]:
-        from reportlab.platypus import Paragraph, Spacer
-
         if isinstance(part, Table):
             yield from self._table(part, within)
         elif isinstance(part, Facts):
@@ -238,11 +229,6 @@ class _Flow:
         yield Spacer(1, 2)
 
     def _drawing(self, drawing: Drawing) -> Iterator[Any]:
-        from reportlab.platypus import Paragraph
-
-        from photogram.show.style import styled
-        from photogram.show.vectors import FigureFlowable
-
         with styled():
             figure = drawing.draw()
         if figure is not None:
@@ -250,9 +236,6 @@ class _Flow:
             yield Paragraph(escape(drawing.caption), self._small)
 
     def _facts(self, facts: Facts) -> Any:
-        from reportlab.platypus import Paragraph
-        from reportlab.platypus import Table as Grid
-
         rows = [
             [
                 Paragraph(escape(each.name), self._cell),
@@ -265,23 +248,68 @@ class _Flow:
         return grid
 
     def _table(self, table: Table, within: str) -> Iterator[Any]:
-        from reportlab.platypus import Paragraph
-
         if table.caption != within:
             yield Paragraph(escape(table.caption), self._caption)
         if table.note:
             yield Paragraph(escape(table.note), self._small)
-        yield grid(table, self._width)
+        yield _grid(table, self._width)
 
 
-def _Heading(text: str, style: Any, key: str) -> Any:  # noqa: N802
-    """Return a heading that stands among the bookmarks, too."""
-    from reportlab.platypus import Paragraph
+def _grid(table: Table, width: float) -> Any:
+    """Return a table that flows over sheets, no wider than there is room; its head is on each of them."""
+    size, widths = _fitted(table, width)
 
-    class Heading(Paragraph):  # type: ignore[misc]
-        def draw(self) -> None:
-            self.canv.bookmarkPage(key)
-            self.canv.addOutlineEntry(self.getPlainText(), key, 0, closed=False)
-            super().draw()
+    def style(name: str, font: str, alignment: int) -> Any:
+        given = {"fontName": font, "fontSize": size, "leading": 1.28 * size, "textColor": INK}
+        return ParagraphStyle(name, alignment=alignment, **given)
 
-    return Heading(text, style)
+    cells = {text: style("cell", FONT, 0 if text else 2) for text in (True, False)}
+    heads = {text: style("head", BOLD, 0 if text else 2) for text in (True, False)}
+    first = [
+        Paragraph(escape(each.head) + (f"<br/>{escape(each.unit)}" if each.unit else ""), heads[each.text])
+        for each in table.columns
+    ]
+    rows = []
+    for row in table.cells():
+        written = [(column, cell, escape(column.written(cell.value))) for column, cell in row]
+        rows.append(
+            [
+                Paragraph(f'<font color="{TONES[cell.tone]}">{text}</font>', cells[column.text])
+                for column, cell, text in written
+            ]
+        )
+    found = LongTable([first, *rows], colWidths=widths, repeatRows=1, hAlign="LEFT")
+    lines = (("LINEBELOW", (0, 0), (-1, 0), 0.8, INK), ("LINEBELOW", (0, 1), (-1, -1), 0.3, RULE))
+    found.setStyle([*lines, *CLOSE])
+    return found
+
+
+def _fitted(table: Table, width: float) -> tuple[float, list[float]]:
+    """Return the size of letters, and widths of columns: names give way first, down to their longest word."""
+    for size in SIZES:
+        wide, least = _widths(table, size, width)
+        if sum(least) <= width:
+            break
+    over = sum(wide) - width
+    if over <= 0:
+        return size, wide
+    slack = [max(each - small, 0.0) for each, small in zip(wide, least, strict=True)]
+    given = min(1.0, over / sum(slack)) if sum(slack) > 0 else 0.0
+    found = [each - given * own for each, own in zip(wide, slack, strict=True)]
+    return size, [each * min(1.0, width / sum(found)) for each in found]
+
+
+def _widths(table: Table, size: float, width: float) -> tuple[list[float], list[float]]:
+    """Return how wide columns would be, and how wide they have to be at the least."""
+    rows = [[column.written(cell.value) for column, cell in row] for row in table.cells()]
+    wide, least = [], []
+    for k, column in enumerate(table.columns):
+        heads = [word for text in (column.head, column.unit) for word in text.split()]
+        head = max((stringWidth(word, BOLD, size) for word in heads), default=0.0)
+        texts = [row[k] for row in rows]
+        longest = max((stringWidth(text, FONT, size) for text in texts), default=0.0)
+        words = [word for text in texts for word in text.split()] if column.text else texts
+        word = max((stringWidth(each, FONT, size) for each in words), default=0.0)
+        wide.append(max(min(longest, 0.5 * width), head) + PADDING)
+        least.append(max(min(word, 0.5 * width), head) + PADDING)
+    return wide, least

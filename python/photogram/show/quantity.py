@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -27,6 +28,7 @@ __all__ = [
     "joined",
     "labelled",
     "long",
+    "members",
     "of_each",
     "records",
 ]
@@ -250,6 +252,13 @@ def frame(table: Table) -> dict[str, Any]:
             with np.errstate(over="ignore"):  # infinite then
                 found[name] = np.degrees(column) if axis.angle and unit else column
     return found
+
+
+def members(thing: object, *names: str, **others: str) -> dict[str, Any]:
+    """Return attributes as members of a JSON document: under their names, then some (`a.b`) under others."""
+    attributes = {**dict(zip(names, names, strict=True)), **others}
+    values = {name: attrgetter(attribute)(thing) for name, attribute in attributes.items()}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 
 def records(table: Table) -> list[dict[str, Any]]:

@@ -72,15 +72,7 @@ def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
 
 
 def reproducibility(run: Run | None, phases: Mapping[str, float]) -> Section:
-    """Return the last section of a report.
-
-    Parameters
-    ----------
-    run
-        The run of a command; None where a report is made from Python.
-    phases
-        Seconds that the engine spent in its phases.
-    """
+    """Return the last section of a report: a command's run, or None, and seconds in phases of the engine."""
     made = [Fact("photogram", _photocore.__version__), Fact("Python", platform.python_version())]
     if run is not None:
         stamp = run.began.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S")

@@ -76,13 +76,7 @@ SETTINGS: dict[str, Any] = {
 
 
 def need_matplotlib() -> None:
-    """Say how to get matplotlib where it is absent.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        It is: the message names the extra.
-    """
+    """Say how to get matplotlib where it is absent: the error names the extra."""
     try:
         import matplotlib  # noqa: F401
     except ModuleNotFoundError as error:

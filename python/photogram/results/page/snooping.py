@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from photogram.results.snooping_result import Snooped
+from photogram.results.snooping_result import LN10, Snooped, estimated_errors, rivals_of
 from photogram.show.methods import page_of
-from photogram.show.page import Cell, Column, Fact, Page, Part, Remarks, Section, Table
+from photogram.show.page import Column, Fact, Page, Remarks, Section, Table
 from photogram.statistics.snooping.log import Removal
 
 __all__ = ["snooped_page"]
@@ -17,35 +17,28 @@ def snooped_page(found: Snooped) -> Page:
     """Return the page of the network without what was taken out."""
     page = page_of(found.judged)
     gone = Fact("Taken out", f"{len(found.removed)}", note=f"of {len(found.suspects)} groups of observations")
-    return replace(
-        page,
-        highlights=[gone, *page.highlights],
-        sections=[_log(found), *page.sections],
-    )
+    return replace(page, highlights=[gone, *page.highlights], sections=[_log(found), *page.sections])
 
 
 def _log(found: Snooped) -> Section:
-    columns = (
-        Column("Round", decimals=0),
-        Column("What", text=True),
-        Column("Estimated error", text=True),
-        Column("T", decimals=2),
-        Column("Dimension", decimals=0),
-        Column("log10 p", decimals=1),
-        Column("Redundancy", decimals=3),
-        Column("Or instead", text=True),
-        Column("Now", text=True),
+    table = Table.of(
+        "In order",
+        found.log,
+        [
+            (Column("Round", decimals=0), lambda each: each.round),
+            (Column("What", text=True), lambda each: each.name),
+            (Column("Estimated error", text=True), estimated_errors),
+            (Column("T", decimals=2), lambda each: each.statistic),
+            (Column("Dimension", decimals=0), lambda each: each.dimension),
+            (Column("log10 p", decimals=1), lambda each: each.log_probability / LN10),
+            (Column("Redundancy", decimals=3), lambda each: each.redundancy),
+            (Column("Or instead", text=True), lambda each: rivals_of(each.rivals[:3], 2)),
+            (Column("Now", text=True), _state),
+        ],
     )
-    rows = [_row(each) for each in found.log]
-    parts: list[Part] = [Table("In order", columns, rows)] if rows else []
     consequences = [f"{each.name}: {line}" for each in found.log for line in each.consequences]
-    told = (
-        [*found.outcome.remarks, *consequences]
-        if rows
-        else ["Nothing was taken out.", *found.outcome.remarks]
-    )
-    if told:
-        parts.append(Remarks(told))
+    sentences = [*([] if found.log else ["Nothing was taken out."]), *found.outcome.remarks, *consequences]
+    parts = [*([table] if found.log else []), *([Remarks(sentences)] if sentences else [])]
     settings = found.settings
     rate = "false discovery rate" if settings.fdr else "level of all tests together"
     intro = (
@@ -55,28 +48,7 @@ def _log(found: Snooped) -> Section:
     return Section("removed", "What was taken out", parts, intro)
 
 
-def _row(each: Removal) -> list[Cell | str | float | None]:
-    errors = ", ".join(
-        f"{component} {error:.4g} {unit} (sd {sd:.2g})".replace("  ", " ")
-        for component, error, unit, sd in zip(
-            each.components, each.error, each.units, each.error_sd, strict=True
-        )
-    )
-    state = (
-        f"kept: {each.kept}"
-        if each.kept
-        else "out"
-        if each.returned is None
-        else f"back in round {each.returned}"
-    )
-    return [
-        each.round,
-        each.name,
-        errors,
-        each.statistic,
-        each.dimension,
-        each.log_probability / 2.302585092994046,
-        each.redundancy,
-        "; ".join(f"{rival.name} ({rival.odds:.2g} : 1)" for rival in each.rivals[:3]),
-        state,
-    ]
+def _state(each: Removal) -> str:
+    if each.kept:
+        return f"kept: {each.kept}"
+    return "out" if each.returned is None else f"back in round {each.returned}"

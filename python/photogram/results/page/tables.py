@@ -12,7 +12,6 @@ from photogram.messages import counted
 from photogram.results.axes import point_axes
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.network_tables import Terms, control, part, photos, points, stations, terms_of
-from photogram.results.observation_kinds import ObservedKind
 from photogram.results.observation_rows import is_held
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observations, unheld
@@ -64,14 +63,7 @@ def control_section(result: AdjustedNetwork) -> Section:
 def _observed(caption: str, table: Sequence[Quantity], given: Observed, sd: Floats) -> list[Table]:
     """Return prior, posterior, difference and test of every observed component; none where there are none.
 
-    Parameters
-    ----------
-    caption
-        Of the table.
-    table, given
-        The observations.
-    sd
-        (n, k) standard deviations of the adjusted values, of all photos or points.
+    `sd` are (n, k) standard deviations of the adjusted values, of all photos or points.
     """
     there = np.isfinite(given.sd)
     tests, own = _tested(there, given.standardized), np.where(there, sd[given.rows], np.nan)
@@ -159,14 +151,13 @@ def _layers(name: str, tables: list[Table]) -> list[Layers] | list[Table]:
 
 def beside_section(result: Result) -> Section:
     """Return observations beside images, kind by kind."""
-    tables = [table for each in result.kinds.values() if each.used for table in _kind_tables(each)]
+    tables = []
+    for each in result.kinds.values():
+        if each.used:
+            tests = _tested(np.isfinite(each.residuals), each.standardized)
+            tables += long_table(each.kind[:1].upper() + each.kind[1:], observations(each), tests)
     intro = "Observations beside images: observed minus adjusted, with their tests."
     return Section("observations", "Other observations", _layers("beside", tables), intro)
-
-
-def _kind_tables(kind: ObservedKind) -> list[Table]:
-    tests = _tested(np.isfinite(kind.residuals), kind.standardized)
-    return long_table(kind.kind[:1].upper() + kind.kind[1:], observations(kind), tests)
 
 
 def chosen_rows(count: int, named: Iterable[int], orders: Sequence[Indices]) -> tuple[Indices, bool]:
@@ -184,17 +175,7 @@ def chosen_rows(count: int, named: Iterable[int], orders: Sequence[Indices]) -> 
 
 
 def photos_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
-    """Return photos: their unknowns, and how their images fit, in layers.
-
-    Parameters
-    ----------
-    result
-        The adjusted network.
-    named
-        Photos that other tables name.
-    intro
-        What they refer to.
-    """
+    """Return photos, those `named` elsewhere first: their unknowns, and how their images fit, in layers."""
     terms, fit = terms_of(result), _fit_of_photos(result, terms_of(result))
     places = {str(name): row for row, name in enumerate(terms.photos.tolist())}
     weak = {places[each.photo]: each.condition for each in weakest_photos(result)}
@@ -257,17 +238,7 @@ def _fit_of_photos(result: AdjustedNetwork, terms: Terms) -> Floats:
 
 
 def points_section(result: AdjustedNetwork, named: Iterable[int], intro: str = "") -> Section:
-    """Return points with their standard deviations.
-
-    Parameters
-    ----------
-    result
-        The adjusted network.
-    named
-        Points that other tables name.
-    intro
-        What they refer to.
-    """
+    """Return points with their standard deviations, those `named` by other tables first."""
     terms, used = terms_of(result), np.flatnonzero(result.used_points)
     places = {str(name): row for row, name in enumerate(terms.points.tolist())}
     weak = {places[each.point]: each.ratio for each in weakest_points(result)}

@@ -10,8 +10,7 @@ from photogram.results.components import VarianceComponents, statement
 from photogram.results.components_picture import figure_of_components
 from photogram.show.judgement import judged
 from photogram.show.methods import page_of
-from photogram.show.page import Column, Drawing, Page, Part, Remarks, Row, Section, Table
-from photogram.statistics.components import Component
+from photogram.show.page import Column, Drawing, Page, Part, Remarks, Section, Table
 
 __all__ = ["components_page", "components_section", "reweighed_page", "weighed_page"]
 
@@ -23,15 +22,7 @@ def components_page(found: VarianceComponents) -> Page:
 
 
 def weighed_page(found: VarianceComponents, page: Page) -> Page:
-    """Return the page of the adjustment with the given weights, judged by the components.
-
-    Parameters
-    ----------
-    found
-        The components.
-    page
-        That of the adjustment.
-    """
+    """Return the page of the adjustment with the given weights, `page`, judged by the components."""
     return replace(
         page,
         judgements=[judged(found.verdict)],
@@ -48,14 +39,8 @@ def components_section(found: VarianceComponents) -> Section:
 def reweighed_page(changes: Sequence[str], left: VarianceComponents | None, page: Page) -> Page:
     """Return the page of a network whose gross errors were taken out and weights estimated in turn.
 
-    Parameters
-    ----------
-    changes
-        What was done to the weights.
-    left
-        The components of the weights that they have now, where they were estimated.
-    page
-        That of the network that is left.
+    `changes` were made to the weights, `left` are the components of those that it has now, where they were
+    estimated, and `page` is that of the network that is left.
     """
     parts: list[Part] = [Remarks(_sentences(changes)), *(_parts(left) if left is not None else [])]
     section = Section("components", "Weights", parts, _CHANGED)
@@ -63,10 +48,11 @@ def reweighed_page(changes: Sequence[str], left: VarianceComponents | None, page
 
 
 def _parts(found: VarianceComponents) -> list[Part]:
+    caption = "Factors of the standard deviations with their intervals (95 percent); 1 is what was given."
     parts: list[Part] = [
         Remarks(_sentences(statement(found))),
-        _drawing(found),
-        Table("Components", _COLUMNS, _rows(found), _NOTE),
+        Drawing("picture-components", "Variance components", caption, lambda: figure_of_components(found)),
+        _table(found),
     ]
     if found.estimate.messages:
         parts.append(Remarks(list(found.estimate.messages)))
@@ -82,31 +68,30 @@ _INTRO = (
     "By which factors the standard deviations of groups of observations are wrong, as their residuals say."
     " Everything else on this page has the weights that were given."
 )
-_NOTE = "The interval holds the true factor of the standard deviation with 95 percent."
-_COLUMNS = (
-    Column("Group", text=True),
-    Column("Number"),
-    Column("Redundancy", decimals=2),
-    Column("Weighted sum of squares", decimals=2),
-    Column("Factor of sd", decimals=3),
-    Column("From", decimals=3),
-    Column("To", decimals=3),
-    Column("p", figures=2),
-    Column("Outcome", text=True),
-)
 
 
-def _rows(found: VarianceComponents) -> list[Row]:
-    return [_row(each) for each in found.components]
+def _table(found: VarianceComponents) -> Table:
+    return Table.of(
+        "Components",
+        found.components,
+        [
+            (Column("Group", text=True), lambda each: each.name),
+            (Column("Number"), lambda each: each.count),
+            (Column("Redundancy", decimals=2), lambda each: each.redundancy),
+            (Column("Weighted sum of squares", decimals=2), lambda each: each.squares),
+            (Column("Factor of sd", decimals=3), lambda each: each.factor_of_sd),
+            (Column("From", decimals=3), lambda each: _of_sd(each.interval[0])),
+            (Column("To", decimals=3), lambda each: _of_sd(each.interval[1])),
+            (Column("p", figures=2), lambda each: None if each.held else each.probability),
+            (
+                Column("Outcome", text=True),
+                lambda each: "held" if each.held else "to be changed" if each.worth_changing else "stands",
+            ),
+        ],
+        "The interval holds the true factor of the standard deviation with 95 percent.",
+    )
 
 
-def _row(each: Component) -> Row:
-    low, high = (math.sqrt(max(end, 0.0)) if math.isfinite(end) else end for end in each.interval)
-    outcome = "held" if each.held else "to be changed" if each.worth_changing else "stands"
-    p = None if each.held else each.probability
-    return [each.name, each.count, each.redundancy, each.squares, each.factor_of_sd, low, high, p, outcome]
-
-
-def _drawing(found: VarianceComponents) -> Drawing:
-    caption = "Factors of the standard deviations with their intervals (95 percent); 1 is what was given."
-    return Drawing("picture-components", "Variance components", caption, lambda: figure_of_components(found))
+def _of_sd(factor: float) -> float:
+    """Return the factor of a standard deviation of that of its variance."""
+    return math.sqrt(max(factor, 0.0)) if math.isfinite(factor) else factor

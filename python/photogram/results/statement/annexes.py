@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
 from photogram.results.cameras import AdjustedCamera, units
 from photogram.results.distortion import distortion_curve
 from photogram.results.statement import translation
-from photogram.results.statement.budget import Budget, budget_line
+from photogram.results.statement.budget import Budget, Source, budget_line
 from photogram.results.statement.comparison import in_order
 from photogram.results.statement.document import kinds_of
 from photogram.results.statement.drawings import overlap
@@ -46,7 +44,6 @@ __all__ = [
     "survey_annex",
 ]
 
-_AXES = ("e", "n", "h")
 SOURCES = 12
 """Sources of a budget at a finer level than kinds that the page lists, those that contribute most."""
 RADII = 11
@@ -59,34 +56,32 @@ def checks_annex(found: Statement) -> Section:
     if found.of_all is None:
         return Section("annex-a", texts("annex.a"), [], annex=True)
     tests, unit = found.of_all.points, found.result.block.linear_unit
-    decimals = decimals_for(tests.sd_adjusted)
-    columns = [
-        cells.column("point", text=True),
-        cells.column("cover", text=True),
-        *cells.columns(("difference", "sd"), unit),
-        *cells.columns(("normalised",), ""),
-        cells.column("T"),
-        cells.column("p"),
-        cells.column("others"),
-        Column("CE90", unit),
-        Column("LE90", unit),
-    ]
-    rows: list[Row] = [
+    decimals, without = decimals_for(tests.sd_adjusted), found.asked.without
+    table = Table.of(
+        texts("annex.a"),
+        range(len(own)),
         [
-            Cell(name, tone="look" if name in found.asked.without else ""),
-            texts(f"cover.{'vegetated' if own.vegetated[k] else 'open'}"),
-            *cells.vector(own.differences[k], decimals),
-            *cells.vector(tests.sd_predicted[k], decimals),
-            *cells.vector(tests.normalised[k], 1),
-            cells.number(float(tests.T[k]), 1),
-            cells.p(float(tests.p[k]), tests.limit),
-            cells.looked(float(tests.others[k]), 1, bad=bool(tests.p_others[k] < tests.limit)),
-            cells.number(float(tests.ce90[k]), decimals),
-            cells.number(float(tests.le90[k]), decimals),
-        ]
-        for k, name in enumerate(own.names)
-    ]
-    table = Table(texts("annex.a"), columns, rows)
+            (
+                cells.column("point", text=True),
+                lambda k: Cell(own.names[k], tone="look" if own.names[k] in without else ""),
+            ),
+            (
+                cells.column("cover", text=True),
+                lambda k: texts(f"cover.{'vegetated' if own.vegetated[k] else 'open'}"),
+            ),
+            *cells.along_axes("difference", own.differences, decimals, unit),
+            *cells.along_axes("sd", tests.sd_predicted, decimals, unit),
+            *cells.along_axes("normalised", tests.normalised, 1),
+            cells.numbers("T", tests.T, 1),
+            (cells.column("p"), lambda k: cells.p(float(tests.p[k]), tests.limit)),
+            (
+                cells.column("others"),
+                lambda k: cells.looked(float(tests.others[k]), 1, bad=bool(tests.p_others[k] < tests.limit)),
+            ),
+            (Column("CE90", unit), lambda k: cells.number(float(tests.ce90[k]), decimals)),
+            (Column("LE90", unit), lambda k: cells.number(float(tests.le90[k]), decimals)),
+        ],
+    )
     return Section("annex-a", texts("annex.a"), [table, _radii(found, found.of_all)], annex=True)
 
 
@@ -109,28 +104,22 @@ def _radii(found: Statement, own: Figures) -> Table:
 
 def left_out_annex(found: Statement) -> Section:
     """Return annex B: control points as the others predict them."""
-    texts, cells = found.texts, Written(found.texts)
-    if not found.left_out:
+    texts, cells, own = found.texts, Written(found.texts), found.left_out
+    if not own:
         return Section("annex-b", texts("annex.b"), [], annex=True)
-    unit = found.result.block.linear_unit
-    decimals = decimals_for(np.array([each.sd for each in found.left_out]))
-    columns = [
-        cells.column("point", text=True),
-        *cells.columns(("difference", "sd"), unit),
-        cells.column("T"),
-        cells.column("p"),
-    ]
-    rows: list[Row] = [
+    unit, sd = found.result.block.linear_unit, np.array([each.sd for each in own])
+    decimals, limit = decimals_for(sd), limit_of(own)
+    table = Table.of(
+        texts("annex.b"),
+        range(len(own)),
         [
-            each.point,
-            *cells.vector(each.difference, decimals),
-            *cells.vector(each.sd, decimals),
-            cells.number(each.T, 1),
-            cells.p(each.p, limit_of(found.left_out)),
-        ]
-        for each in found.left_out
-    ]
-    table = Table(texts("annex.b"), columns, rows)
+            (cells.column("point", text=True), lambda k: own[k].point),
+            *cells.along_axes("difference", np.array([each.difference for each in own]), decimals, unit),
+            *cells.along_axes("sd", sd, decimals, unit),
+            cells.numbers("T", [each.T for each in own], 1),
+            (cells.column("p"), lambda k: cells.p(own[k].p, limit)),
+        ],
+    )
     return Section("annex-b", texts("annex.b"), [table], texts("annex.b.note"), annex=True)
 
 
@@ -138,142 +127,140 @@ def budgets_annex(found: Statement) -> Section:
     """Return annex C: what every source of error contributes."""
     texts = found.texts
     held = translation.held(texts, found.result) or texts("annex.c.nothing")
-    parts: list[Part] = []
-    for each in found.taken_apart:
-        parts += _budget(found, each)
+    parts = [part for each in found.taken_apart for part in _budget(found, each)]
     return Section("annex-c", texts("annex.c"), parts, texts("annex.c.note", held=held), annex=True)
 
 
-def _budget(found: Statement, own: Budget) -> list[Part]:
+def _budget(found: Statement, own: Budget) -> list[Table]:
     texts, cells = found.texts, Written(found.texts)
-    columns = [
-        cells.column("source", text=True),
-        cells.column("number"),
-        cells.column("u", own.unit),
-        cells.column("share", "%"),
-        cells.column("dof"),
-        cells.column("from", text=True),
-    ]
-    estimated = own.freedom.basis == "components"
-    rows: list[Row] = []
-    for each in own.at("kind"):
-        nu = own.freedom.of_kind.get(each.name, math.inf) if estimated else math.inf
-        rows.append(
-            [
-                translation.kind(texts, each.name),
-                each.number,
-                cells.figures(each.u, 2),
-                cells.number(100 * each.share, 1),
-                texts.number(nu, 1),
-                texts("from.estimated" if estimated and math.isfinite(nu) else "from.given"),
-            ]
-        )
+    single = Table.of(
+        texts("table.single", quantity=translation.quantity(texts, own.quantity)),
+        own.largest,
+        [
+            (
+                cells.column("observation", text=True),
+                lambda each: translation.observation(texts, each.observation),
+            ),
+            (cells.column("sd"), lambda each: cells.figures(each.sd)),
+            (cells.column("sensitivity"), lambda each: cells.figures(each.sensitivity)),
+            (cells.column("u", own.unit), lambda each: cells.figures(math.sqrt(each.contribution), 2)),
+            (cells.column("share", "%"), lambda each: cells.number(100 * each.share, 1)),
+        ],
+    )
+    return [_sources(found, own), single]
+
+
+def _sources(found: Statement, own: Budget) -> Table:
+    """Return kinds of observations, and of finer sources those that contribute most."""
+    texts, cells = found.texts, Written(found.texts)
     finer = [each for level in ("strip", "camera", "point", "parameter") for each in own.at(level)]
     if len(own.at("camera")) < 2:
         finer = [each for each in finer if each.level != "camera"]
-    for each in sorted(finer, key=lambda one: -one.contribution)[:SOURCES]:
+    finer = sorted(finer, key=lambda one: -one.contribution)[:SOURCES]
+    estimated = own.freedom.of_kind if own.freedom.basis == "components" else {}
+
+    def named(each: Source) -> str:
+        if each.level == "kind":
+            return translation.kind(texts, each.name)
         of = translation.parameter(texts, each.name) if each.level == "parameter" else each.name
-        name = texts(f"level.{each.level}", name=of)
-        share = cells.number(100 * each.share, 1)
-        rows.append([f"– {name}", each.number, cells.figures(each.u, 2), share, None, ""])
-    title = budget_line(texts, own)
-    single = [
-        cells.column("observation", text=True),
-        cells.column("sd"),
-        cells.column("sensitivity"),
-        cells.column("u", own.unit),
-        cells.column("share", "%"),
-    ]
-    observed: list[Row] = [
+        return f"– {texts(f'level.{each.level}', name=of)}"
+
+    def freedom(each: Source) -> float:
+        return estimated.get(each.name, math.inf)
+
+    return Table.of(
+        budget_line(texts, own),
+        [*own.at("kind"), *finer],
         [
-            translation.observation(texts, each.observation),
-            cells.figures(each.sd),
-            cells.figures(each.sensitivity),
-            cells.figures(math.sqrt(each.contribution), 2),
-            cells.number(100 * each.share, 1),
-        ]
-        for each in own.largest
-    ]
-    return [
-        Table(title, columns, rows),
-        Table(texts("table.single", quantity=translation.quantity(texts, own.quantity)), single, observed),
-    ]
+            (cells.column("source", text=True), named),
+            (cells.column("number"), lambda each: each.number),
+            (cells.column("u", own.unit), lambda each: cells.figures(each.u, 2)),
+            (cells.column("share", "%"), lambda each: cells.number(100 * each.share, 1)),
+            (
+                cells.column("dof"),
+                lambda each: texts.number(freedom(each), 1) if each.level == "kind" else None,
+            ),
+            (
+                cells.column("from", text=True),
+                lambda each: (
+                    ""
+                    if each.level != "kind"
+                    else texts("from.estimated" if math.isfinite(freedom(each)) else "from.given")
+                ),
+            ),
+        ],
+    )
 
 
 def camera_annex(found: Statement) -> Section:
     """Return annex D: values, standard deviations and correlations of cameras, distortion with its band."""
-    parts: list[Part] = []
-    for each in found.result.cameras:
-        parts += _camera(found, each)
+    parts = [part for each in found.result.cameras for part in _camera(found, each)]
     return Section("annex-d", found.texts("annex.d"), parts, annex=True)
 
 
-def _camera(found: Statement, camera: AdjustedCamera) -> list[Part]:
+def _camera(found: Statement, camera: AdjustedCamera) -> list[Table]:
     texts, cells = found.texts, Written(found.texts)
-    columns = [
-        cells.column("parameter", text=True),
-        Column("", text=True),
-        cells.column("value"),
-        cells.column("sd"),
-        cells.column("from", text=True),
+    of, sd, estimated = units(camera.camera), camera.sd.tolist(), camera.estimated
+    table = Table.of(
+        texts("table.camera", camera=camera.name),
+        range(len(of)),
+        [
+            (cells.column("parameter", text=True), lambda k: camera.names[k]),
+            (Column("", text=True), lambda k: of[k]),
+            (
+                cells.column("value"),
+                lambda k: cells.number(float(camera.values[k]), decimals_of(np.array([sd[k]]), unknown=6)),
+            ),
+            (cells.column("sd"), lambda k: cells.figures(sd[k], 2)),
+            (
+                cells.column("from", text=True),
+                lambda k: texts("from.estimated" if k in estimated else "from.given"),
+            ),
+        ],
+    )
+    names = [camera.names[k] for k in estimated]
+    if len(names) < 2:
+        return [table, *_distortion(found, camera)]
+    matrix = camera.correlations[np.ix_(estimated, estimated)].tolist()
+    rows = [
+        [name, *(cells.number(value, 2) for value in row)] for name, row in zip(names, matrix, strict=True)
     ]
-    estimated = set(camera.estimated)
-    rows: list[Row] = []
-    for k, (name, unit) in enumerate(zip(camera.names, units(camera.camera), strict=True)):
-        sd = float(camera.sd[k])
-        decimals = decimals_of(np.array([sd]), unknown=6)
-        own = "from.estimated" if k in estimated else "from.given"
-        rows.append(
-            [name, unit, cells.number(float(camera.values[k]), decimals), cells.figures(sd, 2), texts(own)]
-        )
-    parts: list[Part] = [Table(texts("table.camera", camera=camera.name), columns, rows)]
-    names = [camera.names[k] for k in camera.estimated]
-    if len(names) > 1:
-        matrix = camera.correlations[np.ix_(camera.estimated, camera.estimated)]
-        between: list[Row] = [
-            [name, *(cells.number(float(value), 2) for value in row)]
-            for name, row in zip(names, matrix, strict=True)
-        ]
-        heads = [cells.column("parameter", text=True), *(Column(name) for name in names)]
-        parts.append(Table(texts("table.correlations", camera=camera.name), heads, between))
-    return [*parts, *_distortion(found, camera)]
+    heads = [cells.column("parameter", text=True), *map(Column, names)]
+    correlations = Table(texts("table.correlations", camera=camera.name), heads, rows)
+    return [table, correlations, *_distortion(found, camera)]
 
 
-def _distortion(found: Statement, camera: AdjustedCamera) -> list[Part]:
+def _distortion(found: Statement, camera: AdjustedCamera) -> list[Table]:
     texts, cells = found.texts, Written(found.texts)
     curve = distortion_curve(found.result, camera)
     if curve is None:
         return []
     unit = found.result.block.image_unit
     inside = np.flatnonzero(curve.radii <= curve.observed)
-    rows_at = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
-    decimals = decimals_for(curve.sd[rows_at])
-    columns = [cells.column("radius", unit), cells.column("correction", unit), cells.column("sd", unit)]
-    rows: list[Row] = [
-        [
-            cells.figures(float(curve.radii[k])),
-            *cells.vector(np.array([curve.values[k], curve.sd[k]]), decimals),
-        ]
-        for k in rows_at.tolist()
+    rows = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
+    decimals = decimals_for(curve.sd[rows])
+    columns = [
+        (cells.column("radius", unit), lambda k: cells.figures(float(curve.radii[k]))),
+        cells.numbers("correction", curve.values, decimals, unit),
+        cells.numbers("sd", curve.sd, decimals, unit),
     ]
-    return [Table(texts("table.distortion", camera=camera.name), columns, rows)]
+    return [Table.of(texts("table.distortion", camera=camera.name), rows.tolist(), columns)]
 
 
 def adjustment_annex(found: Statement) -> Section:
     """Return annex E: what was adjusted, how well it fits, what was taken out, residuals of markers."""
     texts, cells, result = found.texts, Written(found.texts), found.result
-    columns = [
-        cells.column("kind", text=True),
-        cells.column("number"),
-        cells.column("redundancy"),
-        cells.column("squares"),
-    ]
-    rows: list[Row] = []
-    for name, (count, redundancy, squares) in kinds_of(result).items():
-        rows.append(
-            [translation.kind(texts, name), count, cells.number(redundancy, 1), cells.number(squares, 1)]
-        )
-    parts: list[Part] = [Table(texts("table.kinds"), columns, rows)]
+    kinds = Table.of(
+        texts("table.kinds"),
+        [(name, *numbers) for name, numbers in kinds_of(result).items()],
+        [
+            (cells.column("kind", text=True), lambda each: translation.kind(texts, each[0])),
+            (cells.column("number"), lambda each: each[1]),
+            (cells.column("redundancy"), lambda each: cells.number(each[2], 1)),
+            (cells.column("squares"), lambda each: cells.number(each[3], 1)),
+        ],
+    )
+    parts: list[Part] = [kinds]
     if result.verdict.tests:
         parts.append(_tests(found))
     if found.removed:
@@ -287,25 +274,27 @@ def adjustment_annex(found: Statement) -> Section:
 def _tests(found: Statement) -> Table:
     """Return all tests of the verdict on the adjustment."""
     texts, cells = found.texts, Written(found.texts)
-    columns = [
-        cells.column("test", text=True),
-        cells.column("statistic", text=True),
-        *(cells.column(key) for key in ("value", "low", "high", "p", "level", "tests")),
-        cells.column("outcome", text=True),
-    ]
-    rows: list[Row] = [
+    return Table.of(
+        texts("table.tests"),
+        found.result.verdict.tests,
         [
-            translation.test(texts, each.name),
-            signs_of(each.statistic),
-            *(cells.figures(value, 4) for value in (each.value, *each.limits)),
-            cells.p(each.p, each.level),
-            cells.figures(each.level, 2),
-            each.tests,
-            Cell(texts("test.passes")) if each.accepted else Cell(texts("test.rejects"), tone="look"),
-        ]
-        for each in found.result.verdict.tests
-    ]
-    return Table(texts("table.tests"), columns, rows, texts("table.tests.note"))
+            (cells.column("test", text=True), lambda each: translation.test(texts, each.name)),
+            (cells.column("statistic", text=True), lambda each: signs_of(each.statistic)),
+            (cells.column("value"), lambda each: cells.figures(each.value, 4)),
+            (cells.column("low"), lambda each: cells.figures(each.limits[0], 4)),
+            (cells.column("high"), lambda each: cells.figures(each.limits[1], 4)),
+            (cells.column("p"), lambda each: cells.p(each.p, each.level)),
+            (cells.column("level"), lambda each: cells.figures(each.level, 2)),
+            (cells.column("tests"), lambda each: each.tests),
+            (
+                cells.column("outcome", text=True),
+                lambda each: (
+                    Cell(texts("test.passes")) if each.accepted else Cell(texts("test.rejects"), tone="look")
+                ),
+            ),
+        ],
+        texts("table.tests.note"),
+    )
 
 
 def _overlap(found: Statement) -> Drawing:
@@ -316,7 +305,7 @@ def _overlap(found: Statement) -> Drawing:
     return Drawing("map-overlap", texts("page.overlap"), texts("page.overlap.caption"), draw)
 
 
-def _markers(found: Statement) -> list[Part]:
+def _markers(found: Statement) -> list[Table]:
     """Return rms and largest residual of the images of every control and check point."""
     texts, cells, result = found.texts, Written(found.texts), found.result
     kinds, unit = result.point_kinds, result.block.image_unit
@@ -329,24 +318,18 @@ def _markers(found: Statement) -> list[Part]:
     own = np.flatnonzero((kinds != "pass") & (counts > 0))
     if not len(own):
         return []
-    columns = [
-        cells.column("point", text=True),
-        cells.column("use", text=True),
-        cells.column("photos"),
-        cells.column("rms", unit),
-        cells.column("largest", unit),
-    ]
-    rows: list[Row] = [
+    table = Table.of(
+        texts("table.markers"),
+        in_order(result.block, own).tolist(),
         [
-            result.block.point_ids[row],
-            texts(f"use.{kinds[row]}"),
-            int(counts[row]),
-            cells.number(math.sqrt(float(total[row]) / float(counts[row])), 2),
-            cells.number(float(largest[row]), 2),
-        ]
-        for row in in_order(result.block, own).tolist()
-    ]
-    return [Table(texts("table.markers"), columns, rows)]
+            (cells.column("point", text=True), lambda row: result.block.point_ids[row]),
+            (cells.column("use", text=True), lambda row: texts(f"use.{kinds[row]}")),
+            (cells.column("photos"), lambda row: int(counts[row])),
+            cells.numbers("rms", np.sqrt(total / np.maximum(counts, 1)), 2, unit),
+            cells.numbers("largest", largest, 2, unit),
+        ],
+    )
+    return [table]
 
 
 def survey_annex(found: Statement) -> Section:
@@ -355,29 +338,26 @@ def survey_annex(found: Statement) -> Section:
     if own.system is None or not own.names:
         return Section("annex-f", texts("annex.f"), [], annex=True)
     decimals = max(3, decimals_for(own.sd))
-    unit = found.result.block.linear_unit
-    columns = [
-        cells.column("point", text=True),
-        cells.column("use", text=True),
-        *(Column(translation.axis(texts, name), texts.word("unit", of)) for name, of in own.system.axes),
-        *cells.columns(("sd",), unit),
-    ]
-    places = [8 if axis == "deg" else decimals for _, axis in own.system.axes]
-    rows: list[Row] = [
+    table = Table.of(
+        texts("annex.f"),
+        range(len(own.names)),
         [
-            name,
-            texts(f"use.{own.kinds[k]}"),
-            *_mixed(cells, own.positions[k], places),
-            *cells.vector(own.sd[k], decimals),
-        ]
-        for k, name in enumerate(own.names)
-    ]
-    note = texts("assume.crs", crs=own.system.crs) if own.system.crs else ""
-    return Section("annex-f", texts("annex.f"), [Table(texts("annex.f"), columns, rows, note)], annex=True)
-
-
-def _mixed(cells: Written, values: Floats, decimals: Sequence[int]) -> list[Cell]:
-    return [cells.number(float(value), own) for value, own in zip(values, decimals, strict=True)]
+            (cells.column("point", text=True), lambda k: own.names[k]),
+            (cells.column("use", text=True), lambda k: texts(f"use.{own.kinds[k]}")),
+            *(
+                (
+                    Column(translation.axis(texts, name), texts.word("unit", unit)),
+                    lambda k, of=column, count=8 if unit == "deg" else decimals: cells.number(
+                        float(of[k]), count
+                    ),
+                )
+                for (name, unit), column in zip(own.system.axes, own.positions.T, strict=True)
+            ),
+            *cells.along_axes("sd", own.sd, decimals, found.result.block.linear_unit),
+        ],
+        texts("assume.crs", crs=own.system.crs) if own.system.crs else "",
+    )
+    return Section("annex-f", texts("annex.f"), [table], annex=True)
 
 
 def files_annex(found: Statement) -> Section:
@@ -388,11 +368,14 @@ def files_annex(found: Statement) -> Section:
         facts.append(Fact(texts("page.command"), found.command))
     parts: list[Part] = [Facts(texts("page.program"), facts)]
     if found.inputs:
-        columns = [
-            Column(texts("page.file"), text=True),
-            cells.column("size", texts("unit.bytes")),
-            Column("SHA-256", text=True),
-        ]
-        rows: list[Row] = [[each.path.name, each.size, each.sha256] for each in found.inputs]
-        parts.append(Table(texts("table.files"), columns, rows))
+        files = Table.of(
+            texts("table.files"),
+            found.inputs,
+            [
+                (Column(texts("page.file"), text=True), lambda each: each.path.name),
+                (cells.column("size", texts("unit.bytes")), lambda each: each.size),
+                (Column("SHA-256", text=True), lambda each: each.sha256),
+            ],
+        )
+        parts.append(files)
     return Section("annex-g", texts("annex.g"), parts, annex=True)

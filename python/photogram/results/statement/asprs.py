@@ -103,17 +103,9 @@ class Remark:
 
 
 def points_asked_for(area: float | None) -> int:
-    """Return how many check points the standard asks for, for each of NVA and VVA (7.13, table C.1).
+    """Return how many check points an area (km2) asks for, for each of NVA and VVA (7.13, table C.1).
 
-    Parameters
-    ----------
-    area
-        Of the project in km2; None where it is not known: the least.
-
-    Raises
-    ------
-    InputError
-        A negative area, or one that is no number.
+    None for an area that is not known: the least.
     """
     if area is None:
         return POINTS_BY_AREA[0][1]
@@ -125,21 +117,9 @@ def points_asked_for(area: float | None) -> int:
 def accuracy(found: float, survey: float, freedom: float, count: int) -> Accuracy:
     """Return a figure of the standard: RMSE_H (7.11), RMSE_V of NVA or VVA, RMSE_3D.
 
-    Parameters
-    ----------
-    found, survey
-        RMSE_1 of the differences and RMSE_2 of the check survey in the linear unit: horizontal ones radial,
-        both axes in one figure.
-    freedom
-        Effective degrees of freedom of RMSE_1, of the joint covariance of its rows; see
-        :func:`photogram.statistics.freedom.effective_freedom`.
-    count
-        Check points.
-
-    Raises
-    ------
-    InputError
-        What is negative, or no number of degrees of freedom.
+    `found` and `survey` are RMSE_1 of the differences and RMSE_2 of the check survey in the linear unit:
+    horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
+    the joint covariance of its rows (:func:`photogram.statistics.freedom.effective_freedom`).
     """
     if not survey >= 0:
         raise InputError(f"the survey's root mean square error is not negative: {survey:g}")
@@ -157,17 +137,7 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
 def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accuracy:
     """Return RMSE_3D, the root of RMSE_H^2 + RMSE_V^2, of the NVA or of the VVA area.
 
-    Parameters
-    ----------
-    horizontal, vertical
-        Of :func:`accuracy`.
-    freedom
-        Effective degrees of freedom of all rows together.
-
-    Raises
-    ------
-    InputError
-        No number of degrees of freedom.
+    `freedom` are effective degrees of freedom of all rows together.
     """
     found = math.hypot(horizontal.found, vertical.found)
     survey = math.hypot(horizontal.survey, vertical.survey)
@@ -175,24 +145,10 @@ def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accurac
 
 
 def verdict(figure: Accuracy, limit: float) -> str:
-    """Return what can be said of a class.
+    """Return what can be said of a class, in the linear unit; refuse one that is not positive.
 
-    Parameters
-    ----------
-    figure
-        Of :func:`accuracy`.
-    limit
-        The class, in the linear unit.
-
-    Returns
-    -------
     `missed` where the figure is larger. Else, by the upper end of its interval, `met with confidence` or
     `met`; with fewer than 30 points `produced to meet` or `not decided` in their places.
-
-    Raises
-    ------
-    InputError
-        A class that is not positive.
     """
     if figure.rmse > _class(limit):
         return "missed"
@@ -203,13 +159,7 @@ def verdict(figure: Accuracy, limit: float) -> str:
 
 
 def wording(count: int) -> str:
-    """Return which of the standard's three sentences holds (7.16): `tested`, `produced`, or `none`.
-
-    Parameters
-    ----------
-    count
-        Check points.
-    """
+    """Return which of the standard's three sentences holds (7.16): `tested`, `produced`, or `none`."""
     if count >= ENOUGH:
         return "tested"
     return "produced" if count else "none"
@@ -218,15 +168,7 @@ def wording(count: int) -> str:
 def survey_good_enough(survey: float, limit: float) -> bool:
     """Return whether a check survey is twice as accurate as the class at least (7.12): RMSE_2 <= N/2.
 
-    Parameters
-    ----------
-    survey, limit
-        RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
-
-    Raises
-    ------
-    InputError
-        A class that is not positive.
+    RMSE_H2 (radial) or RMSE_V2, and the class, in the linear unit.
     """
     return survey <= _class(limit) / 2
 
@@ -236,19 +178,9 @@ def control_good_enough(
 ) -> tuple[bool, bool]:
     """Return whether the control of a triangulation is good enough in plan and in height (7.9).
 
-    Parameters
-    ----------
-    plan, height
-        Root mean squares of its standard deviations, radial in plan, in the linear unit.
-    class_h
-        Horizontal class: half of it holds in plan, and the whole in height where heights are no product.
-    class_v
-        Vertical class, where they are: half of it holds in height.
-
-    Raises
-    ------
-    InputError
-        A class that is not positive.
+    `plan` and `height` are root mean squares of its standard deviations, radial in plan, in the linear unit.
+    Half of the horizontal class holds in plan, and half of the vertical one in height; the whole horizontal
+    one where heights are no product.
     """
     limit = _class(class_h) if class_v is None else _class(class_v) / 2
     return plan <= _class(class_h) / 2, height <= limit
@@ -260,19 +192,8 @@ def remarks(
     """Return what is to be investigated before a class is stated (7.2); nothing is removed for it.
 
     A mean beyond a quarter of the class, a difference beyond three times the class; in plan by axis, of which
-    the class is that over the root of 2.
-
-    Parameters
-    ----------
-    differences
-        (n, 3) east, north, height: adjusted minus given, in the linear unit; NaN where nothing is given.
-    class_h, class_v
-        None where no class is asked for.
-
-    Raises
-    ------
-    InputError
-        An array of another shape, a class that is not positive.
+    the class is that over the root of 2. `differences` are (n, 3) east, north, height: adjusted minus given,
+    in the linear unit; NaN where nothing is given. Classes are None where none is asked for.
     """
     found = numbers("differences", differences, missing=True)
     if found.ndim != 2 or found.shape[1] != 3:

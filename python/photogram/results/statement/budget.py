@@ -167,15 +167,8 @@ def budgets(
 ) -> list[Budget]:
     """Return the budgets of quantities: a solution for each, and a pass over all rows.
 
-    Parameters
-    ----------
-    components
-        Where weights were estimated: those whose result this is.
-
-    Raises
-    ------
-    AdjustmentError, OutOfMemoryError, KeyboardInterrupt
-        As :meth:`Result.covariances`.
+    `components` are those whose result this is, where weights were estimated. Errors are those of
+    :meth:`Result.covariances`.
     """
     if not wanted:
         return []
@@ -197,13 +190,7 @@ def budgets(
 
 
 def _budget(
-    result: Result,
-    wanted: Wanted,
-    value: float,
-    t: Floats,
-    rows: Rows,
-    freedoms: _Freedoms,
-    coverage: float,
+    result: Result, wanted: Wanted, value: float, t: Floats, rows: Rows, freedoms: _Freedoms, coverage: float
 ) -> Budget:
     squares = result.covariance_scale * t**2
     variance = float(squares.sum())

@@ -143,13 +143,7 @@ class Compared:
         )
 
     def without(self, names: Sequence[str]) -> Compared:
-        """Return all but some points.
-
-        Raises
-        ------
-        InputError
-            One of them is no check point.
-        """
+        """Return all but some points; refuse what is no check point."""
         for name in names:
             if name not in self.names:
                 raise InputError(f"{name} is no check point")
@@ -164,13 +158,8 @@ class Compared:
 def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared:
     """Return the check points of a result, by its covariances.
 
-    Raises
-    ------
-    InputError
-        A datum that was chosen, in which nothing can be compared; a point without standard deviations of its
-        survey, with that of one axis in plan only, or that is control.
-    AdjustmentError, OutOfMemoryError, KeyboardInterrupt
-        As :meth:`Result.covariances`.
+    Refused are a datum that was chosen, in which nothing can be compared; a point without standard deviations
+    of its survey, with that of one axis in plan only, or that is control.
     """
     block, checks = result.block, result.check_points
     rows = in_order(block, checks.rows)

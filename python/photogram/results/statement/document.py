@@ -14,10 +14,9 @@ from photogram.results.statement.request import lengths_in
 from photogram.results.statement.sources import kind_of
 from photogram.results.statement.statement import Statement
 from photogram.show.methods import document_of
+from photogram.show.quantity import members
 
 __all__ = ["kinds_of", "to_json"]
-
-_HEAD = ("client", "firm", "project", "surveyor", "date")
 
 
 @document_of.register(Statement)
@@ -29,7 +28,7 @@ def to_json(found: Statement) -> bytes:
         {
             "program": f"photogram {_photocore.__version__}",
             "title": asked.title or result.block.title,
-            **{name: getattr(asked, name) or None for name in _HEAD},
+            **{name: own or None for name, own in members(asked, *_HEAD).items()},
             "language": found.texts.language,
             "units": {"length": unit, "angle": "rad", "image": result.block.image_unit},
             "headline": found.headline,
@@ -48,15 +47,10 @@ def to_json(found: Statement) -> bytes:
             "nssda": standards.nssda_member if "nssda" in asked.standards else None,
             "lengths": None if standards.lengths is None else standards.lengths.member(),
             "iso_19157": standards.iso_19157 or None,
-            "layout": _layout(found),
+            "layout": found.layout and members(found.layout, **_LAYOUT),
             "camera": [
-                {
-                    "name": each.name,
-                    "parameters": list(each.names),
-                    "value": each.values,
-                    "sd": each.sd,
-                    "correlations": each.correlations,
-                }
+                members(each, "name", parameters="names", value="values")
+                | members(each, "sd", "correlations")
                 for each in result.cameras
             ],
             "adjustment": _adjustment(result),
@@ -69,19 +63,16 @@ def to_json(found: Statement) -> bytes:
     )
 
 
-def _layout(found: Statement) -> dict[str, Any] | None:
-    own = found.layout
-    if own is None:
-        return None
-    return {
-        "count": own.count,
-        "diagonal": own.diagonal,
-        "share_in_quadrants": own.quadrants,
-        "least_spacing_over_diagonal": own.least_spacing,
-        "share_of_area_far": own.far,
-        "share_of_heights": own.heights,
-        "outside_control": own.beyond_control,
-    }
+_HEAD = ("client", "firm", "project", "surveyor", "date")
+_LAYOUT = {
+    "count": "count",
+    "diagonal": "diagonal",
+    "share_in_quadrants": "quadrants",
+    "least_spacing_over_diagonal": "least_spacing",
+    "share_of_area_far": "far",
+    "share_of_heights": "heights",
+    "outside_control": "beyond_control",
+}
 
 
 def kinds_of(result: Result) -> dict[str, tuple[int, float, float]]:

@@ -45,11 +45,15 @@ def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Fig
         axes.plot(*control[:, :2].T, "^", color=SOFT, markersize=6, label=labels["control"], linestyle="none")
     if len(found):
         _points(figure, axes, found, float(extent.max()), labels)
+    axes.margins(0.12)
+    axes.legend(loc="upper left", fontsize="small")
+    return _in_plan(figure, axes, labels)
+
+
+def _in_plan(figure: Figure, axes: Axes, labels: dict[str, str]) -> Figure:
     axes.set_xlabel(f"{labels['east']}, {labels['unit']}")
     axes.set_ylabel(f"{labels['north']}, {labels['unit']}")
     axes.ticklabel_format(useOffset=False, style="plain")
-    axes.margins(0.12)
-    axes.legend(loc="upper left", fontsize="small")
     decimal_sign(figure, labels["decimal"])
     return figure
 
@@ -99,9 +103,8 @@ def lengths(found: Lengths, labels: dict[str, str]) -> Figure:
     axes.errorbar(found.calibrated, test.errors, test.sd, fmt="o", color=BLUE, markersize=3, elinewidth=0.7)
     if test.limits is not None:
         for sign in (1.0, -1.0):
-            axes.plot(
-                found.calibrated[order], sign * test.limits[order], "--", color=VERMILION, linewidth=0.9
-            )
+            limits = sign * test.limits[order]
+            axes.plot(found.calibrated[order], limits, "--", color=VERMILION, linewidth=0.9)
     axes.axhline(0.0, color=SOFT, linewidth=0.6)
     axes.set_xlabel(f"{labels['length']}, {labels['unit']}")
     axes.set_ylabel(f"{labels['error']}, {labels['unit']}")
@@ -127,11 +130,7 @@ def overlap(result: Result, labels: dict[str, str]) -> Figure | None:
     drawn = axes.pcolormesh(x, y, shown, cmap="viridis", shading="nearest", rasterized=True)
     figure.colorbar(drawn, ax=axes, shrink=0.8, label=labels["photos"])
     axes.set_aspect("equal")
-    axes.set_xlabel(f"{labels['east']}, {labels['unit']}")
-    axes.set_ylabel(f"{labels['north']}, {labels['unit']}")
-    axes.ticklabel_format(useOffset=False, style="plain")
-    decimal_sign(figure, labels["decimal"])
-    return figure
+    return _in_plan(figure, axes, labels)
 
 
 def photos_per_place(outlines: Floats, x: Floats, y: Floats) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.statement.comparison import Compared
+from photogram.results.statement.comparison import PARTS, Compared
 from photogram.results.statement.honest import (
     Bias,
     PointTests,
@@ -33,7 +33,7 @@ from photogram.statistics.error_radii import (
     upper_order,
 )
 
-__all__ = ["Figures", "Radius", "Sized", "figures"]
+__all__ = ["Figures", "Radius", "Sized", "figures", "root_mean"]
 
 PROBABILITIES = (0.9, 0.95)
 INSIDE = 0.95
@@ -151,41 +151,30 @@ class Figures:
 
 
 def figures(found: Compared, coverage: float = 0.95) -> Figures | None:
-    """Return the figures of check points; None where there are none.
-
-    Parameters
-    ----------
-    coverage
-        Probability of the expanded uncertainty of biases.
-    """
+    """Return the figures of check points, biases with expanded uncertainties; None where there are none."""
     if not len(found):
         return None
     k = critical_student(1.0 - coverage, found.second)
     d = np.where(found.counted, found.differences, np.nan)
     plan, heights = np.hypot(d[:, 0], d[:, 1]), d[:, 2]
+    sizes = dict(zip(PARTS, (*d.T, plan, np.sqrt((d**2).sum(axis=1))), strict=True))
     in_plan, in_height = np.isfinite(plan), np.isfinite(heights)
-    survey = found.survey_variances
+    survey, moments = found.survey_variances, _moments(d[in_plan, :2])
     tests = point_tests(found)
     return Figures(
         n=len(found),
-        parts={
-            "e": _sized(d[:, 0], found.names),
-            "n": _sized(d[:, 1], found.names),
-            "h": _sized(heights, found.names),
-            "plan": _sized(plan, found.names, radial=True),
-            "all": _sized(np.sqrt((d**2).sum(axis=1)), found.names, radial=True),
-        },
-        rmse_h1=_root(plan**2),
-        rmse_v1=_root(heights**2),
-        rmse_h2=_root(np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan)),
-        rmse_v2=_root(np.where(in_height, survey[:, 2], np.nan)),
-        prediction={part: prediction(found, part) for part in ("e", "n", "h", "plan", "all")},
+        parts={part: _sized(own, found.names, radial=part in ("plan", "all")) for part, own in sizes.items()},
+        rmse_h1=root_mean(plan**2),
+        rmse_v1=root_mean(heights**2),
+        rmse_h2=root_mean(np.where(in_plan, survey[:, 0] + survey[:, 1], np.nan)),
+        rmse_v2=root_mean(np.where(in_height, survey[:, 2], np.nan)),
+        prediction={part: prediction(found, part) for part in PARTS},
         bias={part: bias(found, part, k) for part in ("e", "n", "h")},
         points=tests,
-        inside=_inside(tests, heights, in_height),
+        inside=_inside(tests, in_height),
         radii=_radii(plan[in_plan], np.abs(heights[in_height])),
-        moments=_moments(d[in_plan, :2]),
-        of_moments=_of_moments(_moments(d[in_plan, :2]), _root(heights**2)),
+        moments=moments,
+        of_moments=_of_moments(moments, root_mean(heights**2)),
         mixture=_mixture(found, in_plan, in_height),
         surface=surface(found),
     )
@@ -199,16 +188,16 @@ def _sized(values: Floats, names: tuple[str, ...], *, radial: bool = False) -> S
     worst = int(own[np.argmax(np.abs(some))])
     mean = math.nan if radial else float(some.mean())
     sd = math.nan if radial or len(own) < 2 else float(some.std(ddof=1))
-    return Sized(len(own), mean, sd, _root(some**2), float(abs(values[worst])), names[worst])
+    return Sized(len(own), mean, sd, root_mean(some**2), float(abs(values[worst])), names[worst])
 
 
-def _root(squares: Floats) -> float:
+def root_mean(squares: Floats) -> float:
     """Return the root of the mean of what is known; NaN where nothing is."""
     known = squares[np.isfinite(squares)]
     return math.sqrt(float(known.mean())) if known.size else math.nan
 
 
-def _inside(tests: PointTests, heights: Floats, in_height: np.ndarray) -> dict[str, int]:
+def _inside(tests: PointTests, in_height: np.ndarray) -> dict[str, int]:
     limits = {
         k: _photocore.chi_square_quantile(1 - INSIDE, k, upper=True)
         for k in np.unique(tests.dimension[tests.dimension > 0]).tolist()
@@ -230,11 +219,9 @@ def _radii(plan: Floats, heights: Floats) -> dict[str, Radius | None]:
             if not len(values):
                 found[key] = None
                 continue
-            order, sample = sample_radius(values, p)
             upper = upper_order(len(values), p)
-            found[key] = Radius(
-                order, sample, upper, None if upper is None else float(np.sort(values)[upper - 1])
-            )
+            largest = None if upper is None else float(np.sort(values)[upper - 1])
+            found[key] = Radius(*sample_radius(values, p), upper, largest)
     return found
 
 

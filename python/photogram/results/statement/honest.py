@@ -24,7 +24,6 @@ from photogram.statistics.freedom import effective_freedom, rmse_interval
 __all__ = ["Bias", "PointTests", "Prediction", "Surface", "bias", "point_tests", "prediction", "surface"]
 
 LEVEL = 0.05
-_NONE = (math.nan, math.nan)
 LEAST = 6
 """Points with heights that a surface takes."""
 FLAT = 1e-6
@@ -185,7 +184,10 @@ def prediction(found: Compared, part: str) -> Prediction | None:
     rank = int(found_rank) if math.isfinite(found_rank) else 0
     rmse = math.sqrt(float(d @ d) / points)
     freedom = effective_freedom(covariance)
-    low, high = (_limit(rank, upper) for upper in (False, True))
+    low, high = (
+        _photocore.chi_square_quantile(LEVEL / 2, rank, upper=upper) if rank else math.nan
+        for upper in (False, True)
+    )
     variances = np.diag(covariance)
     with np.errstate(divide="ignore", invalid="ignore"):
         alone = float((d**2 / variances).sum())
@@ -213,10 +215,6 @@ def prediction(found: Compared, part: str) -> Prediction | None:
         else (math.nan,) * 2,
         sum_of_squares_without_correlations=alone,
     )
-
-
-def _limit(freedom: int, upper: bool) -> float:
-    return _photocore.chi_square_quantile(LEVEL / 2, freedom, upper=upper) if freedom else math.nan
 
 
 def _inverse(covariance: Floats) -> Floats:

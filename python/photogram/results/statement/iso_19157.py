@@ -41,22 +41,9 @@ def measures(
 ) -> list[dict[str, Any]]:
     """Return figures as measures of data quality, for JSON, in the order in which they are given.
 
-    Parameters
-    ----------
-    values
-        Figures by their keys in `MEASURES`: numbers, or lists of them (components of a bias; semi-axes and
-        azimuth of an ellipse). None is left out.
-    unit, date, scope
-        Of the figures, of their evaluation, and of what they hold for.
-    element
-        `ABSOLUTE` or `RELATIVE`.
-    evaluation
-        How they were found.
-
-    Raises
-    ------
-    InputError
-        A measure that is none of these, or another element.
+    Figures go by their keys in `MEASURES`: numbers, or lists of them (components of a bias; semi-axes and
+    azimuth of an ellipse); None is left out. `unit`, `date` and `scope` are those of the figures, of their
+    evaluation, and what they hold for; `evaluation` is how they were found.
     """
     if element not in (ABSOLUTE, RELATIVE):
         raise InputError(f"element is {ABSOLUTE!r} or {RELATIVE!r}, not {element!r}")

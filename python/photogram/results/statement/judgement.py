@@ -15,7 +15,7 @@ from photogram.results.statement.assumptions import assumptions
 from photogram.results.statement.budget import Budget, budget_line
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.figures import Figures, Sized
-from photogram.results.statement.honest import LEVEL, Bias, Prediction, Surface
+from photogram.results.statement.honest import LEVEL, Bias, PointTests, Prediction, Surface
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
 from photogram.results.statement.request import Asked
@@ -61,16 +61,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class _Against:
-    """What speaks against handing a statement over.
-
-    Attributes
-    ----------
-    spoilt, missed, high
-        The adjustment cannot be used, an accuracy asked for is missed, differences are larger than predicted.
-    warning, low, control, lengths
-        The verdict of the adjustment is a warning, differences are smaller than predicted, control points
-        disagree with the others, calibrated lengths with their standard deviations.
-    """
+    """What speaks against handing a statement over, `high` and `low` differences at check points among it."""
 
     spoilt: bool
     missed: bool
@@ -117,15 +108,14 @@ def judged(
         texts("control.wrong", point=each.point, p=texts.significant(each.p, 2))
         for each in against.control[:NAMED]
     ]
-    fields: dict[str, str | int] = {
-        "verdict": translation.verdict(texts, result.verdict),
-        "points": texts.listed([each.point for each in against.control], NAMED),
-        "n": 0 if of_all is None else of_all.n,
-    }
+    named = texts.listed([each.point for each in against.control], NAMED)
+    n, verdict = 0 if of_all is None else of_all.n, translation.verdict(texts, result.verdict)
     return Judged(
         exit=NOT_USABLE if bad else 0,
         tone="bad" if bad else "look" if remarks or doubtful else "good",
-        headline=texts(_headline(against, of_all, standards, strict=strict), **fields),
+        headline=texts(
+            _headline(against, of_all, standards, strict=strict), verdict=verdict, points=named, n=n
+        ),
         sentences=[
             *_asprs(asked, texts, standards.asprs),
             *(_nssda(texts, standards) if "nssda" in asked.standards else []),
@@ -216,24 +206,20 @@ def _asprs(asked: Asked, texts: Texts, found: Asprs | None) -> Said:
         own = {f"rmse_{name}": texts.length(figure.rmse)} if figure is not None else {}
         if size is None:
             if figure is not None and name != "3d":
-                said.append(_said(texts, f"asprs.found.{name}", n=figure.count, **own))
+                said.append(texts.said(f"asprs.found.{name}", n=figure.count, **own))
         elif figure is not None:
             case = "missed" if found.verdicts[name] == "missed" else found.words
             said.append(
-                _said(texts, f"asprs.{case}.{name}", n=figure.count, **{"class": texts.size(size)}, **own)
+                texts.said(f"asprs.{case}.{name}", n=figure.count, **{"class": texts.size(size)}, **own)
             )
         elif name != "3d":
             left = {f"loo_{name}": texts.length(found.left_out[name])}
-            said.append(_said(texts, f"asprs.none.{name}", **{"class": texts.size(size)}, **left))
+            said.append(texts.said(f"asprs.none.{name}", **{"class": texts.size(size)}, **left))
     vegetated = found.figures["vva"]
     if vegetated is not None:
         key = f"asprs.{wording(vegetated.count)}.vva"
-        said.append(_said(texts, key, n=vegetated.count, rmse_v=texts.length(vegetated.rmse)))
+        said.append(texts.said(key, n=vegetated.count, rmse_v=texts.length(vegetated.rmse)))
     return said
-
-
-def _said(texts: Texts, key: str, **fields: str | int | float) -> tuple[str, str]:
-    return key, texts(key, **fields)
 
 
 def _nssda(texts: Texts, standards: Standards) -> Said:
@@ -243,14 +229,14 @@ def _nssda(texts: Texts, standards: Standards) -> Said:
     said: Said = []
     if found.accuracy_r is not None:
         accuracy = texts.length(found.accuracy_r)
-        said.append(_said(texts, f"nssda.{found.wording}.h", accuracy_r=accuracy, n=found.count))
+        said.append(texts.said(f"nssda.{found.wording}.h", accuracy_r=accuracy, n=found.count))
     elif found.ce95 is not None and found.ratio is not None:
         ratio = texts.number(found.ratio, 2)
-        said.append(_said(texts, "nssda.ce95", ratio=ratio, ce95=texts.length(found.ce95)))
+        said.append(texts.said("nssda.ce95", ratio=ratio, ce95=texts.length(found.ce95)))
     if found.accuracy_z is not None:
         accuracy = texts.length(found.accuracy_z)
-        said.append(_said(texts, f"nssda.{found.wording}.v", accuracy_z=accuracy, n=found.count))
-    return said if found.enough else [*said, _said(texts, "nssda.few", n=found.count)]
+        said.append(texts.said(f"nssda.{found.wording}.v", accuracy_z=accuracy, n=found.count))
+    return said if found.enough else [*said, texts.said("nssda.few", n=found.count)]
 
 
 def _lengths(texts: Texts, found: Lengths | None) -> Said:
@@ -264,35 +250,35 @@ def _lengths(texts: Texts, found: Lengths | None) -> Said:
         "rms": texts.length(test.rms),
     }
     if found.limit is None or test.within is None:
-        said = [_said(texts, "lengths.found", **own)]
+        said = [texts.said("lengths.found", **own)]
     else:
         limit = f"{texts.length(found.limit.constant)} + {texts.significant(found.limit.slope, 2)} L"
         if math.isfinite(found.limit.most):
             limit += f" ≤ {texts.length(found.limit.most)}"
         beyond = int((~test.within).sum())
         key, more = ("lengths.missed", {"beyond": beyond}) if beyond else ("lengths.met", {})
-        said = [_said(texts, key, limit=limit, **own, **more)]
+        said = [texts.said(key, limit=limit, **own, **more)]
     if test.together is not None:
         whole = test.together
         key = f"lengths.{'high' if whole.rejected_high else 'low' if whole.rejected_low else 'agree'}"
-        said.append(_said(texts, key, **_factor(texts, whole.factor, whole.interval)))
+        said.append(texts.said(key, **_factor(texts, whole.factor, whole.interval)))
     return said
 
 
 def _honest(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None) -> Said:
     if of_all is None:
-        return [_said(texts, "honest.none")]
+        return [texts.said("honest.none")]
     said: Said = []
     whole = _whole(of_all)
     high, low = _rejected(of_all)
     if whole is not None:
         key = f"honest.{'high' if high else 'low' if low else 'yes'}"
-        said.append(_said(texts, key, n=whole.points, **_factor(texts, whole.factor, whole.factor_interval)))
+        said.append(texts.said(key, n=whole.points, **_factor(texts, whole.factor, whole.factor_interval)))
     for part in ("e", "n", "h", "plan"):
         own = of_all.prediction[part]
         if own is not None and (own.rejected_high or own.rejected_low):
             fields = _factor(texts, own.factor, own.factor_interval)
-            said.append(_said(texts, "honest.part", component=texts(f"component.{part}"), **fields))
+            said.append(texts.said("honest.part", component=texts(f"component.{part}"), **fields))
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
     for part, shift in shifts:
         if shift.rejected:
@@ -303,31 +289,24 @@ def _honest(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None)
                 "k": texts.number(shift.expanded / shift.sd_of_mean, 2),
                 "p": texts.percent(asked.coverage),
             }
-            said.append(_said(texts, "bias.found", **fields))
+            said.append(texts.said("bias.found", **fields))
     if shifts and not any(shift.rejected for _, shift in shifts):
-        said.append(_said(texts, "bias.none"))
-    return [*said, *_surface(texts, of_all.surface), *_points(asked, texts, found, of_all)]
+        said.append(texts.said("bias.none"))
+    return [*said, *_surface(texts, of_all.surface), *_points(asked, texts, found, of_all.points)]
 
 
 def _surface(texts: Texts, found: Surface | None) -> Said:
     if found is None:
-        return [_said(texts, "surface.few")]
+        return [texts.said("surface.few")]
     p = texts.significant(found.p, 2)
     if not found.rejected:
-        return [_said(texts, "surface.none", p=p)]
-    said = [_said(texts, "surface.found", p=p)]
-    value, sd = found.estimate, found.sd
-    if abs(found.t[0]) > critical_normal(LEVEL):
-        shift, own = texts.length(float(value[0])), texts.length(float(sd[0]))
-        said.append(_said(texts, "surface.shift", shift=shift, sd=own))
-    k = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
-    limit = critical_normal(LEVEL)
-    if abs(found.t[k]) > limit:
-        rise, own = texts.length(float(value[k])), texts.length(float(sd[k]))
-        said.append(_said(texts, "surface.tilt", rise=rise, sd=own))
-    if abs(found.t[3]) > limit:
-        bend, own = texts.length(float(value[3])), texts.length(float(sd[3]))
-        said.append(_said(texts, "surface.dome", bend=bend, sd=own))
+        return [texts.said("surface.none", p=p)]
+    said = [texts.said("surface.found", p=p)]
+    largest = 1 if abs(found.t[1]) > abs(found.t[2]) else 2
+    for name, field, k in (("shift", "shift", 0), ("tilt", "rise", largest), ("dome", "bend", 3)):
+        if abs(found.t[k]) > critical_normal(LEVEL):
+            size, sd = texts.length(float(found.estimate[k])), texts.length(float(found.sd[k]))
+            said.append(texts.said(f"surface.{name}", **{field: size, "sd": sd}))
     return said
 
 
@@ -339,19 +318,15 @@ def _factor(texts: Texts, factor: float, interval: tuple[float, float]) -> dict[
     }
 
 
-def _points(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None) -> Said:
+def _points(asked: Asked, texts: Texts, found: Compared, tests: PointTests) -> Said:
     """Return which single points disagree, and which were set beside."""
-    said: Said = []
-    if of_all is not None:
-        tests = of_all.points
-        for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]:
-            p = texts.significant(float(tests.least[row]), 2)
-            text = texts("point.wrong", point=found.names[row], p=p)
-            said.append(("point.wrong", text))
+    said = [
+        texts.said("point.wrong", point=found.names[row], p=texts.significant(float(tests.least[row]), 2))
+        for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]
+    ]
     if asked.without:
         reasons = "; ".join(f"{point}: {reason}" for point, reason in asked.without.items())
-        points = texts.listed(list(asked.without))
-        said.append(_said(texts, "point.left", points=points, reasons=reasons))
+        said.append(texts.said("point.left", points=texts.listed(list(asked.without)), reasons=reasons))
     return said
 
 
@@ -409,11 +384,9 @@ def _asprs_remarks(
     own: Asprs,
 ) -> list[str]:
     said = []
-    n = 0 if of_all is None else of_all.n
-    if asked.classes and n < own.points_asked:
-        said.append(texts("asprs.points", asked=own.points_asked, n=n))
-    if of_vegetated is not None and of_vegetated.n < own.points_asked:
-        said.append(texts("asprs.points", asked=own.points_asked, n=of_vegetated.n))
+    counts = [0 if of_all is None else of_all.n] if asked.classes else []
+    counts += [of_vegetated.n] if of_vegetated is not None else []
+    said += [texts("asprs.points", asked=own.points_asked, n=n) for n in counts if n < own.points_asked]
     for name, good in own.survey.items():
         figure = own.figures[name]
         if not good and figure is not None:
@@ -422,9 +395,8 @@ def _asprs_remarks(
     for name, good in own.control.items():
         rmse = own.control_rmse["hv".index(name)]
         if not good and math.isfinite(rmse):
-            plain = asked.classes["h"]
-            limit = asked.classes["v"] / 2 if name == "v" and "v" in asked.classes else plain
-            limit = plain / 2 if name == "h" else limit
+            # Half a class holds; where heights are no product, the whole horizontal one.
+            limit = asked.classes[name] / 2 if name in asked.classes else asked.classes["h"]
             said.append(texts(f"asprs.control.{name}", sd=texts.length(rmse), limit=texts.size(limit)))
     for each in own.remarks[:NAMED]:
         fields = {
@@ -440,16 +412,13 @@ def _asprs_remarks(
 
 
 def _layout(texts: Texts, found: Layout) -> list[str]:
-    said = []
-    if not found.even:
-        said.append(texts("layout.quadrants"))
-    if not found.apart:
-        said.append(texts("layout.spacing", spacing=texts.percent(found.least_spacing)))
-    if found.far > 0:
-        said.append(texts("layout.far", percent=texts.percent(found.far)))
-    if found.beyond_control:
-        said.append(texts("layout.outside", n=found.beyond_control))
-    return said
+    told: list[tuple[bool, str, dict[str, str | int]]] = [
+        (not found.even, "quadrants", {}),
+        (not found.apart, "spacing", {"spacing": texts.percent(found.least_spacing)}),
+        (found.far > 0, "far", {"percent": texts.percent(found.far)}),
+        (found.beyond_control > 0, "outside", {"n": found.beyond_control}),
+    ]
+    return [texts(f"layout.{name}", **fields) for holds, name, fields in told if holds]
 
 
 def _two_heights(found: Compared, shift: Bias, own: Sized) -> bool:

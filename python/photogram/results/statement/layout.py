@@ -73,19 +73,10 @@ class Layout:
 def layout(points: ArrayLike, extent: ArrayLike, control: ArrayLike) -> Layout:
     """Return how check points lie in a block.
 
-    Parameters
-    ----------
-    points
-        (n, 3) east, north, height of the check points, n at least 1; a height that is not known is NaN.
-    extent
-        (m, 3) positions of all that the block has, m at least 1: its box and its hull are the block's.
-    control
-        (k, 3) positions of the control points; perhaps none.
-
-    Raises
-    ------
-    InputError
-        Arrays of other shapes, no point, positions in plan that are not finite, or all at one place.
+    `points` are (n, 3) east, north, height of the check points, n at least 1, a height that is not known NaN;
+    `extent` (m, 3) positions of all that the block has: its box and its hull are the block's; `control` (k,
+    3), perhaps none. Other shapes, no point, positions in plan that are not finite, or all at one place, are
+    refused.
     """
     own, block, held = _plan("points", points, 1), _plan("extent", extent, 1), _plan("control", control, 0)
     low, high = block[:, :2].min(axis=0), block[:, :2].max(axis=0)
@@ -106,13 +97,7 @@ def layout(points: ArrayLike, extent: ArrayLike, control: ArrayLike) -> Layout:
 
 
 def area_in_plan(positions: ArrayLike) -> float:
-    """Return the area of the hull of (n, 2) or (n, 3) positions in plan, in the square of their unit.
-
-    Raises
-    ------
-    InputError
-        Another shape, no position, or one that is not finite.
-    """
+    """Return the area of the hull of (n, 2) or (n, 3) positions in plan, in the square of their unit."""
     return area(hull(_plan("positions", positions, 1)[:, :2]))
 
 

@@ -20,14 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest
 
-__all__ = [
-    "LengthTest",
-    "Limit",
-    "angle_to_diagonal",
-    "at_reference",
-    "length_test",
-    "measured_lengths",
-]
+__all__ = ["LengthTest", "Limit", "angle_to_diagonal", "at_reference", "length_test", "measured_lengths"]
 
 LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
 """Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
@@ -127,25 +120,10 @@ class LengthTest:
 
 
 def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLike) -> tuple[Floats, Floats]:
-    """Return distances between points, and their joint covariance J C J'.
+    """Return (m,) distances between points, and their (m, m) joint covariance J C J'.
 
-    Parameters
-    ----------
-    positions
-        (p, 3) of the points in the linear unit.
-    covariance
-        (3 p, 3 p) joint covariance of the positions, point by point, cross blocks included.
-    pairs
-        (m, 2) rows of the points of each length.
-
-    Returns
-    -------
-    (m,) in the linear unit, and (m, m).
-
-    Raises
-    ------
-    InputError
-        Arrays of other shapes, a pair of points at one place.
+    `positions` are (p, 3), `covariance` is (3 p, 3 p), point by point, cross blocks included, `pairs` are (m,
+    2) rows of the points of each length. Two points at one place are refused.
     """
     own = numbers("positions", positions)
     if own.ndim != 2 or own.shape[1] != 3:
@@ -174,17 +152,8 @@ def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLi
 def angle_to_diagonal(steps: ArrayLike, extent: ArrayLike) -> float:
     """Return the smallest angle between lengths and the four diagonals of a box, radians.
 
-    Parameters
-    ----------
-    steps
-        (m, 3) from the one end of each length to the other, m at least 1; none is zero.
-    extent
-        (3,) of the box along the same axes.
-
-    Raises
-    ------
-    InputError
-        Arrays of other shapes, a step or a box without a length.
+    `steps` are (m, 3) from the one end of each length to the other, none zero; `extent` is (3,) of the box
+    along the same axes.
     """
     own, box = numbers("steps", steps), shaped("extent", extent, (3,))
     if own.ndim != 2 or own.shape[1] != 3 or not len(own):
@@ -198,21 +167,10 @@ def angle_to_diagonal(steps: ArrayLike, extent: ArrayLike) -> float:
 
 
 def at_reference(lengths: ArrayLike, temperatures: ArrayLike, expansion: float) -> Floats:
-    """Return what lengths of a body that was measured at some temperature are at 20 degrees Celsius.
+    """Return what (m,) lengths of a body at some temperatures (deg C) are at 20 degrees Celsius.
 
-    Parameters
-    ----------
-    lengths
-        (m,) measured.
-    temperatures
-        (m,) of the body, in degrees Celsius.
-    expansion
-        Its coefficient of thermal expansion, per kelvin: 11.5e-6 of steel.
-
-    Raises
-    ------
-    InputError
-        Arrays of other shapes; an expansion that is not finite, or makes a length of zero.
+    `expansion` is its coefficient of thermal expansion, per kelvin: 11.5e-6 of steel. One that makes a length
+    of zero is refused.
     """
     own = numbers("lengths", lengths)
     grown = 1 + expansion * (shaped("temperatures", temperatures, own.shape) - REFERENCE)
@@ -233,30 +191,14 @@ def length_test(
     off_diagonal: float = math.nan,
     freedom: float = math.inf,
 ) -> LengthTest:
-    """Test measured lengths against calibrated ones.
+    """Test (m,) measured lengths against calibrated ones, both at 20 degrees (:func:`at_reference`).
 
-    Parameters
-    ----------
-    measured, calibrated
-        (m,) lengths of one unit, both at 20 degrees; m at least 1. See :func:`at_reference`.
-    covariance
-        (m, m) joint covariance of the measured ones; see :func:`measured_lengths`.
-    sd
-        (m,) standard deviations of the calibrated ones.
-    lines
-        (m,) names of the lines on which they lie.
-    limit
-        Of the errors.
-    diagonal, off_diagonal
-        Of the volume that was measured, in the same unit, and the smallest angle between a length and a
-        diagonal (:func:`angle_to_diagonal`); NaN where that is not known.
-    freedom
-        Degrees of freedom with which the unit weight of the covariance was estimated.
-
-    Raises
-    ------
-    InputError
-        Arrays of other shapes, no length, one that is not finite, a negative standard deviation.
+    `covariance` is the (m, m) joint one of the measured ones (:func:`measured_lengths`), `sd` are (m,)
+    standard deviations of the calibrated ones, `lines` (m,) names of the lines on which they lie. `diagonal`
+    and `off_diagonal` are of the volume that was measured: its diagonal, and the smallest angle between a
+    length and it (:func:`angle_to_diagonal`); NaN where that is not known. `freedom` are degrees of freedom
+    with which the unit weight of the covariance was estimated. Arrays of other shapes, and what is no length,
+    are refused.
     """
     own = numbers("measured", measured)
     if own.ndim != 1 or not own.size:

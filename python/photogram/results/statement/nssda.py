@@ -65,22 +65,11 @@ class Nssda:
 
 
 def nssda(moments: ArrayLike | None, rmse_z: float | None, count: int) -> Nssda:
-    """Return the accuracy at 95 %.
+    """Return the accuracy of `count` check points at 95 %.
 
-    Parameters
-    ----------
-    moments
-        (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y on its
-        diagonal. None where there are none in plan.
-    rmse_z
-        Of the heights, in the linear unit; None where there are none.
-    count
-        Check points.
-
-    Raises
-    ------
-    InputError
-        A matrix of another shape, or one of no mean products; a negative RMSE.
+    `moments` are (2, 2) mean products of the differences in plan, sum d d' / n: squares of RMSE_x and RMSE_y
+    on its diagonal; None where there are none in plan. `rmse_z` is that of the heights, in the linear unit;
+    None where there are none.
     """
     if rmse_z is not None and not rmse_z >= 0:
         raise InputError(f"a root mean square error is not negative: {rmse_z:g}")

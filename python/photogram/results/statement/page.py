@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +60,8 @@ def statement_page(found: Statement) -> Page:
         head.append(Fact(texts("page.date"), texts.day(asked.date)))
     tone = judged.tone
     mark = texts(f"mark.{tone or 'good'}")
+    assumed = Remarks([text for _, text in judged.assumptions], 40)
+    remarks = [Remarks(judged.remarks, 40)] if judged.remarks else []
     return Page(
         what=texts("page.what"),
         title=asked.title or found.result.block.title,
@@ -68,8 +70,8 @@ def statement_page(found: Statement) -> Page:
         highlights=[],
         sections=[
             Section("figures", texts("page.figures"), [*_figures(found), *_notes(found)]),
-            _assumptions(found),
-            _told("remarks", texts, judged.remarks),
+            Section("assumptions", texts("page.assumptions"), [assumed, _map(found)]),
+            Section("remarks", texts("page.remarks"), remarks),
             Section("signature", "", [Text(texts("page.signature"))]),
             checks_annex(found),
             left_out_annex(found),
@@ -86,15 +88,6 @@ def statement_page(found: Statement) -> Page:
         contents=texts("page.contents"),
         more=texts("page.more", count="{}"),
     )
-
-
-def _assumptions(found: Statement) -> Section:
-    told = Remarks([text for _, text in found.judged.assumptions], 40)
-    return Section("assumptions", found.texts("page.assumptions"), [told, _map(found)])
-
-
-def _told(name: str, texts: Texts, sentences: Sequence[str]) -> Section:
-    return Section(name, texts(f"page.{name}"), [Remarks(sentences, 40)] if sentences else [])
 
 
 def _figures(found: Statement) -> list[Table]:
@@ -221,37 +214,39 @@ def _metrology(found: Statement) -> list[Section]:
     if features is not None and len(features):
         tables.append(_features(texts, features))
     if lengths is not None:
-        decimals = decimals_for(lengths.test.sd)
+        test, decimals = lengths.test, decimals_for(lengths.test.sd)
+        limits = np.full(len(lengths.lines), math.nan) if test.limits is None else test.limits
         columns = [
-            cells.column("line", text=True),
-            *(cells.column(key, unit) for key in ("length", "error", "sd", "normalised", "limit")),
+            (cells.column("line", text=True), lambda k: f"{lengths.lines[k]}: {' – '.join(lengths.ends[k])}"),
+            cells.numbers("length", lengths.calibrated, decimals, unit),
+            cells.numbers("error", test.errors, decimals, unit),
+            cells.numbers("sd", test.sd, decimals, unit),
+            cells.numbers("normalised", test.normalised, 2, unit),
+            cells.numbers("limit", limits, decimals, unit),
         ]
-        own_limits = lengths.test.limits
-        rows: list[Row] = [
-            [
-                f"{line}: {first} – {last}",
-                cells.number(float(lengths.calibrated[k]), decimals),
-                cells.number(float(lengths.test.errors[k]), decimals),
-                cells.number(float(lengths.test.sd[k]), decimals),
-                cells.number(float(lengths.test.normalised[k]), 2),
-                cells.number(math.nan if own_limits is None else float(own_limits[k]), decimals),
-            ]
-            for k, (line, (first, last)) in enumerate(zip(lengths.lines, lengths.ends, strict=True))
-        ]
-        tables.append(Table(texts("table.lengths"), columns, rows))
+        tables.append(Table.of(texts("table.lengths"), range(len(lengths.lines)), columns))
         labels = {name: texts(f"column.{name}") for name in ("length", "error")}
         labels |= {"unit": unit, "decimal": texts("number.decimal")}
         draw = partial(drawn_lengths, lengths, labels)
         title, caption = texts("picture.lengths"), texts("picture.lengths.caption")
         tables.append(Drawing("lengths", title, caption, draw))
     if found.standards.iso_19157:
-        columns = [cells.column("measure", text=True), cells.column("id"), cells.column("value"), Column("")]
-        rows = []
-        for each in found.standards.iso_19157:
-            values = each["value"] if isinstance(each["value"], list) else [each["value"]]
-            shown = " / ".join(texts.significant(own, 3) if own is not None else "–" for own in values)
-            rows.append([each["measure"], each["measure_id"], shown, each["unit"]])
-        tables.append(Table(texts("table.iso"), columns, rows))
+        measures = Table.of(
+            texts("table.iso"),
+            found.standards.iso_19157,
+            [
+                (cells.column("measure", text=True), lambda each: each["measure"]),
+                (cells.column("id"), lambda each: each["measure_id"]),
+                (cells.column("value"), lambda each: _measured(texts, each["value"])),
+                (Column(""), lambda each: each["unit"]),
+            ],
+        )
+        tables.append(measures)
     if not tables:
         return []
     return [Section("annex-h", texts("annex.h"), tables, annex=True)]
+
+
+def _measured(texts: Texts, value: Any) -> str:
+    values = value if isinstance(value, list) else [value]
+    return " / ".join("–" if each is None else texts.significant(each, 3) for each in values)

@@ -53,18 +53,10 @@ class Wanted:
 
 
 def wanted(result: Result, asked: Any) -> Wanted:
-    """Return a quantity as it is asked for.
+    """Return a quantity as it is asked for; refuse what is not there, and points that took no part.
 
-    Parameters
-    ----------
-    asked
-        `point NAME z`, `distance NAME NAME`, `camera NAME f`, `photo NAME x`, `unknown NAME x`; or a mapping
-        of items to gradients, `{("point", "C08"): [0, 0, 1]}`, which is linear.
-
-    Raises
-    ------
-    InputError
-        Kinds, names or components that are not there; points that took no part.
+    `point NAME z`, `distance NAME NAME`, `camera NAME f`, `photo NAME x`, `unknown NAME x`; or a mapping of
+    items to gradients, `{("point", "C08"): [0, 0, 1]}`, which is linear.
     """
     if isinstance(asked, Mapping):
         return _linear(result, asked)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -18,7 +18,7 @@ from photogram.results.statement.figures import Figures
 from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
-from photogram.show.page import Cell, Column, Row, decimals_of
+from photogram.show.page import Cell, Column, decimals_of
 
 __all__ = ["Written", "decimals_for", "files_of_statement"]
 
@@ -58,7 +58,7 @@ def _check_file(
         ("sd_survey", found.survey_sd),
         ("normalised", nothing if tests is None else tests.normalised),
     ):
-        columns |= {f"{name}_{axis}": column for axis, column in zip(_AXES, values.T, strict=True)}
+        columns |= _along_axes(name, values)
     single = ("T", "p", "others", "ce90", "le90")
     titles = ("T", "p", "T_from_the_others", "ce90_predicted", "le90_predicted")
     for title, name in zip(titles, single, strict=True):
@@ -72,18 +72,17 @@ def _check_file(
     return csv_text(columns, [f"lengths in {unit}; d: adjusted minus given, to the east, north and up"])
 
 
+def _along_axes(name: str, values: Floats) -> dict[str, Floats]:
+    return {f"{name}_{axis}": column for axis, column in zip(_AXES, values.T, strict=True)}
+
+
 def _left_out_file(found: Sequence[LeftOut], unit: str) -> bytes:
     """Return `leave_one_out.csv`: control points as the others predict them."""
     columns: dict[str, Any] = {"point": [each.point for each in found]}
     for name, values in (("d", [each.difference for each in found]), ("sd", [each.sd for each in found])):
-        table = np.array(values).reshape(len(found), 3)
-        columns |= {f"{name}_{axis}": column for axis, column in zip(_AXES, table.T, strict=True)}
-    columns |= {
-        "T": [each.T for each in found],
-        "rank": [each.rank for each in found],
-        "p": [each.p for each in found],
-        "least_eigenvalue": [float(each.eigenvalues.min(initial=math.nan)) for each in found],
-    }
+        columns |= _along_axes(name, np.array(values).reshape(len(found), 3))
+    columns |= {name: [getattr(each, name) for each in found] for name in ("T", "rank", "p")}
+    columns["least_eigenvalue"] = [float(each.eigenvalues.min(initial=math.nan)) for each in found]
     return csv_text(
         columns, [f"lengths in {unit}; d: predicted by all others minus survey; no independent check"]
     )
@@ -123,20 +122,28 @@ class Written:
         """Return a column by the key of its head."""
         return Column(self._texts(f"column.{key}"), unit, text=text)
 
-    def columns(self, keys: Sequence[str], unit: str) -> list[Column]:
-        """Return columns for east, north and height of several things."""
+    def numbers(
+        self, key: str, values: Floats | Sequence[float], decimals: int, unit: str = ""
+    ) -> tuple[Column, Callable[[int], Cell]]:
+        """Return a column by the key of its head, with the number of each row."""
+        return self.column(key, unit), lambda row: self.number(float(values[row]), decimals)
+
+    def along_axes(
+        self, key: str, values: Floats, decimals: int, unit: str = ""
+    ) -> list[tuple[Column, Callable[[int], Cell]]]:
+        """Return columns for east, north and height, with the numbers of each row of (n, 3) values."""
+        head = self._texts(f"column.{key}")
+        columns = [Column(f"{head} {self._texts(f'component.{axis}')}", unit) for axis in _AXES]
         return [
-            Column(f"{self._texts(f'column.{key}')} {self._texts(f'component.{axis}')}", unit)
-            for key in keys
-            for axis in _AXES
+            (column, lambda row, own=own: self.number(float(own[row]), decimals))  # type: ignore[misc]
+            for column, own in zip(columns, np.reshape(values, (-1, 3)).T, strict=True)
         ]
 
     def number(self, value: float | None, decimals: int) -> Cell:
         """Return a number with so many decimals; what there is not as a dash."""
         if value is None:
             return Cell("")
-        known = math.isfinite(value)
-        return Cell(self._texts.number(value, decimals), sorts=value if known else None)
+        return Cell(self._texts.number(value, decimals), sorts=value if math.isfinite(value) else None)
 
     def looked(self, value: float, decimals: int, *, bad: bool) -> Cell:
         """Return a number that is to be looked at where it is bad."""
@@ -154,7 +161,3 @@ class Written:
             return Cell("")
         text = self._texts.significant(value, 2) if value >= 1e-4 else f"< {self._texts.number(1e-4, 4)}"
         return Cell(text, tone="look" if value < level else "", sorts=value)
-
-    def vector(self, values: Floats, decimals: int) -> Row:
-        """Return numbers, one after the other."""
-        return [self.number(float(each), decimals) for each in values]

@@ -11,14 +11,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.results.group_sums import observables
 from photogram.results.grouping import Grouping
-from photogram.results.network_trial import (
-    ATTITUDE,
-    CONTROL,
-    IMAGE,
-    KINDS,
-    OBSERVATION,
-    POSITION,
-)
+from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, KINDS, OBSERVATION, POSITION
 from photogram.results.result import Result
 from photogram.results.suspects import block_suspects, observations_of_core
 

@@ -16,7 +16,7 @@ from photogram.network.observations import Control
 from photogram.results.result import Result
 from photogram.results.statement import asprs
 from photogram.results.statement.comparison import Compared, plan_positions, turned_jointly, turned_to_east
-from photogram.results.statement.figures import Figures
+from photogram.results.statement.figures import Figures, root_mean
 from photogram.results.statement.iso_19157 import RELATIVE, measures
 from photogram.results.statement.layout import area_in_plan
 from photogram.results.statement.leave_one_out import LeftOut
@@ -31,6 +31,7 @@ from photogram.results.statement.lengths import (
 from photogram.results.statement.nssda import Nssda, nssda
 from photogram.results.statement.quantities import hint
 from photogram.results.statement.request import Asked, lengths_in
+from photogram.show.quantity import members
 
 __all__ = ["Asprs", "Lengths", "Standards", "standards"]
 
@@ -78,8 +79,7 @@ class Asprs:
         found: dict[str, Any] = dict.fromkeys(_METRES_OF.values())
         found |= {_METRES_OF[name]: size * metre for name, size in asked.classes.items()}
         for name, each in self.figures.items():
-            found[f"upper_{name}"] = None if each is None else each.upper
-            found[f"rmse_{name}"] = None if each is None else each.rmse
+            found |= {f"upper_{name}": each and each.upper, f"rmse_{name}": each and each.rmse}
         found |= {own: self.verdicts.get(name) for name, own in _NAMES.items()}
         return found | {
             "words": self.words,
@@ -106,33 +106,25 @@ class Lengths:
 
     def member(self) -> dict[str, Any]:
         """Return what the JSON document has."""
-        test = self.test
-        rows = [
-            {
-                "line": line,
-                "from": ends[0],
-                "to": ends[1],
-                "calibrated": self.calibrated[k],
-                "error": test.errors[k],
-                "sd": test.sd[k],
-                "normalised": test.normalised[k],
-                "limit": None if test.limits is None else test.limits[k],
-            }
-            for k, (line, ends) in enumerate(zip(self.lines, self.ends, strict=True))
-        ]
-        together = test.together
+        test, together = self.test, self.test.together
+        columns = {
+            "line": self.lines,
+            "from": [first for first, _ in self.ends],
+            "to": [last for _, last in self.ends],
+            "calibrated": self.calibrated,
+            "error": test.errors,
+            **members(test, "sd", "normalised"),
+            "limit": [None] * len(self.lines) if test.limits is None else test.limits,
+        }
         return {
-            "lengths": rows,
-            "largest": test.largest,
-            "rmse": test.rms,
-            "met": test.met,
-            "lines": test.lines,
+            "lengths": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+            **members(test, "largest", rmse="rms", met="met", lines="lines"),
             "arrangement": test.enough and test.long_enough and test.along_diagonal,
             "angle_to_diagonal": test.off_diagonal,
             "at_reference_temperature": self.expansion is not None,
-            "T": None if together is None else together.weighted_sum_of_squares,
-            "rank": None if together is None else together.degrees_of_freedom,
-            "p_high": None if together is None else together.probability_above,
+            "T": together and together.weighted_sum_of_squares,
+            "rank": together and together.degrees_of_freedom,
+            "p_high": together and together.probability_above,
         }
 
 
@@ -148,16 +140,13 @@ class Standards:
     @property
     def nssda_member(self) -> dict[str, Any] | None:
         """What the JSON document has of the NSSDA."""
-        if self.nssda is None:
-            return None
-        found = self.nssda
-        return {
-            "ratio": found.ratio,
-            "accuracy_r_equal": found.accuracy_r_equal,
-            "accuracy_r_unequal": found.accuracy_r,
-            "ce95": found.ce95,
-            "accuracy_z": found.accuracy_z,
-        }
+        return self.nssda and members(
+            self.nssda,
+            *("ratio", "accuracy_r_equal"),
+            accuracy_r_unequal="accuracy_r",
+            ce95="ce95",
+            accuracy_z="accuracy_z",
+        )
 
 
 def standards(
@@ -168,13 +157,7 @@ def standards(
     of_vegetated: Figures | None,
     left_out: Sequence[LeftOut],
 ) -> Standards:
-    """Return what the standards say that are asked for.
-
-    Raises
-    ------
-    InputError
-        Lengths between points that there are not; classes that cannot be.
-    """
+    """Return what the standards say that are asked for; refuse lengths between points that are not there."""
     lengths = _lengths(result, asked) if asked.lengths else None
     return Standards(
         asprs=_asprs(result, asked, found, of_all, of_vegetated, left_out)
@@ -254,22 +237,14 @@ def _control_rmse(result: Result) -> tuple[float, float]:
     if not found:
         return math.nan, math.nan
     squares = np.array(found) ** 2
-    plan, height = squares[:, :2].sum(axis=1), squares[:, 2]
-    return tuple(  # type: ignore[return-value]
-        math.sqrt(float(own[np.isfinite(own)].mean())) if np.isfinite(own).any() else math.nan
-        for own in (plan, height)
-    )
+    return root_mean(squares[:, :2].sum(axis=1)), root_mean(squares[:, 2])
 
 
 def _left_out(found: Sequence[LeftOut]) -> dict[str, float]:
     if not found:
         return {"h": math.nan, "v": math.nan}
     d = np.array([each.difference for each in found])
-    parts = {"h": (d[:, :2] ** 2).sum(axis=1), "v": d[:, 2] ** 2}
-    return {
-        name: math.sqrt(float(own[np.isfinite(own)].mean())) if np.isfinite(own).any() else math.nan
-        for name, own in parts.items()
-    }
+    return {"h": root_mean((d[:, :2] ** 2).sum(axis=1)), "v": root_mean(d[:, 2] ** 2)}
 
 
 def _nssda(of_all: Figures | None) -> Nssda | None:

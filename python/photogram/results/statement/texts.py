@@ -34,13 +34,7 @@ def table_of(language: str) -> Mapping[str, str]:
 
 
 def fields_of(sentence: str) -> set[str]:
-    """Return the names of the fields of a sentence.
-
-    Raises
-    ------
-    InputError
-        Braces that do not close, or that hold more than a name.
-    """
+    """Return the names of the fields of a sentence; refuse braces with more than a name, or not closed."""
     try:
         parts = list(Formatter().parse(sentence))
     except ValueError as error:
@@ -102,6 +96,10 @@ class Texts:
         sentence = self._table[self._form(key, values)]
         return sentence.format(**{name: self._field(value) for name, value in values.items()})
 
+    def said(self, key: str, **values: Any) -> tuple[str, str]:
+        """Return a key with its sentence."""
+        return key, self(key, **values)
+
     def _form(self, key: str, values: Mapping[str, Any]) -> str:
         """Return the key of the sentence in the form that its counts take."""
         ones = [name for name, value in values.items() if isinstance(value, int) and value == 1]
@@ -140,19 +138,12 @@ class Texts:
         head = ""
         while len(whole) > 4 or (head and len(whole) > 3):
             whole, head = whole[:-3], group + whole[-3:] + head
-        return (
-            sign.replace("-", "−")
-            + whole
-            + head
-            + (self._table["number.decimal"] if point else "")
-            + decimals
-        )
+        return sign.replace("-", "−") + whole + head + (point and self._table["number.decimal"]) + decimals
 
     def length(self, value: float, figures: int = 2) -> str:
         """Return a length with its unit: centimetres where it is less than a metre, millimetres for less."""
         unit, factor = self.small(value)
-        digits = value * factor
-        return f"{self.significant(digits, figures)} {unit}"
+        return f"{self.significant(value * factor, figures)} {unit}"
 
     def size(self, value: float) -> str:
         """Return a class as it was asked for: `5 cm`."""

@@ -103,9 +103,8 @@ def test(texts: Texts, name: str) -> str:
 def named(texts: Texts, said: str) -> str:
     """Return what other modules call an observation, or what else a test is of."""
     found = texts.recognised("named", said)
-    if found is not None and all(
-        _is_component(texts, each) for each in found[1].get("axes", "x").split(", ")
-    ):
+    axes = [] if found is None else found[1].get("axes", "x").split(", ")
+    if axes and all(each in LETTERS or texts.has(f"axis.{each}") for each in axes):
         return _turned(texts, "named", said)
     words = said.split(" ")
     for cut in range(len(words) - 1, 0, -1):
@@ -194,10 +193,6 @@ def feature(texts: Texts, found: Feature) -> str:
     return texts("feature.through", feature=own, count=len(found.points), points=points)
 
 
-def _is_component(texts: Texts, name: str) -> bool:
-    return name in LETTERS or texts.has(f"axis.{name}")
-
-
 def _one(texts: Texts, name: str) -> str:
     """Return what one of a kind of observations is called."""
     return ", ".join(texts.word("one", each) for each in name.split(", "))
@@ -208,21 +203,14 @@ def _turned(texts: Texts, family: str, said: str) -> str:
     if found is None:
         return said
     key, fields = found
-    return texts(key, **{name: _FIELDS.get(name, _as_it_is)(texts, own) for name, own in fields.items()})
-
-
-def _as_it_is(_texts: Texts, said: str) -> str:
-    return said
-
-
-def _axes(texts: Texts, said: str) -> str:
-    return ", ".join(axis(texts, each) for each in said.split(", "))
+    turned = {name: _FIELDS[name](texts, own) for name, own in fields.items() if name in _FIELDS}
+    return texts(key, **{**fields, **turned})
 
 
 _FIELDS: Mapping[str, Callable[[Texts, str], str]] = {
     "kind": kind,
     "one": _one,
-    "axes": _axes,
+    "axes": lambda texts, said: ", ".join(axis(texts, each) for each in said.split(", ")),
     "named": named,
     "number": lambda texts, said: texts.numeral(said),
 }
