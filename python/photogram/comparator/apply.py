@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.comparator.correction import Correction
+from photogram.comparator.csvfile import Table
 from photogram.comparator.readings import LARGEST_UM
 from photogram.errors import InputError
 from photogram.io.rows import cells
 from photogram.messages import Message, counted
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.correction import Correction
-    from photogram.comparator.csvfile import Table
 
 __all__ = ["correct_table"]
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.comparator.readings import Case
 from photogram.lazy_dataclasses import dataclass
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.readings import Case
-    from photogram.messages import Message
+from photogram.messages import Message
 
 __all__ = ["Closeout", "close_out"]
 

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.affine import AffineFit
+from photogram.arguments.types import Floats
+from photogram.comparator.case import PlacedCase
 from photogram.comparator.correction import Correction
-from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_rigid, rotation_matrix
 from photogram.comparator.polynomial import COUNT, Polynomial, fit_polynomial
-from photogram.comparator.residuals import Residuals
-from photogram.comparator.rigid import RigidFit, fit_rigid
 from photogram.lazy_dataclasses import dataclass, replace
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.case import PlacedCase
 
 __all__ = ["CombinedLinear", "CombinedPolynomial", "SinglePolynomial", "combine_linear", "combine_polynomial"]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.annotations import path
+from photogram.arguments.types import Floats
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number, whole_number
@@ -19,7 +20,6 @@ from photogram.show.summary import Brief
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photogram.arguments.types import Floats
 
 __all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
 

@@ -10,25 +10,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.comparator.case import PlacedCase
+from photogram.comparator.combined_solution import CombinedLinear
 from photogram.comparator.correction import PARAMETERS, Correction
-from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.fits import Residuals, rotation_matrix
+from photogram.comparator.grid import Grid
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial
-from photogram.comparator.residuals import Residuals
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import GlobalTest, global_test
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.case import PlacedCase
-    from photogram.comparator.combined_solution import CombinedLinear
-    from photogram.comparator.grid import Grid
-    from photogram.comparator.readings import Integers
 
 __all__ = ["JointCase", "JointFit", "JointPlate", "Weights", "adjust_jointly"]
 
@@ -108,7 +103,7 @@ class JointPlate:
         Of the corrections against the standard deviation a priori; None where it was estimated or fixed.
     """
 
-    points: Integers
+    points: Indices
     corrections_um: Floats
     covariance_um2: Floats
     sigma_um: float
@@ -155,11 +150,11 @@ class _Arrays:
     """The problem as the extension module takes it."""
 
     grid_xy: Floats
-    plate_of: Integers
-    measured_cases: Integers
-    measured_points: Integers
+    plate_of: Indices
+    measured_cases: Indices
+    measured_points: Indices
     measured_xy: Floats
-    counts: Integers
+    counts: Indices
     placements: Floats
     left_handed: list[bool]
     frame: Frame
@@ -216,7 +211,7 @@ def _initial_grid(sigma_um: float | None, random_um: float) -> float:
 
 def _arrays(
     cases: Sequence[PlacedCase], grids: Mapping[int, Grid], linear: CombinedLinear, polynomial: bool
-) -> tuple[_Arrays, dict[int, Integers]]:
+) -> tuple[_Arrays, dict[int, Indices]]:
     """Return the problem: points numbered through, placements counted from the middle of the range."""
     plates = list(dict.fromkeys(case.case.plate for case in cases))
     points_of = {
@@ -328,7 +323,7 @@ def _grid_squares(
 def _result(
     cases: Sequence[PlacedCase],
     arrays: _Arrays,
-    points_of: Mapping[int, Integers],
+    points_of: Mapping[int, Indices],
     solution: _photocore.ComparatorSolution,
     variance: Floats,
     random: float,
@@ -396,7 +391,7 @@ def _case(
 
 def _plate(
     arrays: _Arrays,
-    points: Integers,
+    points: Indices,
     solution: _photocore.ComparatorSolution,
     plate: int,
     sigma_um: float,

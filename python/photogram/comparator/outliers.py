@@ -13,28 +13,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.affine import fit_affine
+from photogram.arguments.types import Floats
+from photogram.comparator.case import PlacedCase, exchanged
 from photogram.comparator.combined_solution import (
     CombinedLinear,
     CombinedPolynomial,
     combine_linear,
     combine_polynomial,
 )
-from photogram.comparator.decomposition import rotation_matrix
-from photogram.comparator.orientation import exchanged
+from photogram.comparator.fits import fit_affine, fit_rigid, rotation_matrix
+from photogram.comparator.grid import Grid
+from photogram.comparator.readings import Case
 from photogram.comparator.reduction import Reduction
-from photogram.comparator.rigid import fit_rigid
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.limits import externally_studentized, studentized_limit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from photogram.arguments.types import Floats
-    from photogram.comparator.case import PlacedCase
-    from photogram.comparator.grid import Grid
-    from photogram.comparator.readings import Case
 
     Bools = NDArray[np.bool_]
 

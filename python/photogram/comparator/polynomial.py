@@ -8,15 +8,12 @@ the scaled columns one of a few tens.
 from __future__ import annotations
 
 from math import comb
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
 
 __all__ = ["TERMS", "Frame", "Polynomial", "fit_polynomial"]
 

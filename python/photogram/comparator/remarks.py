@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
+from photogram.comparator.case import PlacedCase
+from photogram.comparator.joint import JointFit
+from photogram.comparator.outliers import FarPointing, Outlier, Screening
+from photogram.comparator.readings import Session
 from photogram.io.places import Place
 from photogram.messages import Message
-
-if TYPE_CHECKING:
-    from photogram.comparator.case import PlacedCase
-    from photogram.comparator.joint import JointFit
-    from photogram.comparator.outliers import FarPointing, Outlier, Screening
-    from photogram.comparator.readings import Session
 
 __all__ = ["plate_remarks", "problems"]
 

@@ -18,10 +18,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.comparator.case import exchanged
 from photogram.comparator.correction import PARAMETERS
-from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.grid import Grid
-from photogram.comparator.orientation import exchanged
 from photogram.comparator.years.record import RecordedCalibration, RecordedCase
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass
