@@ -19,8 +19,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.stellar.inertial import equatorial_axes
-from photogram.stellar.places import Earth, sidereal_time, to_date
+from photogram.stellar.places import Earth, equatorial_axes, sidereal_time, to_date
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
-
-if TYPE_CHECKING:
-    from photogram.stellar.result import Result
+from photogram.stellar.result import Result
 
 __all__ = ["ComparatorFrame", "comparator_frame"]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +11,8 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
+from photogram.stellar.result import Result
 from photogram.stellar.sky import TAU, refraction
-
-if TYPE_CHECKING:
-    from photogram.stellar.result import Result
 
 __all__ = [
     "DistortionCurves",

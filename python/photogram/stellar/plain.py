@@ -23,8 +23,7 @@ from photogram.stellar.landmarks import HOUR, landmark
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.places import sidereal_time
-from photogram.stellar.problem import Axis, Problem, default_parameters
-from photogram.stellar.rejection import rejected
+from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
 from photogram.stellar.sky import Site
 from photogram.stellar.tomlfile import effects, pole_arcsec, site
 

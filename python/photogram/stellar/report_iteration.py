@@ -15,9 +15,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError
-from photogram.stellar.counts import degrees_of_freedom
-from photogram.stellar.failures import failure, singular
-from photogram.stellar.problem import Problem
+from photogram.stellar.problem import Problem, degrees_of_freedom, failure, singular
 from photogram.stellar.state import Level, Solved
 
 __all__ = ["DIVERGED", "SETTLED", "iterate", "residual_cycle", "stop_reason"]

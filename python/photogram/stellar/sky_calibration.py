@@ -19,13 +19,12 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import available_memory
 from photogram.messages import listed
-from photogram.stellar.camera_files import weight_of
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
+from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.problem import weight_root
 from photogram.stellar.sky import Site
-from photogram.stellar.sky_cameras import COMMON, BrownCamera, SkyCamera
-from photogram.stellar.transformation import transformed_angles
+from photogram.stellar.sky_cameras import COMMON, BrownCamera, SkyCamera, weight_of
 
 __all__ = [
     "BrownCamera",

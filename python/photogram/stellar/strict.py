@@ -10,9 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
-from photogram.stellar.counts import degrees_of_freedom
-from photogram.stellar.failures import failure
-from photogram.stellar.problem import Problem
+from photogram.stellar.problem import Problem, degrees_of_freedom, failure
 from photogram.stellar.state import Level, Solved
 
 __all__ = ["iterate"]
