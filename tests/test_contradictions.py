@@ -20,8 +20,8 @@ from photogram.comparator import Grid, compare, listing, simulate_calibration, t
 from photogram.comparator import calibrate as calibrate_comparator
 from photogram.giant import Project, write_project
 from photogram.perspective_center import run_deck
-from photogram.perspective_center.document import to_json as run_to_json
-from photogram.perspective_center.summary import summary
+from photogram.perspective_center.report import summary
+from photogram.perspective_center.report import to_json as run_to_json
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import page_of
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.plot import figure
+from photogram.perspective_center.report import cycles, points, size_of, unknowns
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.perspective_center.tables import cycles, points, size_of, unknowns
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section
 from photogram.show.methods import page_of

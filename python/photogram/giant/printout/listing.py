@@ -10,17 +10,15 @@ from numpy.typing import NDArray
 
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.fields import printed_order
-from photogram.giant.printout.control import control_pages
-from photogram.giant.printout.corrections import correction_pages
-from photogram.giant.printout.formats import Space
-from photogram.giant.printout.frames import Station, frame_pages
-from photogram.giant.printout.iterations import iteration_pages
-from photogram.giant.printout.options import options_page
-from photogram.giant.printout.pages import Page, printout
-from photogram.giant.printout.points import point_pages, propagated_point_pages
-from photogram.giant.printout.residuals import PointResiduals, residual_pages, statistics
-from photogram.giant.printout.stations import station_pages
-from photogram.giant.printout.warnings import warning_pages
+from photogram.giant.printout.forms import Page, Space, printout
+from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
+from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
+from photogram.giant.printout.results import (
+    correction_pages,
+    point_pages,
+    propagated_point_pages,
+    station_pages,
+)
 from photogram.results.result import Result
 
 if TYPE_CHECKING:
