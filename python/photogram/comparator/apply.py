@@ -28,28 +28,13 @@ ROUNDING = 1e-6
 def correct_table(
     correction: Correction, table: Table, *, invert: bool = False, extrapolate: bool = False
 ) -> tuple[bytes, list[Message]]:
-    """Return a table with corrected coordinates and their standard deviations behind its columns.
+    """Return a table with corrected coordinates and their standard deviations added, and remarks.
 
     The standard deviations are what the calibration contributes; those of the readings come on top. The
-    column `in_range` says whether the calibration measured there.
+    column `in_range` says whether the calibration measured there. With `invert` coordinates are corrected
+    ones, and readings are added; `extrapolate` corrects points far outside the calibrated range, too.
 
-    Parameters
-    ----------
-    correction
-        The correction.
-    table
-        Its coordinates are readings; with `invert` they are corrected coordinates, and readings are added.
-    extrapolate
-        Correct points far outside the calibrated range, too.
-
-    Returns
-    -------
-    The table, and remarks on points outside the calibrated range.
-
-    Raises
-    ------
-    InputError
-        A row without coordinates, or no row; points far outside the calibrated range.
+    Raises InputError: a row without coordinates, or no row; points far outside the calibrated range.
     """
     places = []
     for row in table.records.rows():

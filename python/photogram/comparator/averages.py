@@ -202,14 +202,9 @@ def _means(rows: Indices, values: Floats, count: int) -> Floats:
 class ListedGridSigma:
     """What the listing prints under the average residuals (figure 29), micrometres.
 
-    Attributes
-    ----------
-    mean_comparator_um, mean_grid_um
-        "STANDARD DEVIATION": root of the sum of squares of both axes over 2 N - 1.
-    random_um
-        "RANDOM ERRORS" in X and in Y; NaN for one case.
-    grid_um
-        "UNBIASED GRID STANDARD ERROR"; 0 where the difference of variances is negative, or for one case.
+    "STANDARD DEVIATION", roots of the sums of squares of both axes over 2 N - 1; "RANDOM ERRORS" in X and in
+    Y, NaN for one case; "UNBIASED GRID STANDARD ERROR", 0 where the difference of variances is negative, or
+    for one case.
     """
 
     mean_comparator_um: float
@@ -245,9 +240,8 @@ def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
 def text_grid_sigma(averages: PlateAverages) -> float:
     """Compute the grid sigma by equation 64, for unequal numbers of cases a point, both axes pooled.
 
-    Returns
-    -------
-    Micrometres; 0 where the difference of variances is negative, NaN where every point was measured once.
+    Returns micrometres; 0 where the difference of variances is negative, NaN where every point was measured
+    once.
     """
     counts = averages.counts.astype(float)
     total, points = counts.sum(), len(counts)
@@ -271,20 +265,11 @@ def unbiased_grid_sigma(
     comparator + random errors). The expectations of two sums of squares, of the average residuals and of all
     residuals, follow from W and are linear in the variances; they are equated with what was found. Rigid,
     linear and polynomial parameters are thus accounted for, whatever placements and points there are. No
-    matrix of the size of the readings is formed: see :mod:`photogram.comparator.reduction`.
+    matrix of the size of the readings is formed: see :mod:`photogram.comparator.reduction`. `grid_rows` are
+    for each case the rows of its points on its plate.
 
-    Parameters
-    ----------
-    grid_rows
-        For each case the rows of its points on its plate.
-    cases, stage
-        The cases, and the stage of the adjustment that left the residuals.
-
-    Returns
-    -------
-    grid_um, random_um
-        Standard deviation of a grid coordinate of each plate, and of a measured coordinate; NaN where the
-        cases do not separate them, 0 where the estimate of a variance is negative.
+    Returns the standard deviation of a grid coordinate of each plate, and of a measured coordinate; NaN where
+    the cases do not separate them, 0 where the estimate of a variance is negative.
     """
     reduction, errors = _effects(grid_rows, cases, stage)
     plates = list(errors)
@@ -315,18 +300,9 @@ def corrected_grid_sigma(
     """Compute the standard deviation of grid coordinates that average residuals have corrected.
 
     Averages take over a part of the errors of the comparator, and do not show what looks alike in the grid
-    and in the comparator: with few cases corrected coordinates may be worse than good given ones.
-
-    Parameters
-    ----------
-    grid_rows, cases, stage
-        As of :func:`unbiased_grid_sigma`.
-    known_um
-        Standard deviations of the given coordinates; None where they are not known: those computed hold.
-
-    Returns
-    -------
-    Root mean square over the coordinates of each plate, micrometres; NaN where it cannot be known.
+    and in the comparator: with few cases corrected coordinates may be worse than good given ones. Where
+    deviations of given coordinates are not known those computed hold. Returns the root mean square over the
+    coordinates of each plate, micrometres; NaN where it cannot be known.
     """
     computed, random = unbiased_grid_sigma(grid_rows, cases, stage)
     reduction, errors = _effects(grid_rows, cases, stage)

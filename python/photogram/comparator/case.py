@@ -77,10 +77,8 @@ def detect_orientation(grid: Grid, points: Indices, xy_um: Floats) -> Orientatio
     on); here the places of these points follow from the transformation, so that they need not be measured,
     nor be on the plate.
 
-    Raises
-    ------
-    InputError
-        The points lie in a line, or fewer than three are there; coordinates whose squares are no numbers.
+    Raises InputError: the points lie in a line, or fewer than three are there; coordinates whose squares are
+    no numbers.
     """
     plate = grid.xy_um[grid.rows_of(points)]
     largest = np.abs([plate, xy_um]).max(initial=0.0)
@@ -115,9 +113,7 @@ def locations(grid: Grid, corner: int) -> Indices | None:
 
     Locations are numbered like the points of a plate that lies with corner 1 nearest the comparator's zero.
 
-    Returns
-    -------
-    (l,) numbers, row by row of the plate; None where the turned pattern does not meet itself.
+    Returns (l,) numbers, row by row of the plate; None where the turned pattern does not meet itself.
     """
     low, high = grid.xy_um.min(axis=0), grid.xy_um.max(axis=0)
     centred = grid.xy_um - (low + high) / 2
@@ -151,15 +147,12 @@ class LegPoint:
 def intersect_legs(legs_um: Floats) -> Floats:
     """Return where the line through legs 1 and 3 meets the one through legs 2 and 4.
 
+    Raises InputError: the lines are parallel, or two legs of one line coincide.
+
     Parameters
     ----------
     legs_um
         (4, 2) mean coordinates of the legs.
-
-    Raises
-    ------
-    InputError
-        The lines are parallel, or two legs of one line coincide.
     """
     first, second, third, fourth = legs_um
     along, across = third - first, fourth - second
@@ -177,11 +170,8 @@ def reduce_legs(case: Case) -> tuple[Case, list[LegPoint], list[Message]]:
 
     The readings of each leg are averaged first. A point with fewer than four legs is left out, with a remark.
 
-    Raises
-    ------
-    InputError
-        Lines that are parallel, with the place of the first reading of the point; a point measured both on
-        its intersection and on its legs.
+    Raises InputError: lines that are parallel, with the place of the first reading of the point; a point
+    measured both on its intersection and on its legs.
     """
     if not case.legs.any():
         return case, [], []
@@ -267,19 +257,10 @@ class PlacedCase:
 
 
 def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[PlacedCase, list[Message]]:
-    """Reduce legs, group readings, form means, and detect how the plate lies.
+    """Reduce legs, group readings (as the listing does if asked), form means, and detect how the plate lies.
 
-    Parameters
-    ----------
-    case, grid
-        The case and its plate.
-    as_listed
-        Bring points into the order of the listing.
-
-    Raises
-    ------
-    InputError
-        Parallel legs; two points read at one place; points in one line; measurements in another unit.
+    Raises InputError: parallel legs; two points read at one place; points in one line; measurements in
+    another unit.
     """
     reduced, legs, messages = reduce_legs(case)
     if len(np.unique(reduced.points)) < 3:

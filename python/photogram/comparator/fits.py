@@ -147,17 +147,7 @@ RIGID_LOST = 1.5
 
 @dataclass(frozen=True, eq=False)
 class RigidFit:
-    """A rigid fit: grid = M(rotation) comparator + translation.
-
-    Attributes
-    ----------
-    rotation_rad
-        Of the plate against the comparator.
-    translation_um
-        (2,) grid coordinates of the comparator's zero, in the handedness of the comparator.
-    residuals
-        In both systems.
-    """
+    """A rigid fit: grid = M(rotation) comparator + translation, in the handedness of the comparator."""
 
     rotation_rad: float
     translation_um: Floats
@@ -170,19 +160,8 @@ def fit_rigid(
     """Fit measured coordinates onto grid coordinates of the same handedness by rotation and translation.
 
     The rotation is that of the least-squares similarity transformation, which is that of the rigid one as
-    well.
-
-    Parameters
-    ----------
-    points
-        (n,) numbers, two at least.
-    xy_um, grid_um
-        (n, 2) measured (or corrected) and grid coordinates in micrometres.
-    lost
-        Unknowns for each axis, for the standard errors.
-    as_listed
-        Turn residuals back with the cosine and sine of the similarity transformation, without taking its
-        scale out (a relative difference of 1e-5 or so).
+    well. `lost` are the unknowns of each axis, for the standard errors. `as_listed` turns residuals back with
+    the cosine and sine of the similarity transformation, without taking its scale out (1e-5 of them or so).
     """
     middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
     d, g = xy_um - middle, grid_um - grid_middle
@@ -244,17 +223,14 @@ def fit_affine(points: Indices, xy_um: Floats, grid_um: Floats) -> AffineFit:
     The form x + v = A X + T is linear; QR on centred coordinates takes the place of the listing's adjugate of
     the normal equations.
 
+    Raises AdjustmentError: fewer than four points, or points in one line.
+
     Parameters
     ----------
     points
         (n,) numbers, four at least.
     xy_um, grid_um
         (n, 2) measured and grid coordinates in micrometres, of the same handedness.
-
-    Raises
-    ------
-    AdjustmentError
-        Fewer than four points, or points in one line.
     """
     if len(points) < LEAST_POINTS:
         raise AdjustmentError(

@@ -169,23 +169,10 @@ def adjust_jointly(
     *,
     polynomial: bool = True,
 ) -> JointFit:
-    """Adjust everything together.
+    """Adjust everything together, from the combined linear adjustment, with or without polynomials.
 
-    Parameters
-    ----------
-    cases, grids
-        The cases and the plates by number.
-    linear
-        The combined linear adjustment: it gives initial values.
-    weights
-        Where the weights come from.
-    polynomial
-        Whether the comparator has correction polynomials.
-
-    Raises
-    ------
-    AdjustmentError
-        The measurements do not determine the unknowns, or the adjustment does not converge.
+    Raises AdjustmentError: the measurements do not determine the unknowns, or the adjustment does not
+    converge.
     """
     arrays, points_of = _arrays(cases, grids, linear, polynomial)
     random = weights.random_um if weights.random_um is not None else max(linear.sigma0_um, LEAST_UM)
@@ -300,9 +287,8 @@ def _grid_test(
 ) -> GlobalTest | None:
     """Test the corrections of a plate against their standard deviation.
 
-    Their weighted squares are a sum of chi-squares, each times a redundancy, and thus nearly c times
-    chi-square with g degrees of freedom, of the same mean and variance (Satterthwaite): c = sum r^2 / sum r,
-    g = sum r / c.
+    Their weighted squares are nearly c times chi-square with g degrees of freedom, of the same mean and
+    variance (Satterthwaite): c = sum r^2 / sum r, g = sum r / c.
     """
     squares, redundancy = _grid_squares(arrays, solution, plate, sigma_um)
     if redundancy.sum() <= 1e-9:

@@ -167,15 +167,7 @@ def screen(
     stage: CombinedLinear | CombinedPolynomial,
     grids: Mapping[int, Grid],
 ) -> Screening:
-    """Find measured points that do not agree with the adjustment of the others.
-
-    Parameters
-    ----------
-    cases, stage
-        The cases and the last stage of their adjustment.
-    grids
-        The plates by number.
-    """
+    """Find measured points that do not agree with the adjustment of the others, in the last stage."""
     kept = list(cases)
     removed: list[tuple[int, int, float]] = []
     clean, limit = stage, math.inf

@@ -224,16 +224,9 @@ def read_points(points: Indices, xy_um: Floats) -> list[PointReadings]:
 
 
 def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> Precision:
-    """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31).
+    """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31), or divide by `listed_dof` instead.
 
     Each variance is weighted by its degrees of freedom: sums of squares over readings less means.
-
-    Parameters
-    ----------
-    points
-        What to pool.
-    listed_dof
-        Degrees of freedom to divide by instead (see :func:`pool_points`).
     """
     readings = list(points)
     total = sum(point.count for point in readings)
@@ -260,18 +253,9 @@ def pool_points(
 ) -> tuple[dict[int, Precision], Precision]:
     """Pool many cases: each point over its cases (equations 25 to 27), then everything (28 to 32).
 
-    Parameters
-    ----------
-    cases
-        The points of each case.
-    as_listed
-        Divide as the listing does, where that departs from the text: the sums of a point by all its readings
-        less one (not less the number of its cases), those of all points by all readings less the number of
-        points.
-
-    Returns
-    -------
-    by_point, total
+    `as_listed` divides as the listing does, where that departs from the text: the sums of a point by all its
+    readings less one (not less the number of its cases), those of all points by all readings less the number
+    of points.
     """
     by_number: dict[int, list[PointReadings]] = {}
     for case in cases:

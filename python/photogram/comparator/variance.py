@@ -262,14 +262,9 @@ def polynomial_tests(linear: CombinedLinear, nonlinear: CombinedPolynomial) -> P
 
 
 def compare_case_variances(residuals: Sequence[Floats], dof: Sequence[int]) -> CaseVarianceTest:
-    """Compare the variances of unit weight of single cases.
+    """Compare the variances of unit weight of single cases, by their residuals (n, 2) in micrometres.
 
-    Parameters
-    ----------
-    residuals
-        Of each case (n, 2), micrometres.
-    dof
-        Of each case; where they differ, F-max takes the fewest, and errs on the safe side.
+    Where degrees of freedom differ, F-max takes the fewest, and errs on the safe side.
     """
     squares = [float((values**2).sum()) for values in residuals]
     variances = [square / own for square, own in zip(squares, dof, strict=True)]

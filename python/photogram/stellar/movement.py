@@ -173,16 +173,8 @@ def constraints(pairs: tuple[tuple[str, str], ...], parameters: int) -> Floats:
 def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> tuple[Floats, Floats]:
     """Return corrections and cofactors under constraints C x = misclosure (equations 104 and 105).
 
-    Parameters
-    ----------
-    cofactors
-        (n, n) inverse of the normal matrix without constraints.
-    right
-        (n,) right-hand side of the normal equations.
-    c
-        (k, n) constraints.
-    misclosure
-        (k,) what C times the corrections has to be.
+    The cofactors (n, n) are the inverse of the normal matrix without constraints, `right` (n,) its right-hand
+    side, c (k, n) the constraints.
     """
     across = cofactors @ c.T
     gain = np.linalg.solve(c @ across, across.T).T
@@ -191,22 +183,10 @@ def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> t
 
 
 def combine(result: Result, pairs: tuple[tuple[str, str], ...], *, threads: int | None = None) -> Result:
-    """Constrain the attitudes of the given pairs to common values.
+    """Constrain the attitudes of the given pairs to common values; two pairs stand for all three groups.
 
     As published by one linear step, without iterating again; else iterated, with one attitude for the groups.
-
-    Parameters
-    ----------
-    result
-        The solution without constraints.
-    pairs
-        Groups that the movement test found equal; two pairs stand for all three groups.
-    threads
-        Number of threads; all processors when None.
-
-    Returns
-    -------
-    A result of its own, whose degrees of freedom count the constraints.
+    The degrees of freedom of the result count the constraints.
     """
     counts = replace(result.counts, constraints=len(constraints(pairs, len(NAMES))))
     made = (

@@ -74,15 +74,13 @@ _TABLES = {
 def read_plain(path: Path) -> Problem:
     """Read a calibration in plain form.
 
+    Raises InputError: a file that cannot be read, and what cannot be used, with the file, and the record of a
+    CSV file.
+
     Parameters
     ----------
     path
         The TOML file; it names the CSV files of stars and images, relative to itself.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, and what cannot be used, with the file, and the record of a CSV file.
     """
     document = read_document(path, _TABLES)
     try:

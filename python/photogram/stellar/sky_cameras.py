@@ -27,10 +27,7 @@ __all__ = ["COMMON", "BrownCamera", "SkyCamera", "read_any", "read_camera", "rea
 def weight_of(covariance: Floats) -> Floats:
     """Return the weight matrix of a covariance whose rows differ by orders of magnitude.
 
-    Raises
-    ------
-    InputError
-        The covariance is not positive definite.
+    Raises InputError: the covariance is not positive definite.
     """
     sd = np.sqrt(np.diag(covariance))
     try:
@@ -44,10 +41,7 @@ def weight_of(covariance: Floats) -> Floats:
 def read_any(path: Path) -> dict[str, Any]:
     """Read a JSON document.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or holds something else.
+    Raises InputError: the file cannot be read, or holds something else.
     """
     try:
         document = orjson.loads(read_bytes(path))
@@ -63,10 +57,7 @@ def read_any(path: Path) -> dict[str, Any]:
 def read_document(path: Path, kinds: Sequence[str]) -> dict[str, Any]:
     """Read a JSON document of one of some kinds.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is another document.
+    Raises InputError: the file cannot be read, or is another document.
     """
     document = read_any(path)
     if "kind" not in document:
@@ -79,10 +70,7 @@ def read_document(path: Path, kinds: Sequence[str]) -> dict[str, Any]:
 def read_camera(path: Path, document: dict[str, Any], names: Sequence[str]) -> tuple[Floats, Floats]:
     """Return the parameters of a document and their covariance: zero for what is not in its order.
 
-    Raises
-    ------
-    InputError
-        A parameter that is missing, what is not a number, a negative variance.
+    Raises InputError: a parameter that is missing, what is not a number, a negative variance.
     """
     names = list(names)
     try:

@@ -47,10 +47,7 @@ def iterate(
     Where some combination of parameters hardly has an effect (the centre of a small distortion), corrections
     fall slowly or not at all: the iteration stops, too, when the sum of squares stands still.
 
-    Raises
-    ------
-    AdjustmentError
-        Stars or parameters are not determined, or the initial values give no image.
+    Raises AdjustmentError: stars or parameters are not determined, or the initial values give no image.
     """
     parameters, places = initial.copy(), problem.places_at(initial, free)
     dof = degrees_of_freedom(problem, free).usable

@@ -140,16 +140,9 @@ ROWS = 9
 
 
 def table_nodes(centre_um: float) -> list[Floats]:
-    """Return the nodes of the program's table: nine rows of falling x, with nine or five falling y.
+    """Return the nodes of the program's table: nine rows of falling x, each (9, 2) or (5, 2) with falling y.
 
-    Parameters
-    ----------
-    centre_um
-        Middle of the range of the comparator in x and in y (TRANS); the nodes reach 0.1 m to either side.
-
-    Returns
-    -------
-    A list of rows, each (9, 2) or (5, 2), in micrometres.
+    The middle of the range of the comparator (TRANS) is theirs; they reach 0.1 m to either side.
     """
     steps = STEP_UM * np.arange(ROWS // 2, -(ROWS // 2) - 1, -1)
     rows = []

@@ -56,10 +56,7 @@ class Quantities:
 def common_range(records: Sequence[RecordedCalibration]) -> Frame:
     """Return the range of readings that all calibrations measured.
 
-    Raises
-    ------
-    InputError
-        There is none.
+    Raises InputError: there is none.
     """
     identities = [each.correction.identity for each in records]
     low = np.max([each.low_um for each in identities if each], axis=0)
@@ -75,16 +72,10 @@ def quantities_of(
     covariance: Floats,
     frame: Frame,
 ) -> Quantities:
-    """Return what is compared of one comparator.
+    """Return what is compared of one comparator, over the range that its calibrations have in common.
 
-    Parameters
-    ----------
-    records
-        Its calibrations.
-    corrections, covariance
-        Their corrections as adjusted together, and (k, 21, k, 21) of the parameters.
-    frame
-        The range that they have in common.
+    The corrections are those that were adjusted together, with the covariance (k, 21, k, 21) of their
+    parameters.
     """
     bent = all(np.diag(each.covariance)[3:].any() for each in corrections)
     taken, names, units = _figures(frame, bent)

@@ -68,10 +68,7 @@ class CameraFigures:
 def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
     """Return the figures of cameras of one unit within an angle (rad) from the axis.
 
-    Raises
-    ------
-    InputError
-        Cameras of several units; one that has no image within the angle.
+    Raises InputError: cameras of several units; one that has no image within the angle.
     """
     units = {each.unit for each in cameras}
     if len(units) > 1:

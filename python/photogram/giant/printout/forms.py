@@ -54,19 +54,10 @@ def paginate(
     again: Sequence[str] | None = None,
     closing: Sequence[str] = (),
 ) -> list[Page]:
-    """Fill pages with entries, which are never split.
+    """Fill pages with entries of one line or more, which are never split.
 
-    Parameters
-    ----------
-    heading
-        Lines at the top of the first page.
-    entries
-        Entries of one line or more.
-    again
-        Lines at the top of the other pages; the heading when None. A heading that has more lines than this
-        leaves less room for entries.
-    closing
-        What stands below the last entry, on the same page if there is room for all of it.
+    `again` (the heading when None) stands at the top of the other pages; a heading that has more lines leaves
+    less room for entries. `closing` stands below the last entry, on its page if there is room for all of it.
     """
     again = heading if again is None else again
     length = len(again) + LINES

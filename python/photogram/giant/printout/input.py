@@ -41,22 +41,10 @@ def options_page(
     *,
     as_published: bool = False,
 ) -> Page:
-    """Return the page of the options.
+    """Return the page of the options; the unit variance as COMMON says where none is given.
 
-    The sample shows one choice of most options only; `docs/giant-listing.md` says which lines are ours.
-
-    Parameters
-    ----------
-    common
-        What is asked for.
-    space
-        The object space and its linear unit.
-    refraction
-        What is applied, which may be more than COMMON asks for.
-    unit_variance
-        What the unit variance is based on; as COMMON says when None.
-    as_published
-        Without the linear unit of a rectangular job.
+    The sample shows one choice of most options only; `docs/giant-listing.md` says which lines are ours. As
+    published there is no linear unit of a rectangular job. `refraction` may be more than COMMON asks for.
     """
     air = refraction is not None and refraction.air is not None
     water = refraction is not None and refraction.water is not None
@@ -105,14 +93,7 @@ def control_pages(
 ) -> list[Page]:
     """Return the pages of the control: ten points each, whether they are photographed or not.
 
-    Parameters
-    ----------
-    space
-        How positions are written.
-    ground
-        The points; components that are not held are listed as they stand.
-    default_sd
-        What stands for a standard deviation of zero.
+    Components that are not held are listed as they stand; `default_sd` stands for deviations of zero.
     """
     return paginate(headed("GROUND CONTROL DATA"), (_entry(space, point, default_sd) for point in ground))
 
@@ -140,15 +121,7 @@ ACROSS = 4
 
 @dataclass(frozen=True)
 class Station:
-    """A camera station as it was given, with the standard deviations in force.
-
-    Attributes
-    ----------
-    position, attitude, position_sd, attitude_sd
-        Three values each, in the units of the block.
-    principal_distance
-        Millimetres, signed.
-    """
+    """A camera station as it was given, in the units of the block, with the standard deviations in force."""
 
     position: Values
     attitude: Values
@@ -166,17 +139,7 @@ def frame_pages(
     parameters: bool = True,
     plates: bool = True,
 ) -> list[Page]:
-    """Return the pages of a frame.
-
-    Parameters
-    ----------
-    space, photo_to_ground
-        How positions and angles are written.
-    station, images
-        What is listed.
-    parameters, plates
-        Whether the station (COMMON column 3) and the plate coordinates (column 4) are.
-    """
+    """Return the pages of a frame: station (COMMON column 3), plate coordinates (column 4), if asked for."""
     x_sd, y_sd = (sd or IMAGE_SD for sd in images.sd)
     frame = ["", f"FRAME  {images.name}", ""]
     heading = [

@@ -26,20 +26,9 @@ def iteration_pages(
     *,
     as_published: bool = False,
 ) -> list[Page]:
-    """Return the pages of the iterations.
+    """Return the pages of k iterations with their corrections (k, P, 6) of position and attitude (radians).
 
-    Parameters
-    ----------
-    space
-        The units of the positions.
-    names
-        The P stations.
-    iterations, corrections
-        k iterations, and (k, P, 6) their corrections of position and attitude (radians).
-    notice
-        What is said below the last one, if anything.
-    as_published
-        Without the line of the units.
+    The notice stands below the last one; as published there is no line of the units.
     """
     if not iterations:
         return [[*headed(TITLE), notice]]
@@ -76,17 +65,7 @@ ACROSS = 10
 
 @dataclass(frozen=True)
 class PointResiduals:
-    """The residuals of a point.
-
-    Attributes
-    ----------
-    name
-        The point.
-    frames
-        The k frames on which it was measured.
-    residuals
-        (k, 2) observed minus computed, in millimetres.
-    """
+    """The residuals (k, 2) of a point, observed minus computed in mm, on its k frames."""
 
     name: str
     frames: Sequence[str]
@@ -100,18 +79,9 @@ class PointResiduals:
 def residual_pages(
     points: Iterable[PointResiduals], limit: float, closing: Sequence[str], *, as_published: bool = False
 ) -> list[Page]:
-    """Return the pages of the residuals.
+    """Return the pages of the residuals in processing order, with `closing` (:func:`statistics`) below.
 
-    Parameters
-    ----------
-    points
-        Residuals in processing order.
-    limit
-        COMMON columns 41-50.
-    closing
-        What stands below: :func:`statistics`.
-    as_published
-        Without the line that says what the residuals are.
+    The limit is that of COMMON columns 41-50; as published there is no line that says what the residuals are.
     """
     meaning = "OBSERVED MINUS COMPUTED, MICROMETERS; X ABOVE Y".center(132).rstrip()
     heading = headed("TRIANGULATED POINTS RESIDUALS", *([] if as_published else [meaning]))

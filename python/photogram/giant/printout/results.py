@@ -36,18 +36,7 @@ def station_pages(
     attitudes: Floats,
     covariances: Floats | None,
 ) -> list[Page]:
-    """Return the pages of the stations, thirteen each.
-
-    Parameters
-    ----------
-    space, photo_to_ground
-        How positions and angles are written.
-    names, positions, attitudes
-        The P stations, (P, 3) and (P, 3) their values.
-    covariances
-        (P, 6, 6), of which the blocks of the position and of the attitude are shown; None without error
-        propagation.
-    """
+    """Return the pages of P stations, thirteen each; with their (P, 6, 6) covariances if there are any."""
     matrix = "" if covariances is None else f"{'COVARIANCE MATRIX':^{MATRIX}}"
     heading = headed(
         "TRIANGULATED CAMERA STATIONS",
@@ -89,14 +78,9 @@ IDENT = 18
 
 
 def point_pages(space: Space, names: Sequence[str], marks: Sequence[str], positions: Floats) -> list[Page]:
-    """Return the pages without error propagation: a line for each point, 52 on a page.
+    """Return the pages of n points without error propagation: a line for each, 52 on a page.
 
-    Parameters
-    ----------
-    space
-        How positions are written.
-    names, marks, positions
-        The n points, their marks (`*code*` for control, else nothing), and (n, 3) positions.
+    Marks are `*code*` for control, else nothing.
     """
     heading = headed(TITLE, f"{'IDENT':<{IDENT}}{'POSITION':^72}".rstrip())
     return paginate(
@@ -116,16 +100,9 @@ def propagated_point_pages(
     covariances: Floats,
     held: NDArray[np.bool_],
 ) -> list[Page]:
-    """Return the pages with error propagation: three lines for each point, 13 on a page, and a summary.
+    """Return the pages with covariances (n, 3, 3): three lines for each point, 13 on a page, and a summary.
 
-    Parameters
-    ----------
-    space, names, marks, positions
-        As in :func:`point_pages`.
-    covariances
-        (n, 3, 3).
-    held
-        (n, 3): components that are held do not count in the summary.
+    Components that are held (n, 3) do not count in the summary.
     """
     heading = headed(
         TITLE,
@@ -183,17 +160,10 @@ ACROSS = 4
 def correction_pages(
     space: Space, names: Sequence[str], corrections: Floats, held: NDArray[np.bool_], *, as_published: bool
 ) -> list[Page]:
-    """Return the pages of the corrections.
+    """Return the pages of the corrections (n, 3), NaN where there is none, with which components are held.
 
-    Parameters
-    ----------
-    space
-        How positions are written.
-    names, corrections, held
-        n points, their (n, 3) corrections (NaN where there is none), and (n, 3) which components are held.
-    as_published
-        Without the line that says what is listed, and without number and rms of the components that are not
-        held.
+    As published there is neither a line that says what is listed, nor number and rms of the components that
+    are not held.
     """
     meaning = "ADJUSTED MINUS INPUT; IN PARENTHESES: COMPONENT NOT HELD, ADJUSTED MINUS SUPPLIED VALUE"
     heading = headed("CORRECTIONS APPLIED TO GROUND CONTROL", *([] if as_published else [meaning]))
