@@ -29,10 +29,16 @@ from photogram.comparator.correction import Correction, Identity
 from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_affine, fit_rigid
 from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
 from photogram.comparator.options import Options
-from photogram.comparator.outliers import FarPointing, Screening, far_pointings, screen
+from photogram.comparator.outliers import (
+    FarPointing,
+    Screening,
+    far_pointings,
+    plate_remarks,
+    problems,
+    screen,
+)
 from photogram.comparator.pointing import Precision, pool_points
 from photogram.comparator.readings import Session
-from photogram.comparator.remarks import plate_remarks, problems
 from photogram.comparator.variance import (
     CaseVarianceTest,
     PolynomialTest,

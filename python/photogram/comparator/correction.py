@@ -115,10 +115,6 @@ MM = 1000.0
 STEPS = 20
 
 
-def _no_covariance() -> Floats:
-    return np.zeros((PARAMETERS, PARAMETERS))
-
-
 @dataclass(frozen=True, eq=False)
 class Correction:
     """Corrects readings of a comparator: first linearly, then by the polynomials.
@@ -143,7 +139,7 @@ class Correction:
     scale_y: float
     nonorthogonality_rad: float
     polynomial: Polynomial | None = None
-    covariance: Floats = field(default_factory=_no_covariance, repr=False)
+    covariance: Floats = field(default_factory=lambda: np.zeros((PARAMETERS, PARAMETERS)), repr=False)
     identity: Identity | None = None
 
     def __post_init__(self) -> None:

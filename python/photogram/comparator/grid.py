@@ -187,12 +187,9 @@ def find_grid(name: str) -> Grid:
     """
     file = path("name", name)
     if is_whole_number(name) and not file.exists():
-        return built_in_grid(_plate_number(name))
+        try:
+            number = whole_number(name)
+        except ValueError as error:
+            raise InputError(f"grid {error}") from None
+        return built_in_grid(number)
     return read_grid(file)
-
-
-def _plate_number(name: str) -> int:
-    try:
-        return whole_number(name)
-    except ValueError as error:
-        raise InputError(f"grid {error}") from None

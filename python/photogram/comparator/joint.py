@@ -176,7 +176,7 @@ def adjust_jointly(
     """
     arrays, points_of = _arrays(cases, grids, linear, polynomial)
     random = weights.random_um if weights.random_um is not None else max(linear.sigma0_um, LEAST_UM)
-    grid = {plate: _initial_grid(sigma, random) for plate, sigma in weights.grid_um.items()}
+    grid = {plate: random / 2 if sigma is None else sigma for plate, sigma in weights.grid_um.items()}
     for _ in range(ROUNDS):
         variance, solution = _solve(arrays, grid, weights.pointing_um, random)
         known = (random, dict(grid))
@@ -190,10 +190,6 @@ def adjust_jointly(
         if max(changes) <= SETTLED * max(known[0], LEAST_UM):
             break
     return _result(cases, arrays, points_of, solution, variance, known[0], known[1], weights)
-
-
-def _initial_grid(sigma_um: float | None, random_um: float) -> float:
-    return random_um / 2 if sigma_um is None else sigma_um
 
 
 def _arrays(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.arrays import shaped
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration, calibrate
 from photogram.comparator.case import exchanged
 from photogram.comparator.correction import Correction
@@ -103,7 +103,9 @@ def simulate_calibration(
     drawn = grid_um * random.standard_normal((len(grid.points), 2))
     errors = drawn if grid_errors_um is None else shaped("grid_errors_um", grid_errors_um, drawn.shape)
     plate = replace(grid, xy_um=grid.xy_um + errors)
-    points = _default_sequence(grid.points) if sequence is None else np.array(sequence, dtype=np.int64)
+    points = np.concatenate([np.repeat(grid.points, 5), np.repeat(grid.points[:1], 3)])
+    if sequence is not None:
+        points = np.array(sequence, dtype=np.int64)
     rows = grid.rows_of(points)
     measured = []
     for k in range(cases):
@@ -120,11 +122,6 @@ def simulate_calibration(
         tuple(measured), {grid.number: grid}, comparator=comparator, date=date, left_handed=left_handed
     )
     return Simulation(session, correction, errors)
-
-
-def _default_sequence(points: Indices) -> Indices:
-    """Return every point five times, and the first three times again."""
-    return np.concatenate([np.repeat(points, 5), np.repeat(points[:1], 3)])
 
 
 def _readings(

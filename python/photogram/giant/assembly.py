@@ -156,7 +156,7 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
         photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
         point_sd=sd,
         point_check_sd=check_sd,
-        spheroid=_spheroid(common),
+        spheroid=Spheroid(common.semi_major, common.semi_minor) if common.geographic else None,
         photo_to_ground=common.photo_to_ground,
         title=common.title,
         linear_unit=_linear_unit(common),
@@ -323,7 +323,3 @@ def _longitudes(positions: Floats, geographic: bool) -> Floats:
 def _linear_unit(common: Common) -> str:
     """Tell feet from metres by the axes of the spheroid, which fix the linear unit of the job."""
     return "ft" if common.geographic and common.semi_major > LONGEST_METRES else "m"
-
-
-def _spheroid(common: Common) -> Spheroid | None:
-    return Spheroid(common.semi_major, common.semi_minor) if common.geographic else None

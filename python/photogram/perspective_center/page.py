@@ -24,7 +24,7 @@ def run_page(run: Run) -> Page:
         Section("residuals", "Residuals and distortion", [_drawing(run)] if run.results else []),
         _layers("parameters", "Perspective centre and attitude", run, _parameters, _PARAMETERS),
         _layers("points", "Points", run, _points, _POINTS),
-        _layers("iterations", "Iterations", run, _iterations, ""),
+        _layers("iterations", "Iterations", run, lambda each: page_table(_name(each), cycles(each)), ""),
         remarks_section(run.messages),
     ]
     judgements = [judged(each.verdict, _name(each)) for each in run.results]
@@ -83,7 +83,3 @@ def _parameters(result: PerspectiveCenter) -> Table:
 def _points(result: PerspectiveCenter) -> Table:
     note = f"Beyond {result.limit:.2f} the test rejects." if math.isfinite(result.limit) else ""
     return page_table(_name(result), points(result), note)
-
-
-def _iterations(result: PerspectiveCenter) -> Table:
-    return page_table(_name(result), cycles(result))

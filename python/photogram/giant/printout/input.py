@@ -150,7 +150,7 @@ def frame_pages(
     ]
     if parameters:
         heading += _parameters(space, photo_to_ground, station)
-    columns = _columns() if plates else []
+    columns = headed("PLATE COORDINATES", f"{'ID':<8}{'X':>10}{'Y':>11}    " * ACROSS)[1:] if plates else []
     return paginate([*heading, *columns], _plates(images) if plates else [], again=[*frame, *columns])
 
 
@@ -171,10 +171,6 @@ def _parameters(space: Space, photo_to_ground: bool, station: Station) -> Page:
     for name, value, sd, angle, turn, turn_sd in rows:
         lines.append(f"{name} = {value}   ST. D. = {sd}     {angle:<5} = {turn}   ST. D. = {turn_sd}")
     return [*lines, ""]
-
-
-def _columns() -> Page:
-    return headed("PLATE COORDINATES", f"{'ID':<8}{'X':>10}{'Y':>11}    " * ACROSS)[1:]
 
 
 def _plates(images: ImageFrame) -> list[Sequence[str]]:
