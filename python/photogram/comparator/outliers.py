@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.comparator.case import PlacedCase, exchanged
 from photogram.comparator.combined_solution import (
     CombinedLinear,
@@ -32,11 +32,6 @@ from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.statistics.limits import externally_studentized, studentized_limit
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Bools = NDArray[np.bool_]
 
 __all__ = ["FarPointing", "Outlier", "Screening", "far_pointings", "plate_remarks", "problems", "screen"]
 

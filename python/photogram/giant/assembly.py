@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.giant.common import Common
+from photogram.giant.contents import Contents
 from photogram.giant.frames import ATTITUDE_SD, Frame
+from photogram.giant.ground import GroundPoint
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
 from photogram.giant.records import error_at, message_at
@@ -21,11 +24,6 @@ from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
 from photogram.network.structuring import structure
 from photogram.network.ties import FEWEST_TIES, ties
-
-if TYPE_CHECKING:
-    from photogram.giant.common import Common
-    from photogram.giant.contents import Contents
-    from photogram.giant.ground import GroundPoint
 
 __all__ = ["assemble", "job_refraction"]
 
@@ -239,10 +237,10 @@ def _principal_distances(project: Contents, images: list[ImageFrame]) -> Floats:
 
 def _first_images(
     images: list[ImageFrame],
-    image_photos: NDArray[np.int64],
-    image_points: NDArray[np.int64],
+    image_photos: Indices,
+    image_points: Indices,
     messages: list[Message],
-) -> NDArray[np.int64]:
+) -> Indices:
     """Return the rows of the first image of every point on every photo, in their order."""
     pairs = image_photos * (image_points.max() + 1) + image_points
     order = np.argsort(pairs, kind="stable")

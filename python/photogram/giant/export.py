@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
+from photogram.giant.contents import Contents
 from photogram.giant.fields import printed_order
 from photogram.giant.files import written
 from photogram.giant.frames import Frame, frame_records
@@ -22,9 +22,6 @@ from photogram.giant.images import ImageFrame
 from photogram.messages import Message
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
-
-if TYPE_CHECKING:
-    from photogram.giant.contents import Contents
 
 __all__ = ["adjusted_frames", "adjusted_ground", "adjusted_records", "block_files"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.giant.columns import Columns, deviation_fields, real_fields, texts
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
@@ -46,7 +46,7 @@ class ImageFrame:
 
     name: str
     points: list[str]
-    xy: NDArray[np.float64]
+    xy: Floats
     principal_distance: float = 0.0
     sd: tuple[float, float] = (0.0, 0.0)
     camera: str = ""
@@ -108,7 +108,7 @@ def parse_images(source: Source) -> list[ImageFrame]:
     return frames
 
 
-def _coordinates(source: Source, numbers: list[int]) -> NDArray[np.float64]:
+def _coordinates(source: Source, numbers: list[int]) -> Floats:
     """Read columns 11-30 of all point records."""
     columns = Columns([source.lines[number - 1] for number in numbers], 11, 30)
     xy = np.column_stack([columns.real(11, 20), columns.real(21, 30)])

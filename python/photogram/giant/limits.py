@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools, Indices
 from photogram.errors import InputError
 from photogram.giant.records import error_at, message_at
 from photogram.lazy_dataclasses import dataclass, fields
@@ -120,9 +120,7 @@ def _check(what: str, items: Sequence[Frame] | Sequence[GroundPoint], count: int
     raise error_at(record, text)
 
 
-def allowed_images(
-    image_points: NDArray[np.int64], names: list[str], limits: Limits, messages: list[Message]
-) -> NDArray[np.bool_]:
+def allowed_images(image_points: Indices, names: list[str], limits: Limits, messages: list[Message]) -> Bools:
     """Return which images the limit of photographs of a point (N4) leaves: the first ones given.
 
     `image_points` (m,) are indices of points, photo by photo; `messages` gets the warning of the guide.

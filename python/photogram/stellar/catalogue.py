@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.lazy_dataclasses import dataclass
@@ -138,7 +137,7 @@ class Catalogue:
         order = order[self.magnitudes[order] <= magnitude]
         return self.take(order)
 
-    def take(self, chosen: NDArray[np.int64]) -> Catalogue:
+    def take(self, chosen: Indices) -> Catalogue:
         """Return some of the stars, by index."""
         return Catalogue(
             ids=tuple(map(self.ids.__getitem__, chosen.tolist())),

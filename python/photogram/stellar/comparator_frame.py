@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.result import Result
@@ -34,7 +34,7 @@ class ComparatorFrame:
     scale_x: float
     scale_y: float
     epsilon: float
-    covariance: NDArray[np.float64]
+    covariance: Floats
 
     @property
     def mean_errors(self) -> tuple[float, float, float]:

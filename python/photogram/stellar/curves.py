@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.result import Result
@@ -146,7 +145,7 @@ class Histogram:
     """
 
     edges: Floats
-    counts: NDArray[np.int64]
+    counts: Indices
     expected: Floats
     mean: float
     sd: float

@@ -20,19 +20,8 @@ from photogram.stellar.sky import Air, Site
 __all__ = ["read_deck"]
 
 
-@dataclass(frozen=True)
-class Card:
+class Card(Record):
     """A card: fields are taken by their first and last column, counted from 1."""
-
-    record: Record
-
-    def error(self, message: str) -> InputError:
-        """Return an error that names this card."""
-        return self.record.error(message)
-
-    def columns(self, first: int, last: int) -> str:
-        """Return columns as they are; short cards have fewer."""
-        return self.record.columns(first, last)
 
     def name(self, first: int, last: int) -> str:
         """Return a field as text."""
@@ -59,18 +48,7 @@ class Card:
 
 
 class Cards:
-    """The cards of a file, taken one after the other.
-
-    Parameters
-    ----------
-    file
-        A card a line.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
-    """
+    """The cards of a file, a card a line, taken one after the other."""
 
     def __init__(self, file: Path) -> None:
         self._source, self._taken = Source.read(file), 0
@@ -84,7 +62,7 @@ class Cards:
             message = f"the deck ends where {what} is expected"
             raise InputError(message, file=self._source.path, record=self._taken + 1)
         self._taken += 1
-        return Card(self._source.record(self._taken))
+        return Card(self._source, self._taken)
 
     @property
     def at_end(self) -> bool:

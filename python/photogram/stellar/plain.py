@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.io.toml_tables import Document, Table, read_document
@@ -152,7 +151,7 @@ def _problem(document: Document) -> Problem:
     return rejected(problem, set(reject.words("stars", ())), set(reject.words("points", ())))
 
 
-def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, NDArray[np.bool_]]:
+def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, Bools]:
     """Read initial values: angles in grads, all else in the units of the parameters."""
     fixed = np.zeros(len(NAMES), bool)
     for name in table.words("fixed", ()):

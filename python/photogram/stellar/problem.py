@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Set
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
@@ -296,7 +295,7 @@ class Counts:
         return self.degrees_of_freedom or 1
 
 
-def degrees_of_freedom(problem: Problem, free: NDArray[np.bool_]) -> Counts:
+def degrees_of_freedom(problem: Problem, free: Bools) -> Counts:
     """Count observations and unknowns where the given parameters are estimated.
 
     Raises

@@ -7,9 +7,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
@@ -72,7 +71,7 @@ class FictitiousPoint:
     place: tuple[float, float]
     azimuth: float
     elevation: float
-    covariance: NDArray[np.float64]
+    covariance: Floats
 
 
 CORRELATED = 0.95
@@ -356,7 +355,7 @@ class Result(Judged, Paged, Brief):
             for star, first, end in zip(unknown, firsts, ends, strict=True)
         ]
 
-    def _direction(self, star: int, images: NDArray[np.int64], of_images: Floats) -> Direction:
+    def _direction(self, star: int, images: Indices, of_images: Floats) -> Direction:
         problem, solved = self.problem, self.solved
         place, unit = solved.places[star], self.mean_error
         residuals, weights = solved.residuals[images], problem.image_weights[images]

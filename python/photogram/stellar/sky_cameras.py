@@ -9,10 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 import orjson
-from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.files import read_bytes
@@ -182,7 +181,7 @@ class SkyCamera:
         return common
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Bools:
         """(k,) which parameters have a mean error."""
         return np.asarray(np.diag(self.covariance) > 0)
 

@@ -6,9 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import degrees_minutes_seconds
 
@@ -189,7 +188,7 @@ def matrix_rows(covariance: Floats | None) -> Sequence[str]:
     return ["".join(f" {exponential(value)}" for value in row) for row in covariance.tolist()]
 
 
-def counts_and_rms(values: Floats, counted: NDArray[np.bool_]) -> tuple[list[int], list[float]]:
+def counts_and_rms(values: Floats, counted: Bools) -> tuple[list[int], list[float]]:
     """Return how many values of each of three columns count, and the root of their mean square or NaN."""
     count = counted.sum(axis=0)
     squares = np.where(counted, values**2, 0.0).sum(axis=0)

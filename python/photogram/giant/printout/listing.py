@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools
+from photogram.giant.contents import Contents
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.fields import printed_order
+from photogram.giant.limits import Limits
 from photogram.giant.printout.forms import Page, Space, printout
 from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
 from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
@@ -19,12 +20,8 @@ from photogram.giant.printout.results import (
     propagated_point_pages,
     station_pages,
 )
+from photogram.network.block import Block
 from photogram.results.result import Result
-
-if TYPE_CHECKING:
-    from photogram.giant.contents import Contents
-    from photogram.giant.limits import Limits
-    from photogram.network.block import Block
 
 __all__ = ["listing"]
 
@@ -172,7 +169,7 @@ def _corrections(
     if not names:
         return []
     rows = [index[name] for name in names]
-    held: NDArray[np.bool_] = np.isfinite(block.point_sd[rows])
+    held: Bools = np.isfinite(block.point_sd[rows])
     corrections = result.point_differences[rows]
     if as_published:
         corrections = np.where(held, corrections, result.point_last_corrections[rows])

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.giant.printout.forms import (
     MATRIX,
     VALUE,
@@ -98,7 +97,7 @@ def propagated_point_pages(
     marks: Sequence[str],
     positions: Floats,
     covariances: Floats,
-    held: NDArray[np.bool_],
+    held: Bools,
 ) -> list[Page]:
     """Return the pages with covariances (n, 3, 3): three lines for each point, 13 on a page, and a summary.
 
@@ -142,7 +141,7 @@ def _labelled(space: Space, values: Iterable[str]) -> list[str]:
     return [f"{name} ={value}" for name, value in zip(space.names, values, strict=True)]
 
 
-def _summary(space: Space, deviations: Floats, counted: NDArray[np.bool_]) -> list[str]:
+def _summary(space: Space, deviations: Floats, counted: Bools) -> list[str]:
     counts, rms = counts_and_rms(deviations, counted)
     rows = zip(counts, _labelled(space, space.values(rms, 4)), strict=True)
     return [
@@ -158,7 +157,7 @@ ACROSS = 4
 
 
 def correction_pages(
-    space: Space, names: Sequence[str], corrections: Floats, held: NDArray[np.bool_], *, as_published: bool
+    space: Space, names: Sequence[str], corrections: Floats, held: Bools, *, as_published: bool
 ) -> list[Page]:
     """Return the pages of the corrections (n, 3), NaN where there is none, with which components are held.
 
@@ -188,7 +187,7 @@ def _cells(space: Space, name: str, values: Sequence[float], held: Sequence[bool
     ]
 
 
-def _of_components(space: Space, corrections: Floats, counted: NDArray[np.bool_]) -> list[str]:
+def _of_components(space: Space, corrections: Floats, counted: Bools) -> list[str]:
     counts, rms = counts_and_rms(corrections, counted)
     rows = zip(space.names, counts, space.values(rms, 3), strict=True)
     return [f"{axis}     NUMBER OF COMPONENTS ={count:>6d}     RMS ={value}" for axis, count, value in rows]
