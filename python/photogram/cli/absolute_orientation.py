@@ -367,7 +367,7 @@ def _small_files(
 
         made |= {path: drawn(figure(result), path) for path in pictures}
     if trace:
-        from photogram.absolute_orientation.trace import trace_text
+        from photogram.absolute_orientation.report import trace_text
 
         made[trace] = trace_text(result).encode()
     if json:

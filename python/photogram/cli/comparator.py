@@ -261,7 +261,7 @@ def _summarize(calibrations: list[Calibration]) -> None:
 
 
 def _summarize_one(calibration: Calibration) -> None:
-    from photogram.comparator.listing.summary import summary_page
+    from photogram.comparator.listing.parameters import summary_page
     from photogram.show.sections import problems_or_none
 
     session = calibration.session
@@ -366,7 +366,7 @@ def compare(
         from photogram.show.sections import verdict_sections
 
         if example:
-            from photogram.comparator.years.example import simulated_years
+            from photogram.comparator.simulation import simulated_years
 
             found = compared(simulated_years())
             folder = out or Path("comparator-compared")

@@ -119,7 +119,7 @@ def _files(run: Run, json: Path | None, listings: list[Path], pictures: list[Pat
     """Make everything that is asked for, before anything is written."""
     made = {}
     if json is not None:
-        from photogram.perspective_center.document import to_json
+        from photogram.perspective_center.report import to_json
 
         made[json] = to_json(run)
     if listings:
@@ -134,7 +134,7 @@ def _files(run: Run, json: Path | None, listings: list[Path], pictures: list[Pat
 
 
 def _summarize(run: Run) -> None:
-    from photogram.perspective_center.summary import summary
+    from photogram.perspective_center.report import summary
 
     for result in run.results:
         for line in summary(result):

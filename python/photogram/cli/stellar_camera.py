@@ -177,9 +177,8 @@ def exposures(
         from photogram.errors import InputError
         from photogram.show.methods import page_of
         from photogram.stellar.night_calibration import calibrate_night
-        from photogram.stellar.night_document import to_json
         from photogram.stellar.night_file import inputs, read_night
-        from photogram.stellar.night_report import summary
+        from photogram.stellar.night_report import summary, to_json
 
         if night is None:
             night = job.packaged("exposures") / "night.toml"

@@ -1,14 +1,85 @@
-"""Numbers of the printout: the edit descriptors of its FORMAT statements, as the sample shows them."""
+"""Forms of the printout: pages with carriage control, numbers as its FORMAT statements show them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import degrees_minutes_seconds
 
-__all__ = ["VALUE", "Space", "attitude", "attitude_name", "dms", "exponential", "fixed"]
+__all__ = [
+    "MATRIX",
+    "VALUE",
+    "Page",
+    "Space",
+    "attitude",
+    "attitude_name",
+    "counts_and_rms",
+    "dms",
+    "exponential",
+    "fixed",
+    "headed",
+    "matrix_rows",
+    "paginate",
+    "printout",
+]
+
+
+Page = list[str]
+"""The lines of a page below its banner."""
+
+WIDTH = 132
+"""Columns of a line printer, carriage control not counted."""
+LINES = 52
+"""Lines of entries on a page: 13 stations, 52 points of one line or 13 of four, 10 control points of five."""
+
+BANNER = "NOAA/NOS GIANT SYSTEM .... (4/85) : "
+
+
+def headed(title: str, *lines: str) -> Page:
+    """Return the heading of a page: a letter-spaced title in the middle, and further lines below it."""
+    spaced = "   ".join(" ".join(word) for word in title.split())
+    return ["", spaced.center(WIDTH).rstrip(), "", *lines, ""]
+
+
+def paginate(
+    heading: Sequence[str],
+    entries: Iterable[Sequence[str]],
+    *,
+    again: Sequence[str] | None = None,
+    closing: Sequence[str] = (),
+) -> list[Page]:
+    """Fill pages with entries of one line or more, which are never split.
+
+    `again` (the heading when None) stands at the top of the other pages; a heading that has more lines leaves
+    less room for entries. `closing` stands below the last entry, on its page if there is room for all of it.
+    """
+    again = heading if again is None else again
+    length = len(again) + LINES
+    pages, empty = [list(heading)], True
+    for entry in [*entries, closing]:
+        if not empty and len(pages[-1]) + len(entry) > length:
+            pages.append(list(again))
+        pages[-1] += entry
+        empty = False
+    return pages
+
+
+def printout(title: str, pages: Iterable[Page]) -> str:
+    """Return pages as text, numbered from 0, with title and FORTRAN carriage control.
+
+    The first character of a line is the carriage control: `1` begins a page, a blank (or nothing) a line.
+    """
+    lines: list[str] = []
+    for number, page in enumerate(pages):
+        lines.append(f"1{BANNER}{title:<80}  PAGE{number:>5}")
+        lines += [f" {line}".rstrip() for line in page]
+    return "".join(f"{line}\n" for line in lines)
+
 
 VALUE = 15
 """Columns of a value: sign, degrees, minutes and seconds (A1, I3, I3, F8.4), or a length as wide as that."""
@@ -104,3 +175,22 @@ class Space:
             else [fixed(first, VALUE, decimals), fixed(second, VALUE, decimals)]
         )
         return [*planimetry, fixed(third, VALUE, decimals)]
+
+
+MATRIX = 33
+"""Columns of a row of a matrix: three numbers (1X, E10.3)."""
+
+
+def matrix_rows(covariance: Floats | None) -> Sequence[str]:
+    """Write the three rows of a (3, 3) matrix; without one, three times nothing."""
+    if covariance is None:
+        return ["", "", ""]
+    return ["".join(f" {exponential(value)}" for value in row) for row in covariance.tolist()]
+
+
+def counts_and_rms(values: Floats, counted: Bools) -> tuple[list[int], list[float]]:
+    """Return how many values of each of three columns count, and the root of their mean square or NaN."""
+    count = counted.sum(axis=0)
+    squares = np.where(counted, values**2, 0.0).sum(axis=0)
+    rms = np.sqrt(np.divide(squares, count, out=np.full(3, np.nan), where=count > 0))
+    return count.tolist(), rms.tolist()
