@@ -345,11 +345,11 @@ def conventions(view: View) -> tuple[Section, View, bool]:
         if not whole:
             break
         best = whole[0]
-        section.findings.append(Finding("convention", "grave", best.text))
+        section.add("convention", "grave", best.text)
         view, exact = view.changed(best.change), exact and best.exact
     bars = distances_in_millimetres(view.seen)
     if bars is not None:
-        section.findings.append(Finding("convention", "grave", bars.text))
+        section.add("convention", "grave", bars.text)
         view = view.changed(bars.change)
     if section.findings:
         section.parts.append("the sections below hold with this put right")

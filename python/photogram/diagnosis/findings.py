@@ -249,6 +249,18 @@ class Section:
         """Figures and tables as text."""
         return [line for part in self.parts for line in ([part] if isinstance(part, str) else part.lines())]
 
+    def add(
+        self,
+        kind: str,
+        level: Level,
+        text: str,
+        photos: Sequence[str] = (),
+        points: Sequence[str] = (),
+        values: dict[str, float] | None = None,
+    ) -> None:
+        """Add a finding; see :class:`Finding`."""
+        self.findings.append(Finding(kind, level, text, list(photos), list(points), values or {}))
+
     def figure(self, name: str, value: object) -> None:
         """Add a figure with its unit."""
         self.parts.append(Figure(name, str(value)))

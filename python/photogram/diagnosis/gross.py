@@ -89,7 +89,7 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
             " their rays; look at its station (position, angles), the preprocessing of its plate, and whether"
             " the points under its name are its own"
         )
-        section.findings.append(Finding("bad-photo", "grave", text, [name], [], {"points": float(count)}))
+        section.add("bad-photo", "grave", text, [name], [], {"points": float(count)})
         rays = rays.without(block.image_photos == photo)
         findings, images = _broken(rays)
     section.findings += findings
@@ -175,7 +175,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
             " of its plate, and whether the points under its name are its own"
         )
         values = {f"median_residual_{rays.unit}": size, "times_usual": size / usual}
-        section.findings.append(Finding("bad-photo", "grave", text, [name], [], values))
+        section.add("bad-photo", "grave", text, [name], [], values)
     return rays, bad
 
 
@@ -448,4 +448,4 @@ def _control_component(
             )
             level: Level = "grave" if size > CONTROL_GRAVE else "look"
             values = {f"difference_{name}": difference}
-            section.findings.append(Finding("control-difference", level, text, [], [point], values))
+            section.add("control-difference", level, text, [], [point], values)

@@ -60,7 +60,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     try:
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
-        section.findings.append(Finding("no-adjustment", "grave", f"it cannot be adjusted: {error}"))
+        section.add("no-adjustment", "grave", f"it cannot be adjusted: {error}")
         mistakes = flown_hints(block) or shutter_hints(block, None, adjusted)
         section.findings += [Finding("convention", "grave", str(each)) for each in mistakes]
         return [structure, section], None
