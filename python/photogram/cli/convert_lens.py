@@ -30,7 +30,10 @@ class Fit:
     radius: Annotated[
         float,
         typer.Option(
-            min=1.0, metavar="PX", help="Pixels farther from the middle do not count. Default: all count.", show_default=False
+            min=1.0,
+            metavar="PX",
+            help="Pixels farther from the middle do not count. Default: all count.",
+            show_default=False,
         ),
     ] = math.inf
     distances: Annotated[

@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Level, Section
+from photogram.diagnosis.findings import Level, Section, note
 from photogram.diagnosis.robust import MAD_TO_SD, fit
 from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
@@ -145,7 +145,7 @@ def _compare(block: Block, strips: list[Indices], paths: list[_Path], which: str
             )
             level: Level = "grave" if size > GRAVE else "look"
             values = {"departure": departure, "times_usual": float(size)}
-            section.add("outlying-station", level, text, [photo], [], values)
+            note(section, "outlying-station", level, text, [photo], [], values)
 
 
 def _moved(result: Result, misleading: Collection[str], section: Section) -> None:
@@ -182,7 +182,7 @@ def _moved(result: Result, misleading: Collection[str], section: Section) -> Non
                 else "are its initial values right?"
             )
             values = {"change": float(changes[photo, k] * factor), "times_usual": float(sizes[photo, k])}
-            section.add("moved-station", "grave" if wrong else "look", text, [name], [], values)
+            note(section, "moved-station", "grave" if wrong else "look", text, [name], [], values)
 
 
 def _base(block: Block) -> float:
@@ -235,7 +235,7 @@ def two_ray_heights(result: Result) -> Section:
             f" {' and '.join(photos)}, unless the ground is like that"
         )
         values = {"departure": float(departures[row]), "usual": float(scale[row])}
-        section.add("two-ray-height", "look", text, photos, [name], values)
+        note(section, "two-ray-height", "look", text, photos, [name], values)
     return section
 
 
