@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from photogram import simulate
 from photogram.giant import Project, read_project, write_project
-from photogram.giant.contents import NAMES
+from photogram.giant.files import NAMES
 from photogram.network.geometry import Spheroid
 
 T = TypeVar("T")
