@@ -8,9 +8,9 @@ from pathlib import Path
 from photogram.formats.project import Project
 from photogram.io.delimited import ColumnTable
 from photogram.io.files import read_lines
+from photogram.io.json import read_json
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
-from photogram.io.tree import read_json
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.naming import natural_order
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.crs import axes_of, has_place, is_on, to_system
@@ -19,8 +20,9 @@ from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid, lengths_of_units
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
+from photogram.show.page import Column, Row, Section, Table, decimals_of
 
-__all__ = ["Placed", "check_place", "placed", "placed_files"]
+__all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
@@ -263,3 +265,36 @@ def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
 
 def _turned(turns: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.einsum("nij,nj->ni", turns, vectors))
+
+
+MOST = 500
+"""Points that are listed; the tables have all."""
+
+
+def placed_section(found: Placed) -> Section:
+    """Return adjusted control and check points in the system of a client, with standard deviations.
+
+    Standard deviations are along east, north and up of the system, in metres.
+    """
+    names, kinds = found.result.block.point_ids, found.result.point_kinds
+    own = [k for k, row in enumerate(found.rows.tolist()) if kinds[row] != "pass"]
+    own.sort(key=lambda k: natural_order(names[int(found.rows[k])]))
+    sd = np.sqrt(np.diagonal(found.point_covariances, axis1=1, axis2=2))
+    decimals = decimals_of(sd)
+    columns = [
+        Column("Point", text=True),
+        Column("Kind", text=True),
+        *(
+            Column(name.capitalize(), unit, 8 if unit == "deg" else decimals)
+            for name, unit in zip(found.names, found.units, strict=True)
+        ),
+        *(Column(f"sd {axis}", "m", decimals) for axis in ("east", "north", "up")),
+    ]
+    rows: list[Row] = []
+    for k in own[:MOST]:
+        row = int(found.rows[k])
+        rows.append([names[row], str(kinds[row]), *found.points[k].tolist(), *sd[k].tolist()])
+    left = len(own) - len(rows)
+    note = "Tables of all photos and points are in `in_crs`" + (f"; {left} more there." if left else ".")
+    title = f"Control and check points in {found.crs}"
+    return Section("in-crs", title, [Table(title, columns, rows, note)] if rows else [])

@@ -8,10 +8,20 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
 
-__all__ = ["from_corner", "in_corner", "known_size", "sizes_of", "to_corner"]
+__all__ = [
+    "from_corner",
+    "from_tables",
+    "in_corner",
+    "in_unit",
+    "known_size",
+    "sizes_of",
+    "to_corner",
+    "to_tables",
+]
 
 
 def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
@@ -86,3 +96,42 @@ def sizes_of(project: Project) -> Sequence[Size]:
         One that is not known.
     """
     return [known_size(each, size) for each, size in zip(project.block.cameras, project.sizes, strict=True)]
+
+
+def in_unit(settings: Settings, xy: Floats, *, pixels: bool) -> Floats:
+    """Return (m, 2) image coordinates in the unit of cameras; pixels count from the corner of the first.
+
+    `pixels` says that they are pixels: columns and rows, or samples and lines of scanners.
+    """
+    found = xy * 1e-3 if settings.image == "um" and not pixels else xy
+    return found + 0.5 if pixels and settings.pixel_origin == "center" else found
+
+
+def from_tables(settings: Settings, camera: Camera, size: Size | None, xy: Floats) -> Floats:
+    """Return (m, 2) image coordinates along the axes of a camera, from those that tables have in its unit.
+
+    Raises
+    ------
+    InputError
+        A camera whose pictures have no known size, and must have.
+    """
+    if settings.image == "px" and settings.image_y == "down":
+        return from_corner(camera, size, xy)
+    if settings.image == "px" and camera.image_y == "down":
+        width, height = known_size(camera, size)
+        return np.column_stack([width / 2 + xy[:, 0], height / 2 - xy[:, 1]])
+    return xy if camera.image_y == settings.image_y else xy * [1.0, -1.0]
+
+
+def to_tables(image_y: str, camera: Camera, size: Size | None, xy: Floats) -> Floats:
+    """Return (m, 2) image coordinates as tables have them whose `[axes] image_y` this is.
+
+    Raises
+    ------
+    InputError
+        A camera in pixels that counts from the corner among such as count from the middle, or whose pictures
+        have no known size.
+    """
+    if camera.unit == "px" and image_y == "down":
+        return in_corner(camera, size, xy)
+    return xy if camera.image_y == image_y else xy * [1.0, -1.0]

@@ -12,13 +12,15 @@ from photogram.formats.cards import END, Card, angle_unit, cards, names_beside, 
 from photogram.formats.format import Format, Wishes
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
-from photogram.formats.reduced_coordinates import Reduced, project_of, with_fitting_rotations
-from photogram.formats.reduced_coordinates_writing import (
+from photogram.formats.reduced_coordinates import (
+    Reduced,
     ReducedImages,
     by_photo,
     given_control,
     lost_of_reduced,
+    project_of,
     reduced_images,
+    with_fitting_rotations,
 )
 from photogram.formats.rotations import is_rotation
 from photogram.io.csv_text import csv_text

@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 
 from photogram.errors import InputError, PhotogramError
 from photogram.formats.block_contents import check_films
-from photogram.formats.cameras_alone import FORMATS_OF_CAMERAS
-from photogram.formats.format import Format, Wishes
-from photogram.formats.millimetres import in_pixels, nominal_pixels
+from photogram.formats.format import Format, Wishes, later
+from photogram.formats.format_coordinates import (
+    in_pixels,
+    in_topocentric,
+    nominal_pixels,
+    topocentric_remarks,
+)
 from photogram.formats.motion_summary import check_held, lost_motions
+from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
-from photogram.formats.statement_request import parts_of_asked
-from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
 from photogram.messages import counted, listed
 from photogram.results.result import Result
 
-__all__ = ["FORMATS", "adjusting", "cannot_hold", "read", "recognised", "target", "to_files"]
+__all__ = [
+    "FORMATS",
+    "FORMATS_OF_CAMERAS",
+    "adjusting",
+    "cannot_hold",
+    "read",
+    "recognised",
+    "target",
+    "to_files",
+]
 
 FORMATS: dict[str, Format] = {
     name: import_module(f"photogram.formats.{name}").FORMAT
@@ -47,6 +61,42 @@ FORMATS: dict[str, Format] = {
     )
 }
 """By name, in the order in which help lists them."""
+
+
+def _written(name: str, project: Project) -> Mapping[str, bytes]:
+    from photogram.formats.targets.cameras import rig_of_project
+    from photogram.targets.output.formats import CAMERA_FORMATS
+
+    return CAMERA_FORMATS[name](rig_of_project(project))
+
+
+def _unread(path: Path, wishes: Wishes) -> Project:
+    """Refuse to read what has cameras alone."""
+    del wishes
+    raise InputError("has cameras alone, and no photos", file=path)
+
+
+FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
+    {
+        name: Format(
+            name=name,
+            title=title,
+            recognises=lambda _: False,
+            read=_unread,
+            write=partial(_written, name),
+            cannot_hold=later("photogram.formats.targets.cameras", "lost_beside_cameras"),
+            pixels=True,
+            geographic=True,
+        )
+        for name, title in (
+            ("opencv_yaml", "YAML of OpenCV"),
+            ("ros_camera_info", "camera_info of ROS"),
+            ("kalibr_camchain", "camchain.yaml of Kalibr"),
+            ("mrcal", "a .cameramodel of mrcal"),
+        )
+    }
+)
+"""By name, as `photogram.targets.camera_files` has them."""
 _TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
 SD = ("images", "control", "check", "gnss")
 """What of any format may have standard deviations that its files do not say."""

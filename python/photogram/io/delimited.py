@@ -22,8 +22,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_text
-from photogram.io.marks import Marks, marks_of
-from photogram.io.numbers import finite_number
+from photogram.io.numbers import Marks, finite_number, marks_of
 from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
 from photogram.lazy_dataclasses import dataclass, field, replace

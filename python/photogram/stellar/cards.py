@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from photogram.errors import InputError
-from photogram.io.fields import parse_integer, parse_real
-from photogram.io.records import Record, Source
+from photogram.io.records import Record, Source, parse_integer, parse_real
 from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Card", "Cards"]

@@ -16,8 +16,8 @@ from photogram.errors import InputError
 from photogram.formats.csm.angles import Polynomials, of_angles, of_quaternions
 from photogram.formats.csm.isd import Positions, Turns
 from photogram.io.files import reading
+from photogram.io.json import Tree
 from photogram.io.pvl import Group, Quantity, Value, parsed
-from photogram.io.tree import Tree
 from photogram.network.trajectories import Interpolation, increasing, rotations
 
 __all__ = ["is_cube", "members", "one", "read_label", "read_positions", "read_turns"]

@@ -14,8 +14,8 @@ from photogram.formats.csm.cube_tables import members, one, read_label, read_pos
 from photogram.formats.csm.isd import Detector, Isd
 from photogram.formats.csm.line_times import fitting, read_drift
 from photogram.formats.csm.optics import from_pixels, not_zero, transformed
+from photogram.io.json import Tree
 from photogram.io.pvl import Group
-from photogram.io.tree import Tree
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.tree import Tree
+from photogram.io.json import Tree
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.moving_photos import Lines
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.csm.isd import Detector, Pixels, Plane
-from photogram.io.tree import Tree, unknown
+from photogram.io.json import Tree, unknown
 from photogram.network.lens import Lens, LensModel
 
 __all__ = ["from_pixels", "instrument", "not_zero", "read_detector", "read_lens", "transformed"]

@@ -13,7 +13,7 @@ from photogram.formats.csm.angles import of_quaternions
 from photogram.formats.csm.isd import Framelets, Isd, Jitter, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift, read_lines
 from photogram.formats.csm.optics import instrument, not_zero, read_detector, read_lens
-from photogram.io.tree import Tree, read_json, unknown
+from photogram.io.json import Tree, read_json, unknown
 from photogram.network.trajectories import increasing, rotations
 
 __all__ = ["UNITS", "read_isd"]

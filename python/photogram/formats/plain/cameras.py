@@ -1,10 +1,12 @@
-"""The table of cameras."""
+"""The tables of cameras, and of knots of splined ones."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, cast, get_args
+from typing import TYPE_CHECKING, Any, cast, get_args
+
+import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
@@ -12,7 +14,6 @@ from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
-from photogram.formats.plain.knots import with_knots
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
@@ -24,7 +25,7 @@ from photogram.network.moving_photos import LineSensor, Shutter
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-__all__ = ["Cameras", "read_cameras", "spread_over_photos"]
+__all__ = ["Cameras", "knots_table", "read_cameras", "spread_over_photos", "with_knots"]
 
 _MODELS = dict(_photocore.camera_models())
 _EACH = ("all", "photo", "group")
@@ -288,3 +289,66 @@ def spread_over_photos(
             found.lines.append(cameras.lines[row])
         of_photos.append(places[row, own])
     return found, of_photos
+
+
+_SD = ("sd_radial", "sd_tangential")
+
+
+def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
+    """Return the columns of the knots of cameras, row by row; nothing without any."""
+    own = [(each.name, *both) for each in cameras if (both := _both(each)) is not None]
+    if not own:
+        return {}
+    places = [np.indices(knots.shape[:2]).reshape(2, -1) for _, knots, _ in own]
+    values = np.concatenate([knots.reshape(-1, 2) for _, knots, _ in own])
+    sd = np.concatenate([each.reshape(-1, 2) for _, _, each in own])
+    return {
+        "camera": [name for (name, *_), place in zip(own, places, strict=True) for _ in place[0]],
+        "i": np.concatenate([place[1] for place in places]),
+        "j": np.concatenate([place[0] for place in places]),
+        **dict(zip(("dx", "dy"), values.T, strict=True)),
+        **dict(zip(_SD, sd.T, strict=True)),
+    }
+
+
+def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
+    """Return cameras with the knots that the table has of them; those that are missing are 0 and held.
+
+    Raises
+    ------
+    InputError
+        Knots of a camera that has none there, or twice.
+    """
+    table = tables.read("knots")
+    if table is None:
+        return list(cameras)
+    splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
+    values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
+    seen = set[tuple[str, float, float]]()
+    given = {name: table.numbers(name, 0.0, infinite=name in _SD) for name in ("dx", "dy", *_SD)}
+    where = zip(table.texts("camera"), table.numbers("i").tolist(), table.numbers("j").tolist(), strict=True)
+    for row, (name, i, j) in enumerate(where):
+        if name not in splined:
+            raise table.error(row, f"column camera: there is no splined camera {quoted(name)}")
+        rows, columns, _ = values[name].shape
+        if not (i in range(columns) and j in range(rows)):
+            raise table.error(row, f"{name} has {columns} x {rows} knots, from 0: none is {i:g}, {j:g}")
+        if (name, i, j) in seen:
+            raise table.error(row, f"the knot {i:g}, {j:g} of {name} is there twice")
+        seen.add((name, i, j))
+        values[name][int(j), int(i)] = [given["dx"][row], given["dy"][row]]
+        sd[name][int(j), int(i)] = [given[each][row] for each in _SD]
+    try:
+        return [
+            each.replace(knots=values[each.name], knot_sd=sd[each.name]) if each.name in splined else each
+            for each in cameras
+        ]
+    except InputError as error:
+        raise InputError(error.message, file=tables.settings.path) from None
+
+
+def _both(camera: Camera) -> tuple[Floats, Floats] | None:
+    """Return (ny, nx, 2) knots and their standard deviations; None of a camera without knots."""
+    if camera.knots is None or camera.knot_sd is None:
+        return None
+    return camera.knots, camera.knot_sd

@@ -11,8 +11,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.images import from_tables, in_unit, to_tables
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.image_axes import from_tables, in_unit, to_tables
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable

@@ -17,12 +17,11 @@ from photogram.film.interior import (
     interior_orientation,
 )
 from photogram.formats.plain.cameras import Cameras
+from photogram.formats.plain.certificates import read_fiducials
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
-from photogram.formats.plain.fiducials import read_fiducials
 from photogram.formats.plain.film_mistakes import beyond_message, mark_remarks, scale_message
-from photogram.formats.plain.film_readings import MarkReadings, ScannedPhoto
-from photogram.formats.plain.film_sides import Lying, Seen
+from photogram.formats.plain.film_readings import Lying, MarkReadings, ScannedPhoto, Seen
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.common_unknowns import called, word_of
 from photogram.formats.plain.schema import ANGLES, AXES, BIAS, ROTATIONS, deviation_columns
+from photogram.formats.plain.subjects import clock_columns, clocks
 from photogram.formats.plain.tables import Tables, angles_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.images import from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.image_axes import from_tables, in_unit
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of

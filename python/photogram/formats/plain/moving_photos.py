@@ -12,11 +12,11 @@ import numpy as np
 from photogram.adjustment.a_priori import Cartesian
 from photogram.arguments.types import Floats
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
+from photogram.formats.plain.subjects import clock_columns, clocks
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.rigging import Rig
 from photogram.io.delimited import ColumnTable

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
-from photogram.formats.plain.subjects import Subjects, clocked, subject_columns
+from photogram.formats.plain.subjects import Subjects, clock_columns, clocked, clocks, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,

@@ -24,7 +24,7 @@ from photogram.formats.plain.boards import (
 )
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
-from photogram.formats.plain.film_sides import Seen
+from photogram.formats.plain.film_readings import Seen
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving_photos import placed, read_timed

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
+from photogram.formats.plain.subjects import clock_columns, clocks
 from photogram.formats.plain.tables import Tables, angles_of, indices_of
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.messages import quoted

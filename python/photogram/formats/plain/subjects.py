@@ -1,4 +1,4 @@
-"""What rows of observations are of: photos, or trajectories at times."""
+"""What rows of observations are of: photos, or trajectories at times; and the clocks that date them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Range, Rate, Velocity
 from photogram.network.trajectories import Clock, Trajectory
 
-__all__ = ["Subjects", "clocked", "subject_columns"]
+__all__ = ["Subjects", "clock_columns", "clocked", "clocks", "subject_columns"]
 
 
 @dataclass(frozen=True)
@@ -104,4 +104,35 @@ def subject_columns(
         **({"photo": photos} if any(photos) else {}),
         "trajectory": [None if each is None else each.trajectory.name for each in moments],
         "time": [each.time for each in observations],
+    }
+
+
+def clocks(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> list[Clock | None]:
+    """Return the clock of each row, called by its title where it has no name; None where nothing is said.
+
+    Raises
+    ------
+    InputError
+        Offsets that are no numbers, another offset of a clock that a row before has.
+    """
+    values = table.numbers("time_offset", 0.0)
+    sd = table.numbers("sd_time_offset", 0.0, infinite=True)
+    found: list[Clock | None] = []
+    for row, (name, title) in enumerate(zip(table.texts("clock"), titles, strict=True)):
+        if not (name or values[row] or sd[row]):
+            found.append(None)
+            continue
+        given = name or title, float(values[row]), float(sd[row])
+        found.append(tables.shared.one(table, row, "clock", Clock, *given))
+    return found
+
+
+def clock_columns(clocks: Sequence[Clock | None]) -> dict[str, Any]:
+    """Return the columns of clocks; none where there are none."""
+    if not any(clocks):
+        return {}
+    return {
+        "clock": ["" if each is None else each.name for each in clocks],
+        "time_offset": [None if each is None else each.value for each in clocks],
+        "sd_time_offset": [None if each is None else float(each.deviations[0]) for each in clocks],
     }

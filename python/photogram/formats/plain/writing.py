@@ -10,11 +10,11 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
+from photogram.formats.images import to_tables
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
+from photogram.formats.plain.cameras import knots_table
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films_written import WrittenFilms
-from photogram.formats.plain.image_axes import to_tables
-from photogram.formats.plain.knots import knots_table
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
 from photogram.formats.plain.observed_poses import observed_tables
 from photogram.formats.plain.rigs import Rigs
