@@ -29,13 +29,7 @@ class Card:
         self.words = (place.text or "").split()
 
     def number(self, index: int, what: str) -> float:
-        """Return a word as a number.
-
-        Raises
-        ------
-        InputError
-            There is none, or it is no number.
-        """
+        """Return a word as a number."""
         if index >= len(self.words):
             raise self.place.error(f"ends before {what}")
         return self.place.number(self.words[index], what)

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from photogram.errors import InputError, PhotogramError
-from photogram.formats.block_contents import check_films
+from photogram.formats.block_contents import check_images, lost_motions
 from photogram.formats.format import Format, Wishes, later
 from photogram.formats.format_coordinates import (
     in_pixels,
@@ -17,7 +17,6 @@ from photogram.formats.format_coordinates import (
     nominal_pixels,
     topocentric_remarks,
 )
-from photogram.formats.motion_summary import check_held, lost_motions
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
@@ -208,8 +207,7 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
         writable = ", ".join(name for name, each in _TO_WRITE.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
     if chosen.name != "plain":
-        check_films(project.block, chosen.title)
-        check_held(project.block, chosen.title)
+        check_images(project.block, chosen.title)
     return chosen.write(_fitting(project, chosen))
 
 
@@ -310,8 +308,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     """
     chosen = _named(file_format, _TO_WRITE)
     if chosen.name != "plain":
-        check_films(project.block, chosen.title)
-        check_held(project.block, chosen.title)
+        check_images(project.block, chosen.title)
     beside = [counted(len(project.features), "feature")] if project.features else []
     beside += parts_of_asked(project.statement) + lost_motions(project.block)
     return [

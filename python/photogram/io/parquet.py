@@ -66,6 +66,8 @@ class Column:
 class Sheet:
     """A table that was read: arrays of numbers and lists of names, and what the file says of itself.
 
+    A column that is not there, or holds something else than is asked for, is an :class:`InputError`.
+
     Attributes
     ----------
     path
@@ -86,38 +88,20 @@ class Sheet:
         return len(next(iter(self.columns.values()), ()))
 
     def column(self, name: str) -> Any:
-        """Return a column.
-
-        Raises
-        ------
-        InputError
-            It is not there.
-        """
+        """Return a column."""
         if name not in self.columns:
             raise InputError(f"the column {name} is missing", file=self.path)
         return self.columns[name]
 
     def names(self, name: str) -> Repeated:
-        """Return a column of names.
-
-        Raises
-        ------
-        InputError
-            It is not there, or holds something else.
-        """
+        """Return a column of names."""
         found = self.column(name)
         if not isinstance(found, Repeated):
             raise self._other(name, found)
         return found
 
     def numbers(self, name: str, columns: int = 0) -> Any:
-        """Return a column of numbers: (rows,), or (rows, columns) of lists; a negative count divides theirs.
-
-        Raises
-        ------
-        InputError
-            It is not there, or holds something else.
-        """
+        """Return a column of numbers: (rows,), or (rows, columns); a negative count divides that of the columns."""
         found = self.column(name)
         kind = found.dtype.kind if isinstance(found, np.ndarray) else ""
         width = found.shape[1] if kind and found.ndim == 2 else 0
