@@ -34,7 +34,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_beginning(path: Path, size: int = HEAD) -> str:
-    """Read `size` bytes that a text file begins with, by which formats are told, as :func:`read_text` does."""
+    """Read what a text file begins with, by which formats are told, as :func:`read_text` does."""
     with reading(path), path.open("rb") as file:
         text = _decoded(file.read(size), whole=False)
     return text.replace("\r\n", "\n").replace("\r", "\n")

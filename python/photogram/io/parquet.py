@@ -101,7 +101,7 @@ class Sheet:
         return found
 
     def numbers(self, name: str, columns: int = 0) -> Any:
-        """Return a column of numbers: (rows,), or (rows, columns); a negative count divides that of the columns."""
+        """Return a column of numbers: (rows,), or (rows, columns); a negative count divides their number."""
         found = self.column(name)
         kind = found.dtype.kind if isinstance(found, np.ndarray) else ""
         width = found.shape[1] if kind and found.ndim == 2 else 0

@@ -14,7 +14,7 @@ from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, columns_of
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -306,8 +306,8 @@ def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
         "camera": [name for (name, *_), place in zip(own, places, strict=True) for _ in place[0]],
         "i": np.concatenate([place[1] for place in places]),
         "j": np.concatenate([place[0] for place in places]),
-        **dict(zip(("dx", "dy"), values.T, strict=True)),
-        **dict(zip(_SD, sd.T, strict=True)),
+        **columns_of(("dx", "dy"), values),
+        **columns_of(_SD, sd),
     }
 
 

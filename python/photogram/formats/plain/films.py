@@ -60,17 +60,14 @@ class Scanned:
     scans, observations
         What images pass, and what was observed.
     inside
-        The same where films are fitted before, with all that was read of them: tables are written of it.
+        For the details of a project whose films are fitted before: the same with all that was read of them,
+        of which tables are written.
     """
 
     photos: Bools
     scans: list[Scan] = field(default_factory=list)
     observations: list[Observation] = field(default_factory=list)
-    inside: list[tuple[list[Scan], list[Observation]]] = field(default_factory=list)
-
-    def details(self) -> dict[str, object]:
-        """Return what writing tables needs beside the block, for the details of a project."""
-        return {INSIDE: self.inside[0]} if self.inside else {}
+    inside: dict[str, tuple[list[Scan], list[Observation]]] = field(default_factory=dict)
 
 
 def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
@@ -104,7 +101,7 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
             inside = Scanned(scanned)
             silent = replace(tables, messages=[])
             _Reader(silent, seen, covariances, films, before=False).read(inside)
-            found.inside.append((inside.scans, inside.observations))
+            found.inside[INSIDE] = inside.scans, inside.observations
     return found
 
 
@@ -124,6 +121,7 @@ class _Reader:
         self.seen = seen
         self.tables, self.table, self.covariances = tables, photos.table, covariances
         self.before = before
+        self._held: dict[int, Machine] = {}
         machines = read_scanners(tables, covariances)
         self.comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
@@ -150,11 +148,6 @@ class _Reader:
         else:
             own = machines[name]
         return self._held.setdefault(id(own), own.held()) if self.before else own
-
-    @property
-    def _held(self) -> dict[int, Machine]:
-        own: dict[int, Machine] = self.__dict__.setdefault("_held_machines", {})
-        return own
 
     def read(self, found: Scanned) -> None:
         """Put the scans and observations of all photos in their place."""

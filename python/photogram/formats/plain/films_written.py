@@ -10,6 +10,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.plain.scanners import BENDS, CURVES, GRID, LOCAL, Machine
+from photogram.formats.plain.schema import deviation_columns
+from photogram.formats.plain.tables import columns_of
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.films import Film, Mark, Reseau, Scan
@@ -226,8 +228,8 @@ class WrittenFilms:
             "rows_down": [each.down for each in readings],
             "hx": [each.half_range[0] for each in readings],
             "hy": [each.half_range[1] for each in readings],
-            **dict(zip(names, values.T, strict=True)),
-            **{f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)},
+            **columns_of(names, values),
+            **columns_of(deviation_columns(names), sd),
         }
 
     def _certificates(self) -> dict[str, _Marks]:
@@ -278,8 +280,8 @@ class WrittenFilms:
         return {
             "photo": [each.photo for each in self.readings],
             "fiducial": [self.by_mark[id(each.mark)] for each in self.readings],
-            **dict(zip(names, found.T, strict=True)),
-            **{f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)},
+            **columns_of(names, found),
+            **columns_of(deviation_columns(names), sd),
         }
 
 

@@ -16,8 +16,8 @@ from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
-from photogram.formats.plain.subjects import clock_columns, clocks
-from photogram.formats.plain.tables import Tables, indices_of
+from photogram.formats.plain.subjects import scalar_columns, scalars
+from photogram.formats.plain.tables import Tables, columns_of, indices_of
 from photogram.formats.rigging import Rig
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
@@ -144,8 +144,8 @@ class _Columns:
             on,
             table.vectors(_MOTION) * np.concatenate([np.ones(3), np.diag(tables.flip)]),
             table.vectors(_SD, infinite=True),
-            clocks(tables, table, table.texts("photo")),
-            _rates(tables, table),
+            scalars(tables, table, Clock, table.texts("photo")),
+            scalars(tables, table, Readout, table.texts("photo"), 1.0),
             _line_times(tables, photos),
             rigs,
         )
@@ -181,19 +181,6 @@ class _Columns:
             what = "sensor" if own else "camera"
             raise self.table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
         return rig.sensors.get(sensor), rig.clocks.get(sensor)
-
-
-def _rates(tables: Tables, table: ColumnTable) -> list[Readout | None]:
-    """Return the factors of the line rates of photos."""
-    values, sd = table.numbers("line_rate", 1.0), table.numbers("sd_line_rate", 0.0, infinite=True)
-    found: list[Readout | None] = []
-    for row, (name, photo) in enumerate(zip(table.texts("scan"), table.texts("photo"), strict=True)):
-        if not (name or sd[row]) and values[row] == 1.0:
-            found.append(None)
-            continue
-        given = name or photo, float(values[row]), float(sd[row])
-        found.append(tables.shared.one(table, row, "scan", Readout, *given))
-    return found
 
 
 def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
@@ -257,12 +244,10 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
             found[column] = ["" if each is None else each[k] for each in places]
     found["time"] = [None if each is None else each.time for each in own]
     found |= _motion_columns(own)
-    found |= clock_columns([None if each is None or rigs.clock(each.sensor) else each.offset for each in own])
-    rates = [None if each is None else each.rate for each in own]
-    if any(rates):
-        found["scan"] = ["" if each is None else each.name for each in rates]
-        found["line_rate"] = [None if each is None else each.value for each in rates]
-        found["sd_line_rate"] = [None if each is None else float(each.deviations[0]) for each in rates]
+    found |= scalar_columns(
+        Clock, [None if each is None or rigs.clock(each.sensor) else each.offset for each in own]
+    )
+    found |= scalar_columns(Readout, [None if each is None else each.rate for each in own])
     return {name: column for name, column in found.items() if any(each not in (None, "") for each in column)}
 
 
@@ -287,4 +272,4 @@ def line_times_table(block: Block) -> dict[str, Any]:
     tables = [np.asarray(each.lines.table) for each in own if each.lines is not None]
     rows = np.vstack(tables)
     names = [each.photo for each, table in zip(own, tables, strict=True) for _ in table]
-    return {"photo": names, **dict(zip(("line", "time", "seconds_per_line"), rows.T, strict=True))}
+    return {"photo": names, **columns_of(("line", "time", "seconds_per_line"), rows)}

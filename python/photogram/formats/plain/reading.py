@@ -30,7 +30,7 @@ from photogram.formats.plain.images import Images, image_coordinates, read_image
 from photogram.formats.plain.moving_photos import placed, read_timed
 from photogram.formats.plain.observed_poses import read_observations
 from photogram.formats.plain.photos import Photos, read_photos
-from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames
+from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
@@ -88,7 +88,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     transform = Transform(settings, tables.messages)
     cameras = read_cameras(tables if wishes.cameras is None else _with_cameras(tables, wishes.cameras))
     trajectories = read_trajectories(tables)
-    control = _control_table(tables)
+    control = tables.read("control")
     # The frame is settled by control where it has no origin: it is the first that is carried over.
     given = None if control is None else read_control(tables, control, transform)
     photos = read_photos(tables, transform, cameras)
@@ -154,8 +154,8 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
             "settings": settings,
             ASSUMED: assumed,
             REGULARISED: read_regularised(tables),
-            TIMES: times_of_frames(tables) | _times(photos),
-            **scanned.details(),
+            TIMES: times_of_frames(tables) | times_said(photos.names, photos.times),
+            **scanned.inside,
         },
     ).replace(
         sd_taken=True,
@@ -172,12 +172,6 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         rows = np.array([places[name] for name in given.names], dtype=np.int64)
         check_systems(project, settings, control, rows, control.vectors(AXES), free=False)
     return project
-
-
-def _times(photos: Photos) -> dict[str, float]:
-    """Return when photos were taken, of those that say it."""
-    pairs = zip(photos.names, photos.times.tolist(), strict=True)
-    return {photo: time for photo, time in pairs if not math.isnan(time)}
 
 
 def _unused(
@@ -255,10 +249,6 @@ class _Given:
     check_sd: Floats
     observed: list[Observation]
     vegetated: frozenset[str]
-
-
-def _control_table(tables: Tables) -> ColumnTable | None:
-    return tables.read("control")
 
 
 def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _Given:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
@@ -12,9 +12,13 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted, quoted
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Range, Rate, Velocity
-from photogram.network.trajectories import Clock, Trajectory
+from photogram.network.trajectories import Clock, Readout, Trajectory
 
-__all__ = ["Subjects", "clock_columns", "clocked", "clocks", "subject_columns"]
+__all__ = ["Subjects", "clocked", "scalar_columns", "scalars", "subject_columns"]
+
+_Scalar = TypeVar("_Scalar", Clock, Readout)
+_COLUMNS: Mapping[type, tuple[str, str]] = {Clock: ("clock", "time_offset"), Readout: ("scan", "line_rate")}
+"""What names clocks, and line rates of scans, and their numbers."""
 
 
 @dataclass(frozen=True)
@@ -107,32 +111,35 @@ def subject_columns(
     }
 
 
-def clocks(tables: Tables, table: ColumnTable, titles: Sequence[str]) -> list[Clock | None]:
-    """Return the clock of each row, called by its title where it has no name; None where nothing is said.
+def scalars(
+    tables: Tables, table: ColumnTable, kind: type[_Scalar], titles: Sequence[str], usual: float = 0.0
+) -> list[_Scalar | None]:
+    """Return the clock of each row, or the factor of its line rate, as a rule 1; None where nothing is said.
+
+    One without a name is called by its title.
 
     Raises
     ------
     InputError
-        Offsets that are no numbers, another offset of a clock that a row before has.
+        Values that are no numbers, another value of what a row before has of the same name.
     """
-    values = table.numbers("time_offset", 0.0)
-    sd = table.numbers("sd_time_offset", 0.0, infinite=True)
-    found: list[Clock | None] = []
-    for row, (name, title) in enumerate(zip(table.texts("clock"), titles, strict=True)):
-        if not (name or values[row] or sd[row]):
-            found.append(None)
-            continue
-        given = name or title, float(values[row]), float(sd[row])
-        found.append(tables.shared.one(table, row, "clock", Clock, *given))
-    return found
+    word, number = _COLUMNS[kind]
+    values, sd = table.numbers(number, usual), table.numbers(f"sd_{number}", 0.0, infinite=True)
+    return [
+        tables.shared.one(table, row, word, kind, name or title, float(values[row]), float(sd[row]))
+        if name or sd[row] or values[row] != usual
+        else None
+        for row, (name, title) in enumerate(zip(table.texts(word), titles, strict=True))
+    ]
 
 
-def clock_columns(clocks: Sequence[Clock | None]) -> dict[str, Any]:
-    """Return the columns of clocks; none where there are none."""
-    if not any(clocks):
+def scalar_columns(kind: type[Clock | Readout], own: Sequence[Clock | Readout | None]) -> dict[str, Any]:
+    """Return the columns of clocks, or of factors of line rates; none where there are none."""
+    if not any(own):
         return {}
+    word, number = _COLUMNS[kind]
     return {
-        "clock": ["" if each is None else each.name for each in clocks],
-        "time_offset": [None if each is None else each.value for each in clocks],
-        "sd_time_offset": [None if each is None else float(each.deviations[0]) for each in clocks],
+        word: ["" if each is None else each.name for each in own],
+        number: [None if each is None else each.value for each in own],
+        f"sd_{number}": [None if each is None else float(each.deviations[0]) for each in own],
     }

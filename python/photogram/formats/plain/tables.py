@@ -27,6 +27,7 @@ __all__ = [
     "DEGREE",
     "Tables",
     "angles_of",
+    "columns_of",
     "correlations",
     "covariances_of",
     "different",
@@ -288,6 +289,11 @@ def correlations(
     if not any(np.nan_to_num(covariances[:, i, j]).any() for i, j in columns.values()):
         return {}
     return {name: covariances[:, i, j] * (scales[i] * scales[j]) for name, (i, j) in columns.items()}
+
+
+def columns_of(names: Sequence[str], values: Floats) -> dict[str, Any]:
+    """Return (rows, k) numbers as columns by their names."""
+    return dict(zip(names, values.T, strict=True))
 
 
 def places_written(block: Block, values: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""The tables of trajectories: records, what corrections are made of, knots, coefficients."""
+"""The tables of trajectories: records, what corrections are made of, knots, coefficients, their sums."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import AXES, BASES, VELOCITY, deviation_columns
-from photogram.formats.plain.tables import Tables, indices_of, vectors_of
+from photogram.formats.plain.schema import AXES, BASES, FACTORS, VELOCITY, deviation_columns
+from photogram.formats.plain.tables import Tables, covariances_of, indices_of, vectors_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import quoted
+from photogram.network.observations import Observation, Smoothness
 from photogram.network.trajectories import (
     Angles,
     Basis,
@@ -28,7 +29,7 @@ from photogram.network.trajectories import (
     Trajectory,
 )
 
-__all__ = ["read_trajectories", "trajectory_rows"]
+__all__ = ["read_smoothness", "read_trajectories"]
 
 _SD = deviation_columns(AXES)
 _OTHERS = (
@@ -74,7 +75,7 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
     return found
 
 
-def trajectory_rows(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
+def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
     """Return the rows of each trajectory or, with `bases`, of each of its bases.
 
     Raises
@@ -116,7 +117,7 @@ def _turned(
     table = tables.read(name)
     if table is None:
         return {}
-    groups = trajectory_rows(table, places)
+    groups = _rows_of(table, places)
     times, matrices = _times(table, groups), tables.matrices(table)
     unknown = np.isnan(matrices).any(axis=(1, 2))
     if unknown.any():
@@ -151,7 +152,7 @@ class _Records:
         """Read the tables; errors as of :func:`read_trajectories`."""
         found = {}
         if (own := tables.read("trajectory_positions")) is not None:
-            groups = trajectory_rows(own, places)
+            groups = _rows_of(own, places)
             times, values = _times(own, groups), own.vectors(AXES)
             own.check_given(values, AXES)
             values = np.column_stack([values, vectors_of(own, VELOCITY)])
@@ -245,11 +246,11 @@ class _Bases:
             raise table.error(int(np.argmax(negative)), f"column sd_{kind}: is negative")
         knots: dict[str, Floats] = {}
         if (own := tables.read("trajectory_knots")) is not None:
-            groups = trajectory_rows(own, places, bases=True)
+            groups = _rows_of(own, places, bases=True)
             values = _times(own, groups, "knot", multiple=True)
             knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
         coefficients = tables.read("trajectory_coefficients")
-        rows = {} if coefficients is None else trajectory_rows(coefficients, places, bases=True)
+        rows = {} if coefficients is None else _rows_of(coefficients, places, bases=True)
         signs = np.ones((len(table.texts(kind, "none")), 3))
         if kind == "rotation":
             about_photo = [each != "zxz" for each in _words(table, "angles", get_args(Angles))]
@@ -337,3 +338,39 @@ class _Bases:
             values[int(number)] = value * self.unit
             deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
         return values, deviations
+
+
+def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> list[Observation]:
+    """Read sums of neighbouring coefficients.
+
+    Raises
+    ------
+    InputError
+        Trajectories and coefficients that are not there, standard deviations that give no weight.
+    """
+    table = tables.read("smoothness")
+    if table is None:
+        return []
+    groups = _rows_of(table, {name: row for row, name in enumerate(trajectories)}, bases=True)
+    sd = tables.deviations(table, "smoothness", _SD)
+    table.check_given(sd, _SD)
+    observed, covariances = table.vectors(AXES, 0.0), covariances_of(sd, table)
+    factors, first = table.vectors(FACTORS), table.numbers("k")
+    found: dict[int, Observation] = {}
+    for (name, of), rows in groups.items():
+        own = trajectories[name].coefficients[BASES.index(of)]
+        # Rotations are about the axes of photos, in the unit of angles.
+        turn = tables.flip * tables.radians if of == "rotation" else np.eye(3)
+        for row in rows.tolist():
+            given = factors[row][~np.isnan(factors[row])]
+            if np.isnan(factors[row][: len(given)]).any():
+                raise table.error(row, f"{', '.join(FACTORS)}: there is one behind an empty cell")
+            if first[row] not in range(len(own) - len(given) + 1):
+                raise table.error(row, f"column k: the {of} of {name} has no such coefficients")
+            k = int(first[row])
+            own_sum, precision = turn @ observed[row], turn @ covariances[row] @ turn.T
+            make = partial(
+                Smoothness, own[k : k + len(given)], given, own_sum, covariance=(precision + precision.T) / 2
+            )
+            found[row] = made(table, row, make)
+    return [found[row] for row in sorted(found)]
