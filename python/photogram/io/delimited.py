@@ -96,6 +96,11 @@ class ColumnTable:
     def __contains__(self, column: str) -> bool:
         return column in self.columns
 
+    @property
+    def headings(self) -> list[tuple[str, str]]:
+        """What each column is called here, and in the file, as far as it names them."""
+        return list(zip(self.columns, self.own or self.columns, strict=True))
+
     @cached_property
     def _lines(self) -> list[str]:
         return [] if self.path.suffix == ".parquet" else read_text(self.path).split("\n")
@@ -121,6 +126,21 @@ class ColumnTable:
         cells = {names.get(column, column): own for column, own in self.cells.items()}
         ready = {names.get(column, column): own for column, own in self.ready.items()}
         return replace(self, columns=columns, cells=cells, ready=ready)
+
+    def some(self, rows: Sequence[int]) -> ColumnTable:
+        """Return the table with some of its rows, in this order."""
+        cells = {column: [own[row] for row in rows] for column, own in self.cells.items()}
+        ready = {
+            column: Names(own.names, own.rows[rows]) if isinstance(own, Names) else own[rows]
+            for column, own in self.ready.items()
+        }
+        records = [self.records[row] for row in rows]
+        return replace(self, count=len(rows), cells=cells, ready=ready, records=records)
+
+    def with_texts(self, column: str, texts: Sequence[str]) -> ColumnTable:
+        """Return the table with other texts in a column."""
+        ready = {name: own for name, own in self.ready.items() if name != column}
+        return replace(self, cells={**self.cells, column: texts}, ready=ready)
 
     def require(self, *columns: str) -> None:
         """Refuse a table without these columns.
