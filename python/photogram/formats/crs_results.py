@@ -164,7 +164,11 @@ def placed(result: Result, crs: str = "") -> Placed:
     places = result.photo_positions, result.point_positions[rows]
     frame = check_place(block, crs)
     (photos, photo_turns), (points, point_turns) = (_carried(block, crs, frame, xyz) for xyz in places)
-    names, units = axes_of(crs) if crs else _own_axes(block)
+    names, units = ("x", "y", "z"), (block.linear_unit,) * 3
+    if crs:
+        names, units = axes_of(crs)
+    elif block.geographic:
+        names, units = ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
     turned = [
         turns @ own @ turns.transpose(0, 2, 1)
         for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
@@ -228,12 +232,6 @@ def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats,
         return to_system(crs, xyz, frame)
     degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if block.geographic else xyz
     return degrees, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
-
-
-def _own_axes(block: Block) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
-    if block.geographic:
-        return ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
-    return ("x", "y", "z"), (block.linear_unit,) * 3
 
 
 def _positions(names: Sequence[str], xyz: Floats, covariances: Floats) -> dict[str, Any]:

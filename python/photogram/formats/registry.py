@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -129,17 +129,14 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
         # The reader says best what is missing.
         return among[0], path
     if found:
-        raise InputError(f"may be read as {_told(found, path)}: say which", file=path)
+        several = ", ".join(
+            f"{each.title} (--format {each.name}{'' if where == path else f', {where.name}'})"
+            for each, where in found
+        )
+        raise InputError(f"may be read as {several}: say which", file=path)
     what = "folder holds" if path.is_dir() else "file is"
     titles = listed([f"{each.title} ({each.name})" for each in FORMATS.values()], len(FORMATS))
     raise InputError(f"the {what} none of the formats that are known: {titles}{_beside(path)}", file=path)
-
-
-def _told(found: Sequence[tuple[Format, Path]], path: Path) -> str:
-    return ", ".join(
-        f"{each.title} (--format {each.name}{'' if where == path else f', {where.name}'})"
-        for each, where in found
-    )
 
 
 def _beside(path: Path) -> str:

@@ -234,6 +234,9 @@ def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Siz
             values = {own["cx"]: size[0] / 2, own["cy"]: size[1] / 2} | values
     elif "cx" in own and image != "px":
         values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
+    if given.weights not in get_args(Weights):
+        choices = ", ".join(get_args(Weights))
+        raise table.error(row, f"column weights: {quoted(given.weights)} is none of {choices}")
     constants = [*powers][len(powers) - _MODELS[model][2] :]
     return Camera(
         model,
@@ -245,14 +248,8 @@ def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Siz
         },
         name=given.name,
         unit="px" if image == "px" else "mm",
-        weights=_weights(table, row, given.weights),
+        weights=cast("Weights", given.weights),
     )
-
-
-def _weights(table: ColumnTable, row: int, word: str) -> Weights:
-    if word not in get_args(Weights):
-        raise table.error(row, f"column weights: {quoted(word)} is none of {', '.join(get_args(Weights))}")
-    return cast("Weights", word)
 
 
 def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:

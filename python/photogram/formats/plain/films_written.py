@@ -108,14 +108,14 @@ class WrittenFilms:
         films = [self.films.get(photo) for photo in self.photos]
         starts = np.array([self._start(photo) for photo in self.photos])
         return {
-            "film": ["" if film is None else self.rolls[photo] for photo, film in self._rows()],
+            "film": [
+                "" if film is None else self.rolls[photo]
+                for photo, film in zip(self.photos, films, strict=True)
+            ],
             "scanner": ["" if film is None else film.scanner.name for film in films],
             "mirrored": [None if film is None else film.mirrored for film in films],
             **{f"start_{name}": starts[:, k] for k, name in enumerate(FILM[:3])},
         }
-
-    def _rows(self) -> Iterator[tuple[str, Film | None]]:
-        return ((photo, self.films.get(photo)) for photo in self.photos)
 
     def _start(self, photo: str) -> Floats:
         """Return where a film starts: what was observed of it, where it was."""

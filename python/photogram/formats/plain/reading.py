@@ -296,8 +296,10 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
         if use != "control":
             held[row] = np.inf
             continue
+        # Turning changes nothing of such a covariance matrix.
+        isotropic = (covariances[row] == covariances[row][0, 0] * np.eye(3)).all()
         correlated = (turned[row] - np.diag(np.diag(turned[row]))).any()
-        if correlated and np.isfinite(sd[row]).all() and not _isotropic(covariances[row]):
+        if correlated and np.isfinite(sd[row]).all() and not isotropic:
             if not is_covariance(turned[row]):
                 raise table.error(row, "its covariances cannot be: the matrix is not positive definite")
             observed.append(Control(names[row], values[row], covariance=(turned[row] + turned[row].T) / 2))
@@ -306,11 +308,6 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     values = np.where(np.array([row in off for row in range(len(uses))])[:, np.newaxis], np.nan, values)
     vegetated = read_cover(table, names, uses)
     return _Given(table, names, values, held, check_sd, observed, vegetated)
-
-
-def _isotropic(covariance: Floats) -> bool:
-    """Whether turning changes nothing of a covariance matrix."""
-    return bool((covariance == covariance[0, 0] * np.eye(3)).all())
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -206,7 +206,7 @@ def matrices_of(settings: Settings, values: Floats) -> Floats:
     """Return (n, 3, 3) attitudes A, photo to object, from the numbers of the representation of a project."""
     kind = settings.attitude
     given = values.reshape(-1, 3, 3) if kind == "matrix" else values
-    found = Attitudes.of(_own(kind), given).matrices
+    found = Attitudes.of(cast("Representation", kind), given).matrices
     if kind in ("yaw_pitch_roll", "azimuth_tilt_swing"):
         return found
     # Of these kinds the numbers are read as a matrix Q, and the settings say what Q is.
@@ -216,10 +216,6 @@ def matrices_of(settings: Settings, values: Floats) -> Floats:
         to_photo = Y_DOWN @ to_photo
     photo_to_object: Floats = to_photo.transpose(0, 2, 1)
     return photo_to_object
-
-
-def _own(kind: str) -> Representation:
-    return kind  # type: ignore[return-value]
 
 
 def covariances_of(

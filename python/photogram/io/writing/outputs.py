@@ -236,7 +236,9 @@ class OutputSet:
                     mark(staging, places)
             for staged in self._staged:
                 staged.place()
-            self._sync()
+            for directory in {*self._stagings, *(os.path.dirname(made) for made in self._made)}:
+                with naming(Path(directory)):
+                    sync_directory(directory)
         except BaseException:
             restored = [staged.restore() for staged in self._staged]
             if all(restored):
@@ -245,11 +247,6 @@ class OutputSet:
         self._made.clear()
         self._unmark()
         clear_marks(places)
-
-    def _sync(self) -> None:
-        for directory in {*self._stagings, *(os.path.dirname(made) for made in self._made)}:
-            with naming(Path(directory)):
-                sync_directory(directory)
 
     def _unmark(self) -> None:
         for staging in self._stagings.values():
