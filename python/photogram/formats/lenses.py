@@ -13,9 +13,10 @@ __all__ = ["Lens", "lens_of"]
 _TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
 """Models that count from the middle of the picture, y up."""
-_FAMILY = _MIDDLE | frozenset(
-    "radial simple_radial simple_pinhole pinhole opencv full_opencv opencv_pinhole agisoft_frame".split()
-)
+_FAMILY = _MIDDLE | {
+    *("radial", "simple_radial", "simple_pinhole", "pinhole"),
+    *("opencv", "full_opencv", "opencv_pinhole", "agisoft_frame"),
+}
 
 
 @dataclass(frozen=True)
