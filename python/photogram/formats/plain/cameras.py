@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
@@ -12,13 +13,14 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
 from photogram.formats.plain.tables import Tables, columns_of
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, quoted
+from photogram.messages import quoted
 from photogram.network.cameras import Camera, Weights
 from photogram.network.moving_photos import LineSensor, Shutter
 
@@ -75,14 +77,12 @@ def read_cameras(tables: Tables) -> Cameras:
         if own.each not in _EACH:
             raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
         size = _size(table, row, own)
-        try:
-            certificate = _of_camera(tables, table, row, own, certificates)
-            if certificate is None:
-                found.cameras.append(_camera(tables, table, row, own, size))
-            else:
-                found.cameras.append(certified(tables, own.name, own.model, certificate))
-        except InputError as error:
-            raise (error if error.file else table.error(row, error.message)) from None
+        certificate = _of_camera(tables, table, row, own, certificates)
+        if certificate is None:
+            make = partial(_camera, tables, table, row, own, size)
+        else:
+            make = partial(certified, tables, own.name, own.model, certificate)
+        found.cameras.append(made(table, row, make))
         found.sizes.append(size)
         found.pixel_mm.append(own.pixel_mm)
         found.for_each.append(own.each)
@@ -107,7 +107,7 @@ def _of_camera(
             message = f"the camera {own.name} has c {c:g} mm, and its certificate {certificate.c:g} mm"
             raise ContradictionError.of(table.error(row, f"{message}: it is of another lens"))
         message = f"camera {own.name}: it is as the table has it; of its certificate marks alone are taken"
-        tables.messages.append(Message(message, table.path))
+        tables.tell(message, table.path)
         return None
     if read_covariances(tables).names("camera", own.name):
         raise table.error(row, f"the camera {own.name} has a certificate, and a covariance in covariances")

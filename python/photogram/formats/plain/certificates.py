@@ -26,7 +26,7 @@ from photogram.network.observations import KnownTogether, Observation
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-__all__ = ["Fiducials", "certificate_marks", "certified", "definite", "read_certificates", "read_fiducials"]
+__all__ = ["Fiducials", "certified", "definite", "read_certificates", "read_fiducials"]
 
 _MODELS = ("brown_forward", "brown")
 _ITSELF = "a camera of another year is a camera by itself"
@@ -179,24 +179,6 @@ def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera
     return own.camera(chosen).replace(name=name)  # type: ignore[arg-type]
 
 
-def certificate_marks(
-    tables: Tables, camera: str, own: Certificate
-) -> tuple[dict[str, Floats], dict[str, Floats], Floats | None]:
-    """Return places of marks by name, and standard deviations or, of correlated ones, the covariance.
-
-    Raises
-    ------
-    InputError
-        There are neither coordinates nor distances, or a covariance that is none.
-    """
-    marks = own.fiducials()
-    places = dict(zip(marks.names, marks.xy, strict=True))
-    if not (marks.covariance - np.diag(np.diag(marks.covariance))).any():
-        sd = np.sqrt(np.diag(marks.covariance)).reshape(-1, 2)
-        return places, dict(zip(marks.names, sd, strict=True)), None
-    return places, {}, definite(tables, camera, marks.xy, marks.covariance, own.file)
-
-
 def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: Path | None) -> Floats:
     """Return the covariance of all marks of a camera, with the datum that distances have not.
 
@@ -210,13 +192,11 @@ def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: 
     except InputError as error:
         raise InputError(f"camera {camera}: {error.message}", file=file) from None
     if free:
-        tables.messages.append(
-            Message(
-                f"camera {camera}: its marks are known by distances, whose covariance leaves {free} movements"
-                " open: the frame is that of the marks themselves; films take shift and rotation, and the"
-                " principal point is known as it is said",
-                file,
-            )
+        tables.tell(
+            f"camera {camera}: its marks are known by distances, whose covariance leaves {free} movements"
+            " open: the frame is that of the marks themselves; films take shift and rotation, and the"
+            " principal point is known as it is said",
+            file,
         )
     return found
 
@@ -273,7 +253,7 @@ class Fiducials:
         Raises
         ------
         InputError
-            A camera that has marks already.
+            A camera that has marks already, a covariance that is none.
         """
         for camera, own in certificates.items():
             if camera in self.places:
@@ -281,9 +261,14 @@ class Fiducials:
                     f"the camera {camera} has marks here, and others in its certificate",
                     file=self.tables.settings.tables["fiducials"],
                 )
-            self.places[camera], self.sd[camera], covariance = certificate_marks(self.tables, camera, own)
-            if covariance is not None:
-                self.covariances[camera] = covariance
+            marks = own.fiducials()
+            self.places[camera] = dict(zip(marks.names, marks.xy, strict=True))
+            if (marks.covariance - np.diag(np.diag(marks.covariance))).any():
+                found = definite(self.tables, camera, marks.xy, marks.covariance, own.file)
+                self.covariances[camera] = found
+            else:
+                sd = np.sqrt(np.diag(marks.covariance)).reshape(-1, 2)
+                self.sd[camera] = dict(zip(marks.names, sd, strict=True))
 
 
 def read_fiducials(

@@ -18,7 +18,7 @@ from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, quoted
+from photogram.messages import quoted
 
 __all__ = ["Expected", "Laid", "Lying", "MarkReadings", "ScannedPhoto", "Seen", "way_by_images"]
 
@@ -306,7 +306,7 @@ class MarkReadings:
                 )
             ways = [ways[chosen]]
         photo.marks[:] = [list(places)[k] for k in ways[0].marks.tolist()]
-        self.tables.messages.append(Message(f"photo {photo.name}: its film lies {ways[0]}", table.path))
+        self.tables.tell(f"photo {photo.name}: its film lies {ways[0]}", table.path)
         return None
 
     def _by_images(self, photo: ScannedPhoto, ways: Sequence[Lying]) -> int | None:
@@ -357,7 +357,7 @@ class MarkReadings:
             chosen = self._by_images(photo, [Lying(q, False), Lying(q, True)])
             found = None if chosen is None else bool(chosen)
         if given is None and found is None:
-            self.tables.messages.append(
-                Message(f"photo {photo.name}: its marks do not tell the side; it is taken as not mirrored")
+            self.tables.tell(
+                f"photo {photo.name}: its marks do not tell the side; it is taken as not mirrored"
             )
         return bool(found if given is None else given)

@@ -193,18 +193,16 @@ class _Reader:
                     sd.append(photo.machine.readings.pitch * self.seen.deviations(photo.name))
             said = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
             if said:
-                self.tables.messages.append(Message(said, own.file))
+                self.tables.tell(said, own.file)
 
     def _remark(self, photo: ScannedPhoto) -> None:
         """Say it where a film stands on what is known of it beforehand."""
         model = self.kinds[photo.film].model
         if len(photo.marks) < LEAST[model]:
-            self.tables.messages.append(
-                Message(
-                    f"photo {photo.name}: {len(photo.marks)} fiducials, fewer than the {LEAST[model]} of the"
-                    f" {model} film: its unknowns stand on what is known of films beforehand, and on images"
-                    + ("" if len(photo.marks) > 1 else "; where it lay, its images know as far as its pose")
-                )
+            self.tables.tell(
+                f"photo {photo.name}: {len(photo.marks)} fiducials, fewer than the {LEAST[model]} of the"
+                f" {model} film: its unknowns stand on what is known of films beforehand, and on images"
+                + ("" if len(photo.marks) > 1 else "; where it lay, its images know as far as its pose")
             )
 
     def _starts(self) -> list[tuple[bool, Floats]]:
@@ -242,11 +240,9 @@ class _Reader:
             start = found[other][1]
             same = self.photos[other].film == photo.film and self.photos[other].machine is photo.machine
             if start is not None and same and found[other][0] == mirrored:
-                self.tables.messages.append(
-                    Message(
-                        f"photo {photo.name}: fewer than two fiducials; its film starts where that of"
-                        f" {self.photos[other].name} lies"
-                    )
+                self.tables.tell(
+                    f"photo {photo.name}: fewer than two fiducials; its film starts where that of"
+                    f" {self.photos[other].name} lies"
                 )
                 return start
         raise self.table.error(

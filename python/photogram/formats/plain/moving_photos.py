@@ -59,11 +59,8 @@ def read_timed(
         Names that are not there, line scanners without lines or times, what contradicts itself.
     """
     table = photos.table
-    on, motions, lines = (
-        _trajectories(table, trajectories),
-        _motions(tables, table),
-        _line_times(tables, photos),
-    )
+    on, lines = _trajectories(table, trajectories), _line_times(tables, photos)
+    motions = _motions(tables, table)
     clocks = scalars(tables, table, Clock, table.texts("photo"))
     rates = scalars(tables, table, Readout, table.texts("photo"), 1.0)
     words = table.texts("rig"), table.texts("sensor")

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, counted, quoted
+from photogram.messages import counted, quoted
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Range, Rate, Velocity
 from photogram.network.trajectories import Clock, Readout, Trajectory
@@ -71,7 +71,7 @@ class Subjects:
             found.append(own if inside else None)
         if out := sum(each is None for each in found):
             text = f"{counted(out, 'record')} at times that their trajectory does not reach are left out"
-            tables.messages.append(Message(text, table.path))
+            tables.tell(text, table.path)
         return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -95,6 +96,10 @@ class Tables:
         metre = 1.0 / UNITS[self.settings.length]
         required = schema.needed(table.columns)
         return settled(table, given, known, metre, required, self.names, name, self.messages)
+
+    def tell(self, text: str, path: Path | None = None) -> None:
+        """Add a remark, on a file."""
+        self.messages.append(Message(text, path))
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""
