@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from photogram.arguments.naming import natural_order
+from photogram.arguments.arrays import natural_order
 from photogram.giant.fields import (
     format_angle,
     format_deviations,

@@ -9,6 +9,7 @@ change nothing. An array that is such a copy already is shared.
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
@@ -30,6 +31,7 @@ __all__ = [
     "is_masked",
     "length",
     "names",
+    "natural_order",
     "number",
     "numbers",
     "one_of",
@@ -298,3 +300,12 @@ def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]
     """Return the standard deviations (n, k) of matrices of covariances (n, k, k)."""
     deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     return deviations
+
+
+_DIGITS = re.compile("([0-9]+)")
+
+
+def natural_order(name: str) -> list[tuple[int, str]]:
+    """Return the key by which people sort names: character by character, but runs of digits as numbers."""
+    parts = _DIGITS.split(name)
+    return [(int(part), "") if place % 2 else (-1, part) for place, part in enumerate(parts)]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.naming import natural_order
+from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.crs import axes_of, has_place, is_on, to_system
