@@ -129,14 +129,11 @@ def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Call
     ModuleNotFoundError
         pyarrow is not installed.
     """
-    parquet = _module()
+    from pyarrow import parquet, types  # take long to import
+
     table = _table(columns, about)
     repeated = [each.name for each in columns if isinstance(each.values, Repeated)]
-    kinds = {
-        name: kind.value_type if _is_list(kind) else kind
-        for name, kind in zip(table.schema.names, table.schema.types, strict=True)
-    }
-    few = [name for name in repeated if _is_dictionary(kinds[name])]
+    few = [name for name in repeated if types.is_dictionary(table.schema.field(name).type)]
 
     def write(file: BinaryIO) -> None:
         # Of numbers of measurements hardly two are alike: a dictionary of them takes ten times as long.
@@ -163,11 +160,10 @@ def read_sheet(path: Path) -> Sheet:
     ModuleNotFoundError
         pyarrow is not installed.
     """
-    parquet = _module()
-    import pyarrow
+    import pyarrow.parquet
 
     try:
-        table = parquet.read_table(path, page_checksum_verification=True)
+        table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
     columns = {name: _values(path, name, table.column(name)) for name in table.column_names}
@@ -189,12 +185,6 @@ def unpacked(triangles: np.ndarray) -> np.ndarray:
     found[:, rows, columns] = triangles
     found[:, columns, rows] = triangles
     return found
-
-
-def _module() -> Any:
-    import pyarrow.parquet  # takes long to import
-
-    return pyarrow.parquet
 
 
 def _table(columns: Sequence[Column], about: Mapping[str, str]) -> pyarrow.Table:
@@ -233,7 +223,7 @@ def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
 
     whole = column.combine_chunks()
     kind = column.type
-    if _is_dictionary(kind):
+    if pyarrow.types.is_dictionary(kind):
         return Repeated(
             whole.dictionary.to_pylist(), whole.indices.to_numpy(zero_copy_only=False).astype(np.int64)
         )
@@ -245,18 +235,6 @@ def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
         )
     if whole.null_count:
         raise InputError(f"the column {name} has empty cells", file=path)
-    if _is_list(kind):
+    if pyarrow.types.is_fixed_size_list(kind):
         return whole.flatten().to_numpy(zero_copy_only=False).reshape(len(whole), kind.list_size)
     return whole.to_numpy(zero_copy_only=False)
-
-
-def _is_dictionary(kind: Any) -> bool:
-    import pyarrow
-
-    return bool(pyarrow.types.is_dictionary(kind))
-
-
-def _is_list(kind: Any) -> bool:
-    import pyarrow
-
-    return bool(pyarrow.types.is_fixed_size_list(kind))

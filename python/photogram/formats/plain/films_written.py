@@ -264,10 +264,7 @@ class WrittenFilms:
         return {
             "camera": [row[0] for row in rows],
             "fiducial": [row[1] for row in rows],
-            "x": places[:, 0],
-            "y": places[:, 1],
-            "sd_x": sd[:, 0],
-            "sd_y": sd[:, 1],
+            **columns_of(("x", "y", "sd_x", "sd_y"), np.hstack([places, sd])),
         }
 
     def _images(self) -> dict[str, Any]:
