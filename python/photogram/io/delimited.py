@@ -312,21 +312,21 @@ class ColumnTable:
             row, column = missing[0].tolist()
             raise self.error(row, f"column {columns[column]}: {why}")
 
-    def flags(self, column: str, default: bool = True) -> Bools:
-        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0).
+    def flags(self, column: str) -> Bools:
+        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true.
 
         Raises
         ------
         InputError
             Another word.
         """
-        values = np.full(self.count, default)
+        values = np.ones(self.count, dtype=bool)
         if column in self.columns:
             for row, cell in enumerate(self.texts(column)):
                 word = cell.lower()
                 if word and word not in TRUE | FALSE:
                     raise self.error(row, f"column {column}: {quoted(cell)} is neither true nor false")
-                values[row] = word in TRUE if word else default
+                values[row] = not word or word in TRUE
         return values
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.io.files import read_lines
-from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
+from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.messages import listed, quoted
 
@@ -35,13 +35,13 @@ class Row:
     commas: bool = False
     """Whether decimals may have commas: these do not stand between cells."""
 
-    def integer(self, column: str, default: int | None = None, *, highest: int = LARGEST_INTEGER) -> int:
+    def integer(self, column: str, default: int | None = None) -> int:
         """Return a whole number that is not negative; `default` where the cell or the column is missing."""
         text = self.cells.get(column, "")
         if not text and default is not None:
             return default
         try:
-            return whole_number(text, highest=highest)
+            return whole_number(text)
         except ValueError as error:
             raise self.place.error(f"{column} {error}") from None
 

@@ -278,24 +278,17 @@ def abandon_all() -> None:
         _live[-1].abandon()
 
 
-def write_whole(files: Mapping[Path, Content], inputs: Iterable[Path] = ()) -> None:
-    """Write files so that all are there, or none; see :class:`OutputSet`.
-
-    Parameters
-    ----------
-    files
-        Contents by path.
-    inputs
-        Files that are read: none is written over.
+def write_whole(files: Mapping[Path, Content]) -> None:
+    """Write contents by path so that all are there, or none.
 
     Raises
     ------
     InputError
-        An output is an input, a directory, or another output.
+        An output is a directory, or another output.
     OSError
         A file cannot be written; what was there has not changed.
     """
-    with OutputSet(inputs) as outputs:
+    with OutputSet() as outputs:
         for path, content in files.items():
             outputs.write(path, content)
 
