@@ -223,4 +223,4 @@ def topocentric_remarks(project: Project) -> list[str]:
 def _origin(block: Block) -> Floats:
     """Return (1, 3) the place amid the photos, on the ellipsoid."""
     middle = np.degrees(np.median(block.photo_positions[:, :2], axis=0))
-    return np.array([[*np.radians(np.round(middle / ROUND_ORIGIN) * ROUND), 0.0]])
+    return np.array([[*np.radians(np.round(middle / ROUND_ORIGIN) * ROUND_ORIGIN), 0.0]])
