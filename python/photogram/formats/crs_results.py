@@ -28,6 +28,8 @@ _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
 DEGREE = 180.0 / np.pi
 """Of a radian."""
+MOST = 500
+"""Points that are listed; the tables have all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,10 +265,6 @@ def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
 
 def _turned(turns: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.einsum("nij,nj->ni", turns, vectors))
-
-
-MOST = 500
-"""Points that are listed; the tables have all."""
 
 
 def placed_section(found: Placed) -> Section:

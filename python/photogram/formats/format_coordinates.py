@@ -29,6 +29,8 @@ NOMINAL_MM = 0.01
 """Side of a pixel where nothing says how large they are: rays are the same."""
 ROUND = 100
 """Pixels: to whole ones of these go widths and heights that nothing says."""
+ROUND_ORIGIN = 1e-4
+"""Degrees to which the origin is rounded; its height is 0."""
 
 
 def in_pixels(project: Project) -> Project:
@@ -126,10 +128,6 @@ def _size(camera: Camera, xy: Floats) -> Size:
     reach = np.abs(xy).max(axis=0, initial=1.0) * (2 if camera.image_y == "up" else 1)
     width, height = (ROUND * math.ceil(each / ROUND) for each in reach.tolist())
     return width, height
-
-
-ROUND_ORIGIN = 1e-4
-"""Degrees to which the origin is rounded; its height is 0."""
 
 
 def in_topocentric(project: Project) -> Project:

@@ -37,6 +37,10 @@ BETTER = 3.0
 """How much better rotations must fit transposed to be taken so."""
 LEAST, MOST = 2.0, 3000.0
 """Millimetres between which principal distances of cameras lie."""
+NOMINAL = 100.0
+"""Principal distance in millimetres where nothing says how large pixels are: rays are the same."""
+SIDE = -0.02
+"""u3 of unit directions beyond which a perspective camera has no picture."""
 
 
 @dataclass
@@ -175,12 +179,6 @@ def _misfit(project: Project) -> float:
     )
     found = agreement(loose.replace(starts=complete_positions(loose)))
     return found.median if found.images else 0.0
-
-
-NOMINAL = 100.0
-"""Principal distance in millimetres where nothing says how large pixels are: rays are the same."""
-SIDE = -0.02
-"""u3 of unit directions beyond which a perspective camera has no picture."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from photogram.messages import quoted
 __all__ = ["Tree", "holding", "read_json", "to_json", "unknown"]
 
 _FORM = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
+LARGEST = 1e300
 
 
 def to_json(document: object) -> bytes:
@@ -55,9 +56,6 @@ def holding(what: str, path: Path | None = None) -> Iterator[None]:
         raise InputError(f"holds no {what}: {error} is missing", file=path) from None
     except (AttributeError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"holds no {what}: {error}", file=path) from None
-
-
-LARGEST = 1e300
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ LONGEST = 1_000
 
 _WHOLE = re.compile(r"\+?[0-9]+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_GROUPS = re.compile(r"[+-]?\d{1,3}(?:(?P<mark>['’ \u00a0\u202f.,])\d{3})+(?!\d)")
+_SIMPLE = re.compile(r"[+-]?\d*\.?\d*(?:[eE][+-]?\d+)?")
+_MARKED = re.compile(r"[+-]?\d[\d'’ \u00a0\u202f.,]*(?:[eE][+-]?\d+)?")
+_BLANKS = re.compile(r"(?<=\d)['’ \u00a0\u202f](?=\d{3}(?!\d))")
 
 
 def is_whole_number(text: str) -> bool:
@@ -64,12 +68,6 @@ def finite_number(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{quoted(text)} is not a number")
     return value
-
-
-_GROUPS = re.compile(r"[+-]?\d{1,3}(?:(?P<mark>['’ \u00a0\u202f.,])\d{3})+(?!\d)")
-_SIMPLE = re.compile(r"[+-]?\d*\.?\d*(?:[eE][+-]?\d+)?")
-_MARKED = re.compile(r"[+-]?\d[\d'’ \u00a0\u202f.,]*(?:[eE][+-]?\d+)?")
-_BLANKS = re.compile(r"(?<=\d)['’ \u00a0\u202f](?=\d{3}(?!\d))")
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ __all__ = ["Record", "Source", "parse_integer", "parse_real"]
 WIDTH = 80
 WIDE = 0.25
 """Zero bytes that no text of one byte a character has, as a part of all."""
+LARGEST_EXPONENT = 400
+"""Beyond every number in double precision, digits before and after the point included."""
+_REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d+)|([+-]\d+))?", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +117,6 @@ class Record:
     def blank(self, first: int, last: int) -> bool:
         """Whether a field is blank."""
         return not self.columns(first, last).strip(" ")
-
-
-LARGEST_EXPONENT = 400
-"""Beyond every number in double precision, digits before and after the point included."""
-
-_REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d+)|([+-]\d+))?", re.ASCII)
-_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
 
 def parse_real(field: str, decimals: int) -> Decimal:

@@ -33,6 +33,7 @@ _MODELS = dict(_photocore.camera_models())
 _EACH = ("all", "photo", "group")
 OTHER_LENS = 5.0
 """Millimetres by which a principal distance that is given differs from a certificate of another lens cone."""
+_SD = ("sd_radial", "sd_tangential")
 
 
 @dataclass(frozen=True)
@@ -286,9 +287,6 @@ def spread_over_photos(
             found.lines.append(cameras.lines[row])
         of_photos.append(places[row, own])
     return found, of_photos
-
-
-_SD = ("sd_radial", "sd_tangential")
 
 
 def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:

@@ -30,6 +30,8 @@ __all__ = ["Fiducials", "certified", "definite", "read_certificates", "read_fidu
 
 _MODELS = ("brown_forward", "brown")
 _ITSELF = "a camera of another year is a camera by itself"
+SD_MARK = 0.002
+"""mm, of places in a certificate that does not say it: they are printed to 0.001."""
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
@@ -199,10 +201,6 @@ def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: 
             file,
         )
     return found
-
-
-SD_MARK = 0.002
-"""mm, of places in a certificate that does not say it: they are printed to 0.001."""
 
 
 @dataclass(frozen=True)

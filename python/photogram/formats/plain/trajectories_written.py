@@ -21,6 +21,8 @@ __all__ = ["lost_smoothness", "shared_trajectories", "smoothness_table", "trajec
 
 _ANGLES = ANGLES["omega_phi_kappa"]
 _SD = deviation_columns(AXES)
+Place = tuple[str, str, int]
+"""Trajectory, position or rotation, and the number of a coefficient."""
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
@@ -212,10 +214,6 @@ def smoothness_table(block: Block) -> dict[str, Any]:
 def lost_smoothness(block: Block) -> int:
     """Return how many sums of coefficients the table has no place for: not of neighbours, or of too many."""
     return sum(place is None for _, place in _beside(block))
-
-
-Place = tuple[str, str, int]
-"""Trajectory, position or rotation, and the number of a coefficient."""
 
 
 def _beside(block: Block) -> list[tuple[Smoothness, Place | None]]:

@@ -36,6 +36,8 @@ Content = bytes | Callable[[BinaryIO], None]
 """What goes into a file: bytes, or what writes them piece by piece to the file that it is given."""
 
 PERMISSIONS = 0o777
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""The signals that ask a process to end."""
 
 
 class _Raw(io.RawIOBase):
@@ -327,10 +329,6 @@ def _keep_owner(descriptor: int, status: os.stat_result, mode: int) -> None:
         with suppress(OSError):
             os.fchown(descriptor, status.st_uid, status.st_gid)
     os.fchmod(descriptor, mode)
-
-
-ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""The signals that ask a process to end."""
 
 
 @contextmanager

@@ -37,6 +37,12 @@ DIRECTORY = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_NOFOLLO
 TRIALS = 16
 UNSUPPORTED = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EBADF)
 """What file systems answer that cannot put a directory on the disk at a wish."""
+MARK_NAME = re.compile(r"photogram-incomplete-([0-9a-f]{16})\.txt")
+MARK_TEXT = """\
+The files named below belong together, and photogram was ended while it put them in place:
+some may be those of an earlier run. Run the command again; this file goes when all of those
+that stand in this directory have been written again, or remove it yourself.
+"""
 
 
 class Staging:
@@ -170,14 +176,6 @@ def sync_directory(directory: str) -> None:
     except OSError as error:
         if error.errno not in UNSUPPORTED:
             raise
-
-
-MARK_NAME = re.compile(r"photogram-incomplete-([0-9a-f]{16})\.txt")
-MARK_TEXT = """\
-The files named below belong together, and photogram was ended while it put them in place:
-some may be those of an earlier run. Run the command again; this file goes when all of those
-that stand in this directory have been written again, or remove it yourself.
-"""
 
 
 def mark(staging: Staging, places: Iterable[str]) -> None:

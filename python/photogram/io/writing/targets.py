@@ -17,6 +17,7 @@ __all__ = ["Guard", "Target", "check_outputs", "follow", "naming"]
 
 MOST_LINKS = 40
 """Symbolic links that are followed, as by Linux."""
+_Identity = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,6 @@ def _own_descriptor(place: str) -> int | None:
         return None
     descriptors = rf"/proc/{os.getpid()}(/task/\d+)?/fd"
     return int(name) if re.fullmatch(descriptors, os.path.realpath(directory)) else None
-
-
-_Identity = tuple[int, int]
 
 
 class Guard:
