@@ -63,11 +63,11 @@ def read_timed(
     motions = _motions(tables, table)
     clocks = scalars(tables, table, Clock, table.texts("photo"))
     rates = scalars(tables, table, Readout, table.texts("photo"), 1.0)
-    words = table.texts("rig"), table.texts("sensor")
+    on_rigs, as_sensors = table.texts("rig"), table.texts("sensor")
     found: list[Timed] = []
     for place, row in enumerate(photos.rows.tolist()):
         name, camera, time = photos.names[place], photos.cameras[place], float(photos.times[place])
-        sensor, clock = _on_rig(table, row, *(own[row] for own in words), photos.taken[place], rigs)
+        sensor, clock = _on_rig(table, row, on_rigs[row], as_sensors[row], photos.taken[place], rigs)
         said = {
             "trajectory": on[row],
             "offset": clocks[row] or clock,

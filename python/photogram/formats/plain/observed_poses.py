@@ -204,8 +204,8 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
         raise table.error(row, "there are no angles")
     given = zip(first, second, vectors, turns, covariances, strict=True)
     return [
-        made(table, row, partial(Relative, names[one], names[other], *pose, covariance=covariance))
-        for row, (one, other, *pose, covariance) in enumerate(given)
+        made(table, row, partial(Relative, names[one], names[other], vector, turn, covariance=covariance))
+        for row, (one, other, vector, turn, covariance) in enumerate(given)
     ]
 
 
