@@ -269,7 +269,7 @@ def relative(
         import numpy as np
 
         from photogram.absolute_orientation.models import strip_of
-        from photogram.formats.reduced_coordinates_writing import given_control
+        from photogram.formats.reduced_coordinates import given_control
         from photogram.io.csv_text import csv_text
 
         project = read_project(job, project_path(job, path), added)

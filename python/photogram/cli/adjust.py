@@ -211,8 +211,7 @@ def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[
     """Return the tables of a result in another system, and a section of the page, where one is asked for."""
     if crs is None:
         return {}, []
-    from photogram.formats.crs_page import placed_section
-    from photogram.formats.crs_results import placed, placed_files
+    from photogram.formats.crs_results import placed, placed_files, placed_section
 
     found = placed(result, crs)
     return {f"in_crs/{name}": each for name, each in placed_files(found).items()}, [placed_section(found)]

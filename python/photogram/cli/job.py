@@ -282,7 +282,7 @@ class Job:
 
     def _remark(self) -> None:
         """Remark on inputs that belong to a set which an interrupted run may have left incomplete."""
-        from photogram.io.writing.markers import doubtful
+        from photogram.io.writing.staging import doubtful
 
         for path, mark in doubtful(self._inputs()).items():
             told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"

@@ -200,7 +200,7 @@ def described(project: Project) -> list[Section]:
     """Return what was read, as titled sections."""
     import numpy as np
 
-    from photogram.formats.motion_summary import motions
+    from photogram.formats.block_contents import motions
     from photogram.formats.plain.writing import known_cameras
     from photogram.formats.self_check import agreement, doubts
     from photogram.network.film_reduction import camera_unit

@@ -73,7 +73,7 @@ class Wanted:
 
     def options(self, unit: str) -> dict[str, Any]:
         """Return what :meth:`photogram.Result.statement` takes of it; `unit` is that of the block."""
-        from photogram.formats.sentences import read_sentences
+        from photogram.formats.plain.statement_settings import read_sentences
         from photogram.results.statement.request import length_of
 
         sizes = {"h": self.class_h, "v": self.class_v, "3d": self.class_3d}

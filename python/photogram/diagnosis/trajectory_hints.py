@@ -28,16 +28,14 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.directions import image_directions
 from photogram.network.geometry import geographic_to_geocentric
-from photogram.network.motion import timed_photos
+from photogram.network.motion import given_poses, timed_images, timed_photos
 from photogram.network.moving_photos import Lines, Moment, Timed
 from photogram.network.observations import Position
 from photogram.network.projecting import camera_of, projected
 from photogram.network.rays import meet
 from photogram.network.subset import kept_images
 from photogram.network.trajectories import Table, Trajectory
-from photogram.network.motion import timed_images
 from photogram.network.unknowns import LeverArm
-from photogram.network.motion import given_poses
 
 __all__ = [
     "flown_hints",

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from photogram.arguments.naming import natural_order
+from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera

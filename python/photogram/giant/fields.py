@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from decimal import Decimal
 
-from photogram.io.fields import parse_real
+from photogram.io.records import parse_real
 from photogram.show.angles import ARCSEC
 
 __all__ = [

@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.fields import parse_integer, parse_real
-from photogram.io.records import Record, Source
+from photogram.io.records import Record, Source, parse_integer, parse_real
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
 from photogram.stellar.options import Options

@@ -11,8 +11,8 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
+from photogram.io.json import Tree
 from photogram.io.toml import TomlFile
-from photogram.io.tree import Tree
 from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import nearest
 from photogram.targets.board import Board

@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_beginning, read_bytes
-from photogram.io.tree import Tree, read_json
+from photogram.io.json import Tree, read_json
 from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import Message
 from photogram.targets.board import Board
