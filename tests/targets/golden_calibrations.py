@@ -12,7 +12,7 @@ from given_targets import DATA, NAMES, golden
 
 from photogram import Camera, _photocore
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
-from photogram.targets.view_rows import view_rows
+from photogram.targets.new_views import view_rows
 from photogram.targets.vision import composed, of_vectors
 
 VIEWS = 20

@@ -14,7 +14,7 @@ from photogram.cli.options import PictureFormat
 if TYPE_CHECKING:
     from photogram.results.network import AdjustedNetwork
     from photogram.show.page import Drawing
-    from photogram.targets.appraisal_report import Worth
+    from photogram.targets.calibration_result import Worth
 
 __all__ = ["Pictures"]
 
@@ -64,7 +64,7 @@ class Pictures:
         """Return the pictures of what a calibration is worth as files."""
         if worth is None:
             return {}
-        from photogram.targets.appraisal_page import drawings
+        from photogram.targets.page import drawings
 
         return self.of_drawings(lambda: drawings(worth))
 

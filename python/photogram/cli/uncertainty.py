@@ -15,7 +15,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
-    from photogram.targets.appraisal_report import WorthOptions
+    from photogram.targets.calibration_result import WorthOptions
     from photogram.targets.cross_validation import Into
 
 __all__ = ["AS_USUAL", "NOT_GOOD_ENOUGH", "Uncertainty", "distances_of"]
@@ -80,7 +80,7 @@ class Uncertainty:
 
     def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""
-        from photogram.targets.appraisal_report import WorthOptions
+        from photogram.targets.calibration_result import WorthOptions
 
         return WorthOptions(
             distances=self.distances,

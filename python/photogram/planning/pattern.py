@@ -13,13 +13,14 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
-from photogram.planning.locations import locations
-from photogram.planning.motion import MotionQuality, motion_quality
 from photogram.planning.statistics import (
     ControlQuality,
+    MotionQuality,
     PhotoQuality,
     PointQuality,
     control_quality,
+    locations,
+    motion_quality,
     photo_quality,
     point_quality,
 )
@@ -97,7 +98,7 @@ class Pattern:
 
     @cached_property
     def point_locations(self) -> NDArray[np.str_]:
-        """(n,) `corner`, `edge` or `interior`, as :func:`photogram.planning.locations.locations` has them."""
+        """(n,) `corner`, `edge` or `interior`, as :func:`~photogram.planning.statistics.locations` has it."""
         stations = [self.photo_plan]
         if on_shared(self.block).any():
             # A strip of a scanner is as long as its trajectory.

@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.errors import InputError, RankError
-from photogram.targets.appraisal_report import Worth, WorthOptions
-from photogram.targets.calibration_result import Calibrated
+from photogram.targets.calibration_result import Calibrated, Worth, WorthOptions
 from photogram.targets.cross_validated import cross_validate
 from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.housings import housed_with, housing_of

@@ -10,13 +10,12 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
 from photogram.show.summary import Brief, Rows
-from photogram.targets.datums import fixed_points
-from photogram.targets.difference_test import DifferenceTest
+from photogram.targets.cross_validation import DifferenceTest
 from photogram.targets.housing import transformed
-from photogram.targets.imaging import imaged, unknown_of, values_of
 from photogram.targets.maps import distance_text, image_grid
 from photogram.targets.motion_fit import Criterion, Fitted, differences_at, fitted_motion, points_at
-from photogram.targets.projection import of_functions, point_partials, worst
+from photogram.targets.projection import fixed_points, of_functions, point_partials, worst
+from photogram.targets.vision import imaged, unknown_of, values_of
 
 __all__ = ["CameraDifference", "Side", "compared"]
 
@@ -39,7 +38,7 @@ class Side:
     covariance
         (p, p) of its parameters; None where it is not known.
     rows
-        (6, p) the datum `corners` (:func:`photogram.targets.datums.fixed_points`); None with `covariance`.
+        (6, p) the datum `corners` (:func:`~photogram.targets.projection.fixed_points`); None as `covariance`.
     """
 
     name: str

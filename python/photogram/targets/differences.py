@@ -12,9 +12,9 @@ from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.calibration_difference import CameraDifference, Side, compared
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.datums import datum_rows
 from photogram.targets.housings import camera_number, housing_of, size_of
 from photogram.targets.motion_fit import Criterion
+from photogram.targets.projection import datum_rows
 from photogram.targets.uncertainty import checked_distance
 
 __all__ = ["difference"]

@@ -13,8 +13,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
-from photogram.targets.imaging import unknown_of
-from photogram.targets.vision import cross_matrices
+from photogram.targets.vision import cross_matrices, unknown_of
 
 __all__ = ["Housing", "SeenCorners", "mean_motion", "transformed"]
 

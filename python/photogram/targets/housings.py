@@ -12,8 +12,7 @@ from photogram.errors import InputError
 from photogram.network.knots import Knot
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
-from photogram.targets.imaging import unknown_of
-from photogram.targets.vision import sensor_steps
+from photogram.targets.vision import sensor_steps, unknown_of
 
 __all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
 

@@ -12,8 +12,7 @@ from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import hull, outside
 from photogram.show.summary import Brief, Rows
-from photogram.targets.datums import DatumName
-from photogram.targets.projection import worst
+from photogram.targets.projection import DatumName, worst
 
 __all__ = ["UncertaintyCurve", "UncertaintyMap", "distance_text", "image_grid"]
 

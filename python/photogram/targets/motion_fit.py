@@ -15,8 +15,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
-from photogram.targets.imaging import imaged, motion_partials, rays
-from photogram.targets.vision import moved_by
+from photogram.targets.vision import imaged, motion_partials, moved_by, rays
 
 __all__ = ["Criterion", "Fitted", "differences_at", "fitted_motion", "points_at"]
 

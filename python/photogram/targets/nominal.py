@@ -10,10 +10,9 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import number
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
-from photogram.targets.families import FAMILIES
-from photogram.targets.first_camera import NARROW, usual_models
-from photogram.targets.knot_weights import WEAK
+from photogram.targets.first_camera import FAMILIES, NARROW, usual_models
 from photogram.targets.lens_fit import KNOTS, fitted, free_names, grid_of_pixels, lens_of
+from photogram.targets.regularisation import WEAK
 
 __all__ = ["nominal_camera", "weakly_known"]
 

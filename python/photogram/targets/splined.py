@@ -11,8 +11,8 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import Knot, beyond_knots
 from photogram.network.observations.prior import Prior
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.imaging import TURNED
 from photogram.targets.lens_fit import field_of, grid_of_pixels
+from photogram.targets.vision import TURNED
 
 __all__ = ["Spline", "spline_lines", "splines"]
 

@@ -7,12 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import dataclass
 from photogram.show.page import Fact, Tone, significant
 from photogram.show.quantity import Axis, Quantity
-from photogram.targets.board_fit import STRETCHES, board_fit
 from photogram.targets.calibration_result import Calibrated
 
-__all__ = ["board_facts", "view_rms", "views", "worst_points"]
+__all__ = [
+    "BoardFit",
+    "board_facts",
+    "board_fit",
+    "moved_lines",
+    "prior_shift",
+    "view_rms",
+    "views",
+    "worst_points",
+]
 
 LISTED = 10
 """Points of the board that a report names at most: those that fit worst."""
@@ -127,3 +136,102 @@ def _told(calibrated: Calibrated, row: int, tests: Floats) -> str:
     apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in zip("xyz", off, strict=True))
     name, much = result.block.point_ids[row], f"{tests.max():.1f} standard deviations"
     return f"point {name}: {apart} {unit} off its place, {much}"
+
+
+STRETCHES = ("scale x", "scale y", "shear")
+"""The affine part of the spacing."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoardFit:
+    """The adjusted points of a board against their nominal places.
+
+    Attributes
+    ----------
+    plane
+        (3,) a, b, c of z = a + b x + c y, fitted to the adjusted points.
+    rms_out_of_plane
+        Of z about it, in the unit of the board.
+    stretch, sd
+        (3,) in ppm, with standard deviations: by how much the spacing along x and along y is longer than it
+        should be, and the sine of what the angle between columns and rows lacks of 90 degrees.
+    """
+
+    plane: Floats
+    rms_out_of_plane: float
+    stretch: Floats
+    sd: Floats
+
+
+def board_fit(calibrated: Calibrated) -> BoardFit | None:
+    """Return what was found of the board; None where its points were held, or fewer than four were seen.
+
+    The adjusted places are fitted to the nominal ones, (x, y) = t + M (X, Y), all points alike. With columns
+    m, n of M the stretches are |m| - 1, |n| - 1 and m'n.
+    """
+    result, board = calibrated.result, calibrated.calibration.board
+    seen = np.flatnonzero(result.used_points)
+    if calibrated.calibration.shape != "points" or len(seen) < 4:
+        return None
+    nominal, found = board.places[seen], result.point_positions[seen]
+    design = np.column_stack([np.ones(len(seen)), nominal[:, :2]])
+    solve = np.linalg.pinv(design)
+    plane = solve @ found[:, 2]
+    away = found[:, 2] - design @ plane
+    fitted = (solve @ found[:, :2])[1:]  # rows m and n
+    lengths = np.linalg.norm(fitted, axis=1)
+    stretch = np.array([*(lengths - 1), fitted[0] @ fitted[1]])
+    # Partials of |m|, |n| and m'n by m and n, which are linear in the points.
+    units = fitted / lengths[:, np.newaxis]
+    by_rows = np.zeros((3, 2, 2))
+    by_rows[0, 0], by_rows[1, 1] = units
+    by_rows[2] = fitted[::-1]
+    by_points = np.einsum("rij,in->rnj", by_rows, solve[1:])
+    partials = np.concatenate([by_points, np.zeros((3, len(seen), 1))], axis=2).reshape(3, -1)
+    covariance = result.covariance(("point", [result.block.point_ids[row] for row in seen.tolist()]))
+    sd = np.sqrt(np.einsum("ri,ij,rj->r", partials, covariance, partials))
+    return BoardFit(plane, float(np.sqrt(np.mean(away**2))), 1e6 * stretch, 1e6 * sd)
+
+
+MOVED = 0.2
+"""Of a standard deviation: what moves less is no matter."""
+
+
+def prior_shift(calibrated: Calibrated) -> list[Quantity]:
+    """Return how far priors moved each unknown parameter, and that over its sd; nothing without priors.
+
+    The adjustment without the priors is where the one with them began.
+    """
+    before = calibrated.unregularised
+    if before is None:
+        return []
+    names, changes, axes = list[str](), list[float](), list[Axis]()
+    of_sd = list[float]()
+    for own, free in zip(calibrated.cameras, before.cameras, strict=True):
+        for k in own.estimated:
+            names.append(f"{own.name} {own.names[k]}")
+            axes.append(Axis.of(own.names[k], own.camera.unit_of(own.names[k])))
+            changes.append(float(own.values[k] - free.values[k]))
+            of_sd.append(changes[-1] / float(own.sd[k]))
+    return [
+        Quantity(np.array(names, dtype=object), (), "name", "parameter", "parameter", head="Parameter"),
+        Quantity(
+            np.array(changes), tuple(axes), "value", None, "change", head="Moved", of=np.arange(len(names))
+        ),
+        Quantity(np.array(of_sd), (), "number", None, "over_sd", head="Over its sd"),
+    ]
+
+
+def moved_lines(calibrated: Calibrated) -> list[str]:
+    """Return the largest of it in a line for each parameter that moved by more than a fifth of its sd."""
+    table = prior_shift(calibrated)
+    if not table:
+        return []
+    names, changes, of_sd = (each.values for each in table)
+    largest = int(np.argmax(np.abs(of_sd)))
+    lines = [f"largest: {names[largest]} by {of_sd[largest]:+.2f} of its standard deviation"]
+    return lines + [
+        f"{name} moved by {change:+.3g}, {over:+.2f} of its standard deviation"
+        for name, change, over in zip(names, changes, of_sd, strict=True)
+        if abs(over) > MOVED
+    ]

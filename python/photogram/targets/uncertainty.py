@@ -13,12 +13,11 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.knots import beyond_knots
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.datums import DatumName, datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.housings import camera_number, housing_of, size_of
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
 from photogram.targets.motion_fit import points_at
-from photogram.targets.projection import projection_cofactors, worst
+from photogram.targets.projection import DatumName, datum_rows, projection_cofactors, worst
 
 __all__ = ["checked_distance", "projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"]
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from photogram.targets.output.rig import Rig
-from photogram.targets.output.terms import Terms, terms_of
+from photogram.targets.output.rig import Rig, Terms, terms_of
 from photogram.targets.output.yaml import figures
 
 __all__ = ["kalibr_camchain"]

@@ -7,8 +7,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.results.cameras import AdjustedCamera
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.output.rig import Rig
-from photogram.targets.output.terms import TERMS, Terms, terms_of
+from photogram.targets.output.rig import TERMS, Rig, Terms, terms_of
 from photogram.targets.output.yaml import matrix
 from photogram.targets.vision import cross_matrices
 

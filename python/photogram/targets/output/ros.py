@@ -6,8 +6,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.targets.output.rig import Rig
-from photogram.targets.output.terms import Terms, terms_of
+from photogram.targets.output.rig import Rig, Terms, terms_of
 from photogram.targets.output.yaml import quoted, ros_matrix
 
 __all__ = ["ros_camera_info"]
