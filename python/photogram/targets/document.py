@@ -1,6 +1,6 @@
 """The JSON document of a calibration, and its maps as files.
 
-The document (`docs/json.md`) is that of the block, with the board, the views and what the calibration is worth.
+The document (`docs/json.md`) is that of the block, with the board, the views and what it is worth.
 """
 
 from __future__ import annotations
