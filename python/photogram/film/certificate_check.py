@@ -109,14 +109,8 @@ def difference_of(
 ) -> DistanceDifference:
     """Compare a distance with the coordinates of its marks; explain what differs by more than 0.010 mm.
 
-    Parameters
-    ----------
-    first, second
-        The marks.
-    typed
-        All figures as they stand in the certificate, by their fields.
-    usual
-        Usual places of marks (mm), where they are known.
+    `typed` are all figures as they stand in the certificate, by their fields; `usual` the usual places of
+    marks (mm), where they are known.
     """
     name = f"{first}-{second}"
     fields = [*(f"{mark}.{axis}" for mark in (first, second) for axis in "xy"), name]
@@ -134,16 +128,9 @@ def explained(
     """Return the single changes that bring a distance and four coordinates together.
 
     In the order of the kinds of slips and, among changes of a kind, by how far from its usual place the
-    farthest of both marks then is; where these are not known, by what is left.
-
-    Parameters
-    ----------
-    fields
-        x and y of the one and of the other mark, then the distance.
-    typed
-        The figures by these.
-    places
-        Usual coordinates by the same fields, as far as they are known.
+    farthest of both marks then is; where these are not known, by what is left. Fields are x and y of the one
+    and of the other mark, then the distance; `typed` the figures by these, `places` usual coordinates as far
+    as they are known.
     """
     found: list[tuple[tuple[int, float, int, int], Explanation]] = []
     kinds = get_args(How)

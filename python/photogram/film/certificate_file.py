@@ -53,10 +53,7 @@ _KEYS = (
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the fields of a :class:`~photogram.film.certificate.Certificate` from a file.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, is no TOML, or has what is not known or cannot be used.
+    InputError: the file cannot be read, is no TOML, or has what is not known or cannot be used.
     """
     table = read_document(path, {"certificate": _KEYS}).table("certificate")
     if (unit := table.text("unit", "mm")) != "mm":
@@ -298,11 +295,8 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
 
     Marks with `use` off are left out, and remarked on. A table `covariances` beside it (`kind, name, first,
     second, covariance`; kind `fiducials`) takes the place of the standard deviations of what it names.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, lacks a column, has other ones, or several cameras of which none is chosen.
+    InputError: the file cannot be read, lacks a column, has other ones, or several cameras of which none is
+    chosen.
     """
     table = read_columns(path, known=_COLUMNS, numbers=_NUMBERS)
     table.require("camera", "fiducial", "x", "y")

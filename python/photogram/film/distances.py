@@ -305,17 +305,8 @@ def with_datum(xy: Floats, covariance: Floats) -> tuple[Floats, int]:
     images by the principal point and kappa: nothing that can be estimated depends on s, but for the principal
     point, to whose variance s^2/n is added.
 
-    Parameters
-    ----------
-    xy
-        (n, 2) places of the marks, mm.
-    covariance
-        (2n, 2n) theirs, x and y of a mark behind each other, mm^2.
-
-    Raises
-    ------
-    InputError
-        A covariance that is singular otherwise.
+    Places are (n, 2) mm, their covariance (2n, 2n) mm^2, x and y of a mark behind each other. InputError: a
+    covariance that is singular otherwise.
     """
     values, vectors = np.linalg.eigh(covariance)
     free = values < SINGULAR * values[-1]

@@ -144,10 +144,7 @@ class LensParameters:
 def fit_curve(table: RadialTable, focal_length: float, sd_focal_length: float, terms: int) -> Curve:
     """Fit a table by k0 and some odd terms.
 
-    Raises
-    ------
-    InputError
-        There are fewer values than unknowns, or two of one angle that leave these undetermined.
+    InputError: there are fewer values than unknowns, or two of one angle that leave these undetermined.
     """
     radius = focal_length * np.tan(table.angle)
     if len(np.unique(radius)) < terms + 1:
@@ -171,10 +168,7 @@ def fit_curve(table: RadialTable, focal_length: float, sd_focal_length: float, t
 def curves_of(table: RadialTable, focal_length: float, sd_focal_length: float) -> tuple[Curve, ...]:
     """Return the curves with one odd term, two ...: at most n - 3 of n angles, and three.
 
-    Raises
-    ------
-    InputError
-        Fewer than four angles.
+    InputError: fewer than four angles.
     """
     most = min(MOST_TERMS, len(np.unique(table.angle)) - 3)
     if most < 1:
@@ -287,15 +281,7 @@ class Tangential:
 
 
 def of_profile(radius: Floats, displacement: Floats, sd: float) -> tuple[float, float]:
-    """Return J1 and its standard deviation by a fit of P(r) = J1 r^2.
-
-    Parameters
-    ----------
-    radius, displacement
-        (n,) mm.
-    sd
-        Of a displacement, mm.
-    """
+    """Return J1 and its standard deviation by a fit of P(r) = J1 r^2 to (n,) displacements of an sd, mm."""
     fit = Fit.of(displacement, sd**2 * np.eye(len(radius)), radius[:, np.newaxis] ** 2)
     return float(fit.parameters[0]), math.sqrt(float(fit.cofactors[0, 0]))
 
@@ -338,21 +324,8 @@ def of_semi_diagonals(angle: Floats, distortion: Mapping[str, Floats], sd: float
     """Return the mean of four semi-diagonals, and what opposite ones differ by.
 
     What is left, half of ll + ur - ul - lr, has the variance of a single reading, and gives the standard
-    deviation of the mean.
-
-    Parameters
-    ----------
-    angle
-        (n,) rad.
-    distortion
-        (n,) mm along each of `SEMI_DIAGONALS`.
-    sd
-        Of a mean, where it is known.
-
-    Raises
-    ------
-    InputError
-        Readings along the four that leave nothing from which a standard deviation could be found.
+    deviation of the mean, unless this is given (mm). Angles are (n,) rad, distortion (n,) mm along each of
+    `SEMI_DIAGONALS`. InputError: readings that leave nothing from which a standard deviation could be found.
     """
     ll, ul, ur, lr = (np.asarray(distortion[name], float) for name in SEMI_DIAGONALS)
     single = math.sqrt(float(np.mean(((ll + ur - ul - lr) / 2) ** 2)))

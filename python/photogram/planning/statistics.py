@@ -268,16 +268,8 @@ def point_quality(
 ) -> list[PointQuality]:
     """Return the quality of new points by number of rays, by location, and of all; groups without points too.
 
-    Parameters
-    ----------
-    result
-        The predicted block.
-    point_sd
-        (n, 3) standard deviations, linear unit.
-    locations
-        (n,) one of `LOCATIONS` each.
-    new
-        (n,) the points to be judged.
+    Standard deviations are (n, 3) in the linear unit, locations (n,) of `LOCATIONS`; `new` (n,) are the
+    points to be judged.
     """
     rays = result.point_rays
     groups = [("rays", name, (rays >= low) & (rays <= high)) for name, low, high in _CLASSES]

@@ -37,10 +37,7 @@ def is_board(path: Path) -> bool:
 def read_board(path: Path) -> Board:
     """Read a `board.toml`, or a target of Kalibr.
 
-    Raises
-    ------
-    InputError
-        Keys that there are not, values of another kind, what is no board: names file and line.
+    InputError: keys that there are not, values of another kind, what is no board: names file and line.
     """
     return _of_toml(path) if path.suffix.lower() == ".toml" else _of_kalibr(path)
 
@@ -48,10 +45,7 @@ def read_board(path: Path) -> Board:
 def picture_size(path: Path) -> tuple[int, int] | None:
     """Return width and height of the pictures that a `board.toml` was seen in, where it says them.
 
-    Raises
-    ------
-    InputError
-        Something else than two whole numbers.
+    InputError: something else than two whole numbers.
     """
     if path.suffix.lower() != ".toml" or "picture_size" not in (file := TomlFile(path)).content:
         return None

@@ -186,10 +186,7 @@ def adjusted_start(
 
 
 def _better(start: Start, result: Result) -> Start | None:
-    """Return what to adjust again, where the result says otherwise of what was held; None where it does not.
-
-    That are the standard deviation of corners, and the motion of the board.
-    """
+    """Return what to adjust again: other sd of corners, or motion of the board; None where all is as held."""
     found = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
     if (sd := _sd_to_assume(start, result)) is not None:
         found = found.replace(assumed=sd)
@@ -262,12 +259,8 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
     """Return what is to be said of the motion of a board by which offsets between cameras are known.
 
     Its speeds follow from poses that have errors: v = v_true + e. An offset comes out too small by the share
-    of E(e'e) in v'v, all by the weights of the poses, and has too small a standard deviation.
-
-    Raises
-    ------
-    RankError
-        A free offset, where a fifth or more are errors: the board stands still.
+    of E(e'e) in v'v, all by the weights of the poses, and has too small a standard deviation. RankError: a
+    free offset, where a fifth or more are errors: the board stands still.
     """
     messages = []
     start, result = calibrated.calibration, calibrated.result
@@ -313,9 +306,10 @@ ANY, TAKEN = 5.0, 4.0
 
 
 def marked_as_mrcal(result: Result) -> Bools:
-    """Return (m,) which images are taken out.
+    """Return (m,) which images mrcal takes out: only to reproduce its results.
 
-    None, unless a weighted residual is beyond 5 rms of all; then those with one beyond 4.
+    None, unless a weighted residual is beyond 5 rms of all; then those with one beyond 4. Snooping tests each
+    corner by its own accuracy.
     """
     weighted = np.abs(result.residuals / result.image_given_sd)
     rms = np.sqrt(np.nanmean(weighted**2))

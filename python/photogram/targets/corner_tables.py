@@ -82,10 +82,7 @@ def is_vnl(path: Path) -> bool:
 def read_vnl(path: Path, board: Board | None) -> Measured:
     """Read the text of mrcal: all corners of an image, row by row; `-` for what is missing.
 
-    Raises
-    ------
-    InputError
-        An image with another number of rows than the board has points, a cell that is no number.
+    InputError: an image with another number of rows than the board has points, a cell that is no number.
     """
     table = read_columns(path, known=("filename",), spelling=lambda names: names[:4])
     table.require("filename", "x", "y")
@@ -156,12 +153,8 @@ def _of_levels(table: ColumnTable) -> tuple[Floats, Bools]:
 def read_table(path: Path, board: Board | None) -> Measured:
     """Read a table with columns image (or time), point (or i, j; or tag, corner), x, y.
 
-    It may have camera, view, time, sd or level, and use.
-
-    Raises
-    ------
-    InputError
-        Columns that are missing, cells that are no numbers, points that the board does not have.
+    It may have camera, view, time, sd or level, and use. InputError: columns that are missing, cells that are
+    no numbers, points that the board does not have.
     """
     table = read_columns(path, known=("image", "time"), numbers=_NUMBERS, spelling=_spelled)
     return _of_table(table, board)

@@ -138,16 +138,9 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
 def parts_agree(
     a: Housing, b: Housing, names: Sequence[str], unit: tuple[float, float] = (1.0, math.inf)
 ) -> list[DifferenceTest]:
-    """Test the differences of two parts, of each camera, and of all cameras and sensors together.
+    """Test the differences of two parts, of each of K cameras, and of all cameras and sensors together.
 
-    Parameters
-    ----------
-    a, b
-        The parts.
-    names
-        Of the K cameras.
-    unit
-        Variance of unit weight with its degrees of freedom; infinite where it was known before.
+    `unit` is the variance of unit weight with its degrees of freedom; infinite where it was known before.
     """
     change, cofactors = changes_between(a, b)
     variance, freedom = unit

@@ -160,15 +160,7 @@ def findings(result: UnknownWeight) -> Findings:
 
 
 def judged(calibrated: Calibrated, worth: Worth | None = None) -> Calibrated:
-    """Return a calibration whose parts all have the verdict on it as a calibration.
-
-    Parameters
-    ----------
-    calibrated
-        As adjusted.
-    worth
-        What it is worth, where that is known.
-    """
+    """Return a calibration whose parts all have the verdict on it, by what it is worth if that is known."""
     own = verdict(_findings(calibrated, worth))
     result, snooped = copy(calibrated.result), calibrated.snooped
     vars(result)["verdict"] = own

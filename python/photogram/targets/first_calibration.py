@@ -53,16 +53,8 @@ class Rig:
 def connected(poses: Floats, cameras: Indices, views: Indices, count: int, turns: dict[int, Floats]) -> Rig:
     """Return the poses of cameras on their rig, each by the one before with which it has most views.
 
-    Parameters
-    ----------
-    poses
-        (P, 4, 4) board -> camera of each picture; NaN where it is not known.
-    cameras, views
-        (P,) of each picture.
-    count
-        K.
-    turns
-        Turns of the board that are not seen, by their orders; order 0 is none.
+    Poses are (P, 4, 4) board -> camera of each picture, NaN where not known; cameras and views (P,) of each,
+    `count` is K. `turns` are turns of the board that are not seen, by their orders; order 0 is none.
     """
     sensors, references = np.tile(np.eye(4), (count, 1, 1)), np.full(count, -1)
     found, turned = poses.copy(), np.zeros(len(poses), dtype=np.int64)

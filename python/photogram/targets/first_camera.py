@@ -81,20 +81,9 @@ def adjusted_views(
 ) -> Adjusted | None:
     """Adjust a camera and the poses of views; with less of it free where they do not determine all.
 
-    Parameters
-    ----------
-    camera
-        The camera, what is unknown of it free; nothing is where the poses alone are adjusted.
-    seen
-        The views, their corners in the order of their numbers.
-    poses
-        (P, 4, 4) board -> camera, to begin with.
-    tolerance
-        As of :func:`photogram.adjust`.
-
-    Returns
-    -------
-    What was adjusted; None where the adjustment fails, whatever is held.
+    What is unknown of the camera is free; nothing is where the poses alone are adjusted. Corners are in the
+    order of their numbers, poses (P, 4, 4) board -> camera to begin with; `tolerance` is that of
+    :func:`photogram.adjust`. None where the adjustment fails, whatever is held.
     """
     view, point = np.nonzero(np.isfinite(seen.xy[..., 0]))
     positions, attitudes = photo_poses(poses)
@@ -296,22 +285,10 @@ def first_camera(
 ) -> tuple[Camera, list[Message]]:
     """Return a camera with the wanted model, free, and remarks.
 
-    Parameters
-    ----------
-    seen
-        The pictures of the camera.
-    size, name
-        Width and height of them in pixels, and what the camera is called.
-    model
-        The wanted model; None for what is usual at its field of view. The knots of a splined one are fitted
-        to the usual one: many of them are where no corner is.
-    knots
-        Along columns and rows, of a splined one.
-
-    Raises
-    ------
-    InputError
-        A model that there is not, or one that cannot show corners that the camera sees.
+    `seen` are its pictures, `size` width and height of them in pixels. The model is what is usual at its
+    field of view where None is wanted; the `knots` of a splined one, along columns and rows, are fitted to
+    the usual one: many of them are where no corner is. InputError: a model that there is not, or one that
+    cannot show corners that the camera sees.
     """
     used = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MANY)))
     trial, adjusted = adjusted_family(used, trials(used, size))
@@ -378,13 +355,7 @@ def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str |
 
 
 def usual_models(field: float, farthest: float) -> list[str]:
-    """Return the models that are usual at a horizontal field of view, in order.
-
-    Parameters
-    ----------
-    field, farthest
-        Radians; the latter is how far from the axis anything is seen.
-    """
+    """Return the models that are usual, in order, at a horizontal field; `farthest` is off the axis (rad)."""
     if farthest >= WIDEST:
         return ["opencv_fisheye"]
     return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]

@@ -18,13 +18,7 @@ __all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
 
 
 def camera_number(calibrated: Calibrated, camera: int | str) -> int:
-    """Return the number of a camera by its number or name.
-
-    Raises
-    ------
-    InputError
-        There is no such camera.
-    """
+    """Return the number of a camera by its number or name; an InputError where there is no such one."""
     names = [each.name for each in calibrated.cameras]
     if isinstance(camera, str) and camera in names:
         return names.index(camera)
@@ -34,13 +28,7 @@ def camera_number(calibrated: Calibrated, camera: int | str) -> int:
 
 
 def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
-    """Return width and height of the pictures of a camera.
-
-    Raises
-    ------
-    InputError
-        Nobody has said.
-    """
+    """Return width and height of the pictures of a camera; an InputError where nobody has said."""
     size = calibrated.calibration.corners.sizes[camera]
     if size is None:
         name = calibrated.cameras[camera].name

@@ -106,16 +106,10 @@ class Points:
     roots: Floats | None = None
 
     def least(self, start: Moved, free: Sequence[int], moving: slice = HELD) -> Moved:
-        """Return what has the least sum of squares (Levenberg-Marquardt).
+        """Return what has the least sum of squares (Levenberg-Marquardt), from where it begins.
 
-        Parameters
-        ----------
-        start
-            Where it begins.
-        free
-            Numbers of the parameters that are free.
-        moving
-            Which of the six steps (dt, w) of the motion are: `slice(3, 6)` rotations.
+        `free` are the numbers of free parameters; `moving` says which of the six steps (dt, w) of the motion
+        are: `slice(3, 6)` rotations.
         """
         # Images are linear in knots: one step finds them.
         at, damping, close = start, FIRST, CLOSE
@@ -213,22 +207,10 @@ def is_perspective(camera: Camera) -> bool:
 def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int, int] = KNOTS) -> Camera:
     """Return a camera of a model with focal length and principal point of another, and no distortion.
 
-    Parameters
-    ----------
-    model
-        A model of `docs/cameras.md`, or a name of `LENS_TERMS`; its terms are free.
-    source
-        The camera that focal length, principal point, name and unit are taken from.
-    size
-        Width and height of its pictures, pixels.
-    knots
-        Along columns and rows, of a splined model; its field holds all pixels of the source, and a tenth
-        more. Its knots are free in place of its parameters.
-
-    Raises
-    ------
-    InputError
-        A model that there is not, or one that counts no columns and rows of pixels.
+    The model is one of `docs/cameras.md`, or a name of `LENS_TERMS`; its terms are free, of a splined one its
+    `knots` in place of its parameters: its field holds all pixels of the source, and a tenth more. Name and
+    unit are those of the source, `size` is width and height of its pictures. InputError: a model that there
+    is not, or one that counts no columns and rows of pixels.
     """
     own, count = ("opencv_pinhole", LENS_TERMS[model]) if model in LENS_TERMS else (model, None)
     models = dict(_photocore.camera_models())

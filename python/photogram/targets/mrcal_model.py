@@ -46,10 +46,7 @@ SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x
 def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera:
     """Return a camera, held, of its name and numbers in mrcal.
 
-    Raises
-    ------
-    InputError
-        A lens that is not taken, or another number of values.
+    InputError: a lens that is not taken, or another number of values.
     """
     said = model.removeprefix(PREFIX)
     if splined := SPLINED.fullmatch(said):
@@ -103,11 +100,8 @@ class _Free:
 def read_model(path: Path) -> Calibration:
     """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start.
 
-    Raises
-    ------
-    InputError
-        The file is no such text, holds no corners, or what is not taken: lenses that there are not, points
-        that were observed one by one, cameras that moved, values that were held.
+    InputError: the file is no such text, holds no corners, or what is not taken: lenses that there are not,
+    points that were observed one by one, cameras that moved, values that were held.
     """
     arrays = read_arrays(path, _packed(path))
     for name in ("observations_point", "observations_point_triangulated"):
@@ -143,10 +137,7 @@ def read_model(path: Path) -> Calibration:
 def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
     """Read the camera of a `.cameramodel`, held, and width and height of its pictures.
 
-    Raises
-    ------
-    InputError
-        The file is no such text, or its lens is not taken.
+    InputError: the file is no such text, or its lens is not taken.
     """
     content = _content(path)
     try:

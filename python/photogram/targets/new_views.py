@@ -173,14 +173,9 @@ class Suggestions(Brief):
 
 
 def shown_of(camera: Camera, size: Floats, places: Floats) -> tuple[Indices, Floats]:
-    """Return which points a picture would show, and their images; none where they are fewer than 12.
+    """Return which of (n, 3) points in its axes a picture would show, and their images; none below 12.
 
-    Parameters
-    ----------
-    camera, size
-        The camera, and (2,) width and height of its pictures.
-    places
-        (n, 3) the points in its axes.
+    `size` is (2,) width and height of the pictures of the camera.
     """
     xy = camera.project(places * TURNED)
     with np.errstate(invalid="ignore"):
@@ -297,12 +292,7 @@ class ViewRows:
 def view_rows(housing: Housing, pose: Floats, cameras: Indices, points: Indices) -> ViewRows:
     """Return the images of points of the board, each in one of the cameras, and their partials.
 
-    Parameters
-    ----------
-    housing, pose
-        The cameras, and the (4, 4) pose board -> camera 0 of the view.
-    cameras, points
-        (n,) of each image.
+    The pose is (4, 4) board -> camera 0 of the view; cameras and points are (n,) of each image.
     """
     xy, by_pose, by_point = (np.empty((len(points), 2, *more)) for more in ((), (6,), (3,)))
     by_common = np.zeros((len(points), 2, housing.common))

@@ -78,11 +78,6 @@ def weakly_known(camera: Camera, size: tuple[int, int]) -> Camera:
 
     So much a data sheet says; it makes any number of views determine the camera, and next to nothing of what
     they determine well. Knots have their usual weights.
-
-    Parameters
-    ----------
-    camera, size
-        The camera, and width and height of its pictures.
     """
     if camera.knots is not None:
         return camera.replace(knot_sd=WEAK) if camera.knot_unknowns else camera

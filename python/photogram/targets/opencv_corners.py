@@ -44,10 +44,8 @@ def is_npz(path: Path) -> bool:
 def read_storage(path: Path, board: Board | None) -> Measured:
     """Read `image_points` (views x corners x 2), and the board of `board_width`, `square_size` ...
 
-    Raises
-    ------
-    InputError
-        Matrices that are missing or of another shape, another number of corners than the board has points.
+    InputError: matrices that are missing or of another shape, another number of corners than the board has
+    points.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":
@@ -182,10 +180,8 @@ def _value(word: str) -> Any:
 def read_npz(path: Path, board: Board | None) -> Measured:
     """Read arrays `imgpoints` (views x corners x 2), and `objpoints`, a grid, where no board is given.
 
-    Raises
-    ------
-    InputError
-        No such arrays, those of Python objects, points of the board that are no grid, or differ in views.
+    InputError: no such arrays, those of Python objects, points of the board that are no grid, or differ in
+    views.
     """
     arrays = read_arrays(path, read_bytes(path))
     name = arrays.first("imgpoints", "image_points")

@@ -42,17 +42,10 @@ POINTS_TOGETHER = 4096
 def datum_rows(
     housing: Housing, camera: int, datum: DatumName, fixed: tuple[Floats, Floats, bool] | None = None
 ) -> Floats:
-    """Return (6, c + 6) T of a camera.
+    """Return (6, c + 6) T of a camera by the name of a datum.
 
-    Parameters
-    ----------
-    housing, camera
-        The cameras, and the number of one.
-    datum
-        Its name.
-    fixed
-        Of `image`: (n, 3) points in the axes of the camera that hold still, their (n, 2, 2) weights W,
-        and whether they are at finite distances.
+    Of `image`, `fixed` are (n, 3) points in the axes of the camera that hold still, their (n, 2, 2) weights
+    W, and whether they are at finite distances.
     """
     found = np.zeros((6, housing.common + 6))
     own = housing.parameters(camera)
@@ -77,16 +70,8 @@ def datum_rows(
 def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool = True) -> Floats:
     """Return (6, p) T by which the images of points move least when the camera's parameters change.
 
-    T = -(sum G' Pi' W Pi G)^-1 sum G' Pi' W K. At infinity there is no translation to find.
-
-    Parameters
-    ----------
-    camera, points
-        The camera, and (n, 3) points in its axes.
-    weights
-        (n, 2, 2) W of their images.
-    finite
-        Whether they are at finite distances.
+    T = -(sum G' Pi' W Pi G)^-1 sum G' Pi' W K of (n, 3) points in its axes with (n, 2, 2) weights W of their
+    images. At infinity, not `finite`, there is no translation to find.
     """
     normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
     for start in range(0, len(points), POINTS_TOGETHER):
@@ -137,14 +122,8 @@ def projection_cofactors(
 ) -> Floats:
     """Return (n, 2, 2) cofactors of the images of points at (n, 2) pixels; NaN where a pixel sees nothing.
 
-    Parameters
-    ----------
-    housing, camera
-        The cameras, and the number of one.
-    pixels, distance
-        Where, and how far from the centre of this camera; infinite: directions.
-    rows
-        (6, c + 6) the datum (:func:`photogram.targets.projection.datum_rows`).
+    The distance is from the centre of this camera, infinite of directions; `rows` are (6, c + 6) the datum
+    (:func:`datum_rows`).
     """
     cofactors = with_motion(housing, camera, rows)
     found = np.empty((len(pixels), 2, 2))

@@ -39,19 +39,8 @@ def regularised(
 ) -> list[Camera]:
     """Return cameras with the priors of mrcal on what is free in them.
 
-    Parameters
-    ----------
-    cameras
-        The cameras.
-    sizes
-        Width and height of their pictures.
-    observed
-        n: two for each corner of the board and picture.
-
-    Raises
-    ------
-    InputError
-        A camera whose pictures have no known size.
+    Sizes are width and height of their pictures: an InputError of one that is not known. `observed` is n: two
+    for each corner of the board and picture.
     """
     terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
     count = sum(map(len, terms))
@@ -106,19 +95,9 @@ def with_knot_sd(
 ) -> list[Camera]:
     """Return cameras whose free knots are observed as zero, radially and tangentially.
 
-    Parameters
-    ----------
-    cameras
-        The cameras.
-    knot_sd
-        Along the radius and across. None: `WEAK`, unless `regularise` says them.
-    regularise
-        Whose priors cameras have.
-
-    Raises
-    ------
-    InputError
-        Standard deviations of knots that there are not, or that are said twice; such that are not positive.
+    Along the radius and across with `knot_sd`, by default `WEAK`, unless `regularise` says whose priors
+    cameras have. InputError: standard deviations of knots that there are not, or that are said twice; such
+    that are not positive.
     """
     if knot_sd is not None:
         if not all(0 < each < np.inf for each in knot_sd):

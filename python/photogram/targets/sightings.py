@@ -140,13 +140,7 @@ class Sightings:
 
     @classmethod
     def of_corners(cls, board: Board, corners: Corners) -> Self:
-        """Return the corners that count, of all pictures.
-
-        Raises
-        ------
-        InputError
-            Points that the board does not have.
-        """
+        """Return the corners that count; InputError of points that the board does not have."""
         places = board.places
         beyond = corners.point >= len(places)
         if beyond.any():

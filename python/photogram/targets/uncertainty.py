@@ -161,13 +161,7 @@ def uncertainty_against_distance(
 
 
 def checked_distance(distance: float) -> float:
-    """Return a distance.
-
-    Raises
-    ------
-    InputError
-        It is not positive.
-    """
+    """Return a distance; an InputError where it is not positive."""
     if not distance > 0:
         raise InputError(f"a distance from the camera is positive, or infinite, not {distance:g}")
     return float(distance)

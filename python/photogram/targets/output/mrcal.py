@@ -176,12 +176,7 @@ def valid_region(found: UncertaintyMap, largest: float) -> Floats:
     """Return (n, 2) the closed outline of the pixels to which the worst sd stays below a bound.
 
     From the best known pixel of the map outwards in 90 directions, each as far as the standard deviation,
-    linear between pixels of the map, is not above the bound.
-
-    Raises
-    ------
-    InputError
-        No pixel of the map is as good.
+    linear between pixels of the map, is not above the bound. InputError: no pixel of the map is as good.
     """
     sd = np.where(np.isfinite(found.sd), found.sd, np.inf)
     row, column = np.unravel_index(np.argmin(sd), sd.shape)

@@ -119,13 +119,7 @@ class Rig:
         return np.asarray(self.sensors[camera] @ inverted(self.sensors[camera - 1]))
 
     def size(self, camera: int) -> tuple[int, int]:
-        """Return width and height of the pictures of a camera.
-
-        Raises
-        ------
-        InputError
-            They are not known.
-        """
+        """Return width and height of the pictures of a camera; an InputError where they are not known."""
         found = self.sizes[camera]
         if found is None:
             raise InputError(
