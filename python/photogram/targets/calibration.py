@@ -29,11 +29,9 @@ from photogram.targets.vision import FLIP, photo_poses
 
 __all__ = [
     "Calibration",
-    "adjusted_start",
     "checked_clocks",
     "marked_as_mrcal",
     "simulate_corners",
-    "snooped_start",
     "weighted_block",
 ]
 
@@ -120,7 +118,26 @@ class Calibration(Start):
         InputError
             Priors without the size of pictures.
         """
-        return adjusted_start(self, loss=loss, outliers=outliers, threads=threads, progress=progress)
+        if outliers is not None:
+            one_of("outliers", outliers, ("mrcal",))
+        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
+        start: Start = self
+        rounds = 0
+        while True:
+            # Knots that no image touches are determined by priors alone.
+            free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
+            if free is None:
+                result = adjust(weighted_block(start), **how, covariance="verdict", tolerance=FINELY)
+            else:
+                result = _with_priors(start, free, threads)
+            worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
+            if worse.any() and result.converged:
+                start = start.without(worse)
+            elif rounds < ROUNDS and (better := _better(start, result)) is not None:
+                start, rounds = better, rounds + 1
+            else:
+                break
+        return _ended(start, result, free if start.regularise else None)
 
     def snoop(self, **options: Any) -> Calibrated:
         """Take gross errors out one after the other, and adjust what is left.
@@ -137,7 +154,15 @@ class Calibration(Start):
         RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
             As of :func:`photogram.snoop`.
         """
-        return snooped_start(self, **options)
+        if self.regularise is not None and not _has_knots(self):
+            raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+        start = self.adjust().calibration if self.sync == "offset" else self
+        found = snoop(weighted_block(start), **options)
+        result = found.judged
+        assert isinstance(result, Result)
+        own = start.with_images_of(result.block)
+        told = replace(result, messages=[*own.messages, *result.messages])
+        return judged(Calibrated(calibration=own, result=told, snooped=found))
 
 
 ROUNDS = 8
@@ -147,42 +172,15 @@ FINELY = 1e-6
 """Of a standard deviation: where the steps of a splined lens end."""
 
 
-def adjusted_start(
-    start: Start,
-    *,
-    loss: Loss | None = None,
-    outliers: Literal["mrcal"] | None = None,
-    threads: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
-) -> Calibrated:
-    """Adjust cameras, sensors, views and the board together; see :meth:`Calibration.adjust`."""
-    if outliers is not None:
-        one_of("outliers", outliers, ("mrcal",))
-    rounds = 0
-    while True:
-        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
-        # Knots that no image touches are determined by priors alone.
-        free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
-        if free is None:
-            result = adjust(weighted_block(start), **how, covariance="verdict", tolerance=FINELY)
-        else:
-            result = _with_priors(start, free, threads)
-        worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
-        if worse.any() and result.converged:
-            start = start.without(worse)
-        elif rounds < ROUNDS and (better := _better(start, result)) is not None:
-            start, rounds = better, rounds + 1
-        else:
-            break
+def _ended(start: Start, result: Result, unregularised: Result | None) -> Calibrated:
+    """Return a calibration that was adjusted, with all that is to be said of it."""
     messages = [*start.messages, *result.messages]
     if start.sync == "offset":
         messages += checked_clocks(Calibrated(calibration=start, result=result))
     told = replace(result, messages=messages)
     if start.sd0 is None:
         told = with_unknown_weight(told)
-    return judged(
-        Calibrated(calibration=start, result=told, unregularised=free if start.regularise else None)
-    )
+    return judged(Calibrated(calibration=start, result=told, unregularised=unregularised))
 
 
 def _better(start: Start, result: Result) -> Start | None:
@@ -235,20 +233,6 @@ def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
     found = adjusted_again(weighted_block(start), free.options, free.state, threads=threads)
     assert isinstance(found, Result)
     return found
-
-
-def snooped_start(start: Start, **options: Any) -> Calibrated:
-    """Take gross errors out one after the other, and adjust what is left; see :meth:`Calibration.snoop`."""
-    if start.regularise is not None and not _has_knots(start):
-        raise InputError("gross errors are taken out without priors of cameras: regularise is None")
-    if start.sync == "offset":
-        start = adjusted_start(start).calibration
-    found = snoop(weighted_block(start), **options)
-    result = found.judged
-    assert isinstance(result, Result)
-    own = start.with_images_of(result.block)
-    told = replace(result, messages=[*own.messages, *result.messages])
-    return judged(Calibrated(calibration=own, result=told, snooped=found))
 
 
 NOTABLE, MOST = 0.01, 0.2

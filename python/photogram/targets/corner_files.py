@@ -26,6 +26,9 @@ MODEL = ".cameramodel"
 KEY = "optimization_inputs"
 """Of a model of mrcal that keeps its corners."""
 PICTURES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff", ".webp"})
+ENDINGS = frozenset(
+    {*(".vnl", ".csv", ".tsv", ".txt", ".yml", ".yaml", ".xml", ".json", ".npz", ".toml"), MODEL}
+)
 MOST = 2000
 """Files of a folder that are looked at."""
 
@@ -74,19 +77,7 @@ def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Pa
     models, boards = [], []
     corners: dict[Form, list[Path]] = {}
     for each in files_at(path):
-        if each.suffix.lower() not in (
-            ".vnl",
-            ".csv",
-            ".tsv",
-            ".txt",
-            ".yml",
-            ".yaml",
-            ".xml",
-            ".json",
-            ".npz",
-            ".toml",
-            MODEL,
-        ):
+        if each.suffix.lower() not in ENDINGS:
             continue
         if is_board(each):
             boards.append(each)

@@ -42,13 +42,16 @@ def _spelled(names: Sequence[str]) -> list[str]:
     return [own.get(name) or _SYNONYMS.get(name, name) for name in names]
 
 
+def _first_line(path: Path) -> str:
+    """Return the first line that is neither empty nor a comment."""
+    lines = (line.strip() for line in read_beginning(path).splitlines())
+    return next((line for line in lines if line and line[0] != "#"), "")
+
+
 def _header(path: Path) -> list[str]:
     """Return the columns of the first line that has any."""
-    for line in read_beginning(path).splitlines():
-        bare = line.strip()
-        if bare and not bare.startswith("#"):
-            return _spelled([cell.strip('" ').lower() for cell in bare.replace(";", ",").split(",")])
-    return []
+    cells = _first_line(path).replace(";", ",").split(",")
+    return _spelled([cell.strip('" ').lower() for cell in cells])
 
 
 def is_table(path: Path) -> bool:
@@ -63,10 +66,7 @@ def is_headless(path: Path) -> bool:
     """Return whether a file has rows of a time, a corner, x and y, and no header."""
     if path.suffix.lower() not in (".csv", ".txt"):
         return False
-    first = next(
-        (line for line in read_beginning(path).splitlines() if line.strip() and line.strip()[0] != "#"), ""
-    )
-    cells = first.replace(",", " ").split()
+    cells = _first_line(path).replace(",", " ").split()
     try:
         return len(cells) == len(HEADLESS) and all(finite_number(cell) >= 0 for cell in cells[:2])
     except ValueError:

@@ -9,7 +9,6 @@ import numpy as np
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.network.knots import Knot
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.vision import sensor_steps, unknown_of
@@ -60,15 +59,15 @@ def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
 def _housing(calibrated: Calibrated, cameras: list[int]) -> Housing:
     corners = calibrated.calibration.corners
     views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
-    poses = calibrated.poses[views]
+    poses, by_board = calibrated.poses[views], _points_by_board(calibrated)
     return Housing(
         cameras=tuple(calibrated.cameras[each].camera for each in cameras),
         sensors=calibrated.sensors[cameras],
         poses=poses,
         points=calibrated.points,
-        points_by_board=_points_by_board(calibrated),
+        points_by_board=by_board,
         seen=_seen(calibrated, cameras, views),
-        cofactors=_cofactors(calibrated, cameras, views, poses),
+        cofactors=_cofactors(calibrated, cameras, views, poses, by_board.shape[2]),
         weights=_weights(calibrated, cameras),
         variance=calibrated.result.covariance_scale,
     )
@@ -79,11 +78,6 @@ def _board_rows(calibrated: Calibrated) -> list[int]:
     if calibrated.calibration.shape != "points":
         return []
     return np.flatnonzero(calibrated.result.used_points).tolist()
-
-
-def _board_size(calibrated: Calibrated) -> int:
-    """Return how many unknowns the board has: coordinates of its points, or the two of its bend."""
-    return 3 * len(_board_rows(calibrated)) if calibrated.bend is None else 2
 
 
 def _points_by_board(calibrated: Calibrated) -> Floats:
@@ -112,13 +106,15 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCor
     )
 
 
-def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats) -> Floats:
-    """Return the cofactors of common unknowns and of the mean motion of the boards."""
+def _cofactors(
+    calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats, board: int
+) -> Floats:
+    """Return the cofactors of common unknowns, `board` of them of the board, and of its mean motion."""
     given = calibrated.result.block.cameras
     lengths = [len(each.names) + 2 * len(each.knot_unknowns) for each in given]
     starts = np.concatenate([[0], np.cumsum(lengths)])
     kept = [starts[each] + np.flatnonzero(unknown_of(calibrated.cameras[each].camera)) for each in cameras]
-    sensors, board = calibrated.sensors_adjusted(), _board_size(calibrated)
+    sensors = calibrated.sensors_adjusted()
     kept += [starts[-1] + 6 * sensors.index(each) + np.arange(6) for each in cameras[1:]]
     kept.append(starts[-1] + 6 * len(sensors) + np.arange(board))
     columns = np.concatenate(kept)
@@ -129,11 +125,6 @@ def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses
         partials[len(columns) :, before + 6 * view : before + 6 * view + 6] = each
     parts = ("cameras", "sensors", *(("board",) if board else ()), "views")
     return calibrated.combined(partials, parts)
-
-
-def _weight_of(knot: Knot) -> Floats:
-    """Return (2, 2) of the observation that a knot is 0."""
-    return np.zeros((2, 2)) if knot.covariance is None else np.asarray(np.linalg.inv(knot.covariance))
 
 
 def _weight_of_sensor(calibrated: Calibrated, camera: int) -> Floats:
@@ -148,15 +139,16 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
     """Return the inverse covariances of what was known before: of cameras, sensors, points and the bend."""
     block, rows = calibrated.result.block, _board_rows(calibrated)
     blocks = []
-    for each in cameras:
-        sd = block.cameras[each].deviations
+    for number in cameras:
+        camera = block.cameras[number]
+        sd = camera.deviations
         weighted = np.isfinite(sd[sd > 0])
         own = np.diag(np.where(weighted, 1 / sd[sd > 0] ** 2, 0.0))
-        covariance = block.cameras[each].prior_covariance
+        covariance = camera.prior_covariance
         if covariance is not None:
             own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
-        knots = [knot for knot in block.cameras[each].knot_unknowns if np.any(knot.sd)]
-        blocks += [own, *(_weight_of(knot) for knot in knots)]
+        knots = [knot.covariance for knot in camera.knot_unknowns if np.any(knot.sd)]
+        blocks += [own, *(np.zeros((2, 2)) if each is None else np.linalg.inv(each) for each in knots)]
     blocks += [_weight_of_sensor(calibrated, each) for each in cameras[1:]]
     points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
     bend = np.diag(1 / np.asarray(calibrated.calibration.sd_bend) ** 2)

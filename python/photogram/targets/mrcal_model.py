@@ -19,7 +19,6 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_text
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board
@@ -88,15 +87,6 @@ def freed(camera: Camera, model: str, core: bool, lens: bool) -> Camera:
 INDICES = "indices_frame_camintrinsics_camextrinsics"
 
 
-@dataclass(frozen=True)
-class _Free:
-    """What of a calibration was optimized."""
-
-    core: bool
-    lens: bool
-    warp: bool
-
-
 def read_model(path: Path) -> Calibration:
     """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start.
 
@@ -112,15 +102,15 @@ def read_model(path: Path) -> Calibration:
         raise InputError(f"its {KEY} hold no corners of a board", file=path)
     observed = arrays.numbers("observations_board", None, None, None, 3)
     indices = _indices(arrays, len(observed))
-    free = _freed(arrays)
-    cameras = _cameras(arrays, free)
+    core, lens, warped = _freed(arrays)
+    cameras = _cameras(arrays, core, lens)
     sensors, poses = _poses(arrays, indices, len(cameras))
     warp = arrays.numbers("calobject_warp", 2) if "calobject_warp" in arrays else np.zeros(2)
     board = Board(
         columns=observed.shape[2],
         rows=observed.shape[1],
         spacing=float(arrays.numbers("calibration_object_spacing")),
-        shape="bend" if free.warp else "held",
+        shape="bend" if warped else "held",
     )
     sizes = arrays.numbers("imagersizes", len(cameras), 2).astype(int).tolist()
     return Calibration(
@@ -182,22 +172,23 @@ def _indices(arrays: Arrays, count: int) -> Indices:
     return found
 
 
-def _freed(arrays: Arrays) -> _Free:
+def _freed(arrays: Arrays) -> tuple[bool, bool, bool]:
+    """Return whether cores, terms of lenses or knots, and the bend of the board were optimized."""
     core = arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core")
     lens = arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
     for held in ("do_optimize_frames", "do_optimize_extrinsics"):
         if held in arrays and not arrays.says(held):
             raise arrays.error(held, "is false: poses that were held are not taken")
-    return _Free(arrays.says(core), arrays.says(lens), arrays.says("do_optimize_calobject_warp"))
+    return arrays.says(core), arrays.says(lens), arrays.says("do_optimize_calobject_warp")
 
 
-def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
+def _cameras(arrays: Arrays, core: bool, lens: bool) -> list[Camera]:
     model, rows = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None)
     try:
         own = [lens_of_mrcal(model, row, f"camera {number}") for number, row in enumerate(rows.tolist())]
     except InputError as error:
         raise InputError(error.message, file=arrays.path) from None
-    return [freed(each, model, free.core, free.lens) for each in own]
+    return [freed(each, model, core, lens) for each in own]
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:

@@ -20,7 +20,7 @@ from photogram.show.summary import Brief, Rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.maps import distance_text
 from photogram.targets.projection import of_functions, worst
-from photogram.targets.vision import TURNED, imaged, motion_partials, rays
+from photogram.targets.vision import TURNED, motion_partials, rays
 
 __all__ = ["Added", "Candidate", "NewView", "Suggestions", "ViewRows", "best_views", "shown_of", "view_rows"]
 
@@ -299,14 +299,7 @@ def view_rows(housing: Housing, pose: Floats, cameras: Indices, points: Indices)
     turned = housing.points[points] @ pose[:3, :3].T
     for number in np.unique(cameras).tolist():
         own = cameras == number
-        turn, shift = housing.sensors[number, :3, :3], housing.sensors[number, :3, 3]
-        in_camera = (turned[own] + pose[:3, 3]) @ turn.T
-        images = imaged(housing.cameras[number], in_camera + shift)
-        in_first = images.by_point @ turn
-        xy[own] = images.xy
-        by_common[own, :, housing.parameters(number)] = images.by_parameters
-        if number:
-            by_common[own, :, housing.sensor(number)] = images.by_point @ motion_partials(in_camera)
+        xy[own], in_first, by_common[own] = housing.linearized(number, turned[own] + pose[:3, 3])
         by_point[own] = in_first @ pose[:3, :3]
         by_common[own, :, housing.board] = by_point[own] @ housing.points_by_board[points[own]]
         by_pose[own] = in_first @ motion_partials(turned[own])

@@ -61,13 +61,20 @@ def calibration_page(calibrated: Calibrated) -> Page:
 
 def _residuals(calibrated: Calibrated) -> list[Part]:
     """Return tables of residuals by groups, and pictures of them over the board and in the poorest views."""
-    figures = {
-        "board-residuals": ("On the board", "Mean residuals over all views: errors of the print.", _on_board),
-        "poorest-views": ("Poorest views", "Residuals of the pictures that fit worst.", _poorest),
+    figures: dict[str, tuple[str, str, partial[object]]] = {
+        "board-residuals": (
+            "On the board",
+            "Mean residuals over all views: errors of the print.",
+            partial(draw_board_residuals, calibrated),
+        ),
+        "poorest-views": (
+            "Poorest views",
+            "Residuals of the pictures that fit worst.",
+            partial(draw_poorest_views, calibrated),
+        ),
     }
     drawings = [
-        Drawing(name, title, caption, partial(draw, calibrated))
-        for name, (title, caption, draw) in figures.items()
+        Drawing(name, title, caption, _figure(draw)) for name, (title, caption, draw) in figures.items()
     ]
     tables = [page_table(title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
     return [Layers("corner-residuals", drawings), *(each for each in tables if len(each.rows) > 1)]
@@ -78,14 +85,6 @@ _GROUPS: dict[Groups, str] = {
     "level": "By level of the detector",
     "radius": "By distance from the middle of the picture",
 }
-
-
-def _on_board(calibrated: Calibrated) -> Figure:
-    return figure_of(lambda ax: draw_board_residuals(calibrated, ax=ax))
-
-
-def _poorest(calibrated: Calibrated) -> Figure:
-    return figure_of(lambda ax: draw_poorest_views(calibrated, ax=ax))
 
 
 CAPTION = (

@@ -236,15 +236,15 @@ class Start(Valued, Brief):
         corners, poses = self.corners, np.asarray(self.poses)
         frames, photo = self.frames()
         names = [*corners.pictures, *frames]
-        of_frames = poses[photo >= len(corners.pictures)]
-        centres, attitudes = photo_poses(np.concatenate([self.picture_poses(), of_frames]))
+        alone = photo >= len(corners.pictures)
+        centres, attitudes = photo_poses(np.concatenate([self.picture_poses(), poses[alone]]))
         use = corners.use
         return Block(
             photo_ids=names,
             photo_positions=centres,
             photo_attitudes=attitudes.values("omega_phi_kappa"),
             cameras=self.cameras if cameras is None else cameras,
-            photo_cameras=np.concatenate([corners.cameras, self._cameras_of_frames(photo)]),
+            photo_cameras=np.concatenate([corners.cameras, self.references_of_views()[alone]]),
             point_ids=self.board.names,
             point_positions=self.board.places if self.shape == "bend" else self.places(),
             point_sd=self.board.deviations(corners.view_count),
@@ -263,10 +263,6 @@ class Start(Valued, Brief):
         if self.shape != "bend":
             return []
         return [Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
-
-    def _cameras_of_frames(self, photo: Indices) -> Indices:
-        """Return the references of views that have no picture of them."""
-        return self.references_of_views()[photo >= len(self.corners.pictures)]
 
     def references_of_views(self) -> Indices:
         """Return (V,) the camera that the pose of each view is of."""

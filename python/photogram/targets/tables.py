@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -42,36 +43,21 @@ def views(calibrated: Calibrated) -> list[Quantity]:
     largest = np.zeros(count)
     np.maximum.at(largest, view, np.nan_to_num(np.abs(result.standardized)).max(axis=1, initial=0.0))
     left_out = np.bincount(of_picture[corners.picture[~use]], minlength=count)
+    names = np.array(corners.view_names(), dtype=object)
     return [
-        Quantity(
-            np.array(corners.view_names(), dtype=object),
-            (),
-            "name",
-            "view",
-            "name",
-            "first picture of the view",
-            head="View",
-        ),
-        Quantity(
-            np.bincount(of_picture, minlength=count), (), "number", "pictures", "pictures", head="Pictures"
-        ),
-        Quantity(used, (), "number", "corners", "corners", head="Corners"),
-        Quantity(left_out, (), "number", "left_out", "left_out", head="Left out"),
-        Quantity(rms, _PIXELS, "value", "rms_px", "rms_px", head="rms"),
-        Quantity(
-            _sums(view, result.redundancy, count), (), "number", "redundancy", "redundancy", head="Redundancy"
-        ),
-        Quantity(_sums(view, weighted, count), (), "number", "chi2", "chi2", head="chi²", figures=4),
-        Quantity(
-            largest,
-            (),
-            "number",
-            "largest_standardized",
-            "largest_standardized",
-            head="Largest standardized",
-            marked=largest > NOTABLE,
-        ),
+        Quantity(names, (), "name", "view", "name", "first picture of the view", head="View"),
+        _of_views("pictures", np.bincount(of_picture, minlength=count), "Pictures"),
+        _of_views("corners", used, "Corners"),
+        _of_views("left_out", left_out, "Left out"),
+        _of_views("rms_px", rms, "rms", axes=_PIXELS, kind="value"),
+        _of_views("redundancy", _sums(view, result.redundancy, count), "Redundancy"),
+        _of_views("chi2", _sums(view, weighted, count), "chi²", figures=4),
+        _of_views("largest_standardized", largest, "Largest standardized", marked=largest > NOTABLE),
     ]
+
+
+def _of_views(name: str, values: Floats | Indices, head: str, **how: Any) -> Quantity:
+    return Quantity(values, name=name, member=name, head=head, **how)
 
 
 def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:

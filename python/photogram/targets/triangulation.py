@@ -144,24 +144,13 @@ def _rows(
     housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return (n, 2 k) observed less computed, and partials by points (n, 2 k, 3) and unknowns (n, 2 k, c)."""
-    count = len(points)
-    residuals = np.empty((count, len(cameras), 2))
-    by_point = np.empty((count, len(cameras), 2, 3))
-    by_common = np.zeros((count, len(cameras), 2, housing.common))
-    for number, camera in enumerate(cameras):
-        turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
-        turned = points @ turn.T
-        images = imaged(housing.cameras[camera], turned + shift)
-        residuals[:, number] = pixels[:, number] - images.xy
-        by_point[:, number] = images.by_point @ turn
-        by_common[:, number, :, housing.parameters(camera)] = images.by_parameters
-        if camera:
-            by_common[:, number, :, housing.sensor(camera)] = images.by_point @ motion_partials(turned)
-    rows = 2 * len(cameras)
+    parts = [housing.linearized(camera, points) for camera in cameras]
+    xy, by_point, by_common = (np.stack(each, axis=1) for each in zip(*parts, strict=True))
+    shape = len(points), 2 * len(cameras)
     return (
-        residuals.reshape(count, rows),
-        by_point.reshape(count, rows, 3),
-        by_common.reshape(count, rows, housing.common),
+        (pixels - xy).reshape(shape),
+        by_point.reshape(*shape, 3),
+        by_common.reshape(*shape, housing.common),
     )
 
 

@@ -62,7 +62,9 @@ def projection_uncertainty(
     """
     where = shaped("pixels", pixels, (length("pixels", pixels), 2))
     number = camera_number(result, camera)
-    housing, own = _with(result, number, noise_only)
+    housing, own = housing_of(result, number)
+    if noise_only:
+        housing = housing.noise_only()
     rows = _rows(result, number, housing, own, datum, checked_distance(distance))
     found = housing.variance * projection_cofactors(housing, own, where, distance, rows)
     seen = result.cameras[number].camera
@@ -165,11 +167,6 @@ def checked_distance(distance: float) -> float:
     if not distance > 0:
         raise InputError(f"a distance from the camera is positive, or infinite, not {distance:g}")
     return float(distance)
-
-
-def _with(result: Calibrated, camera: int, noise_only: bool) -> tuple[Housing, int]:
-    housing, own = housing_of(result, camera)
-    return (housing.noise_only() if noise_only else housing), own
 
 
 def _rows(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from photogram.targets.output.rig import Rig, Terms, terms_of
-from photogram.targets.output.yaml import figures
+from photogram.targets.output.rig import Rig, Terms, figures, terms_of
 
 __all__ = ["kalibr_camchain"]
 

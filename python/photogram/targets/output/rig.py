@@ -1,6 +1,7 @@
 """What is written of a calibration: cameras, sizes of their pictures, and where they are to each other.
 
-Lenses are as OpenCV, ROS and Kalibr have them: a pinhole with terms in one order, or a fisheye with four.
+Lenses are as OpenCV, ROS and Kalibr have them: a pinhole with terms in one order, or a fisheye with four;
+so is YAML: numbers with all their digits, matrices in rows.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -16,7 +18,7 @@ from photogram.network.cameras import Camera
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.vision import inverted
 
-__all__ = ["FISHEYE_TERMS", "TERMS", "Rig", "Terms", "rig_of", "terms_of"]
+__all__ = ["FISHEYE_TERMS", "TERMS", "Rig", "Terms", "figures", "matrix", "rig_of", "terms_of"]
 
 TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
 """Of a pinhole, in the order of OpenCV; k4, k5, k6 are of the denominator."""
@@ -149,3 +151,17 @@ def rig_of(calibrated: Calibrated) -> Rig:
         sensors=sensors,
         calibrated=calibrated,
     )
+
+
+def figures(values: ArrayLike) -> str:
+    """Return numbers between brackets, each with the digits that say it."""
+    return "[" + ", ".join(repr(float(each)) for each in np.ravel(values)) + "]"
+
+
+def matrix(name: str, values: ArrayLike, *, opencv: bool = False) -> list[str]:
+    """Return a matrix in the YAML of ROS, or of OpenCV."""
+    found = np.atleast_2d(np.asarray(values, dtype=float))
+    rows, columns = found.shape
+    tag, indent, kind = (" !!opencv-matrix", "   ", ["dt: d"]) if opencv else ("", "  ", [])
+    lines = [f"rows: {rows}", f"cols: {columns}", *kind, f"data: {figures(found)}"]
+    return [f"{name}:{tag}", *(indent + line for line in lines)]

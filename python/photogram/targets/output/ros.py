@@ -6,8 +6,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.targets.output.rig import Rig, Terms, terms_of
-from photogram.targets.output.yaml import quoted, ros_matrix
+from photogram.targets.output.rig import Rig, Terms, matrix, terms_of
 
 __all__ = ["ros_camera_info"]
 
@@ -33,17 +32,18 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
         rectified = _rectified(rig.sensors[1], lenses)
     found = {}
     for row, (lens, (turn, projection)) in enumerate(zip(lenses, rectified, strict=True)):
+        name = rig.names[row].replace("\\", "\\\\").replace('"', '\\"')
         width, height = rig.size(row)
         model, terms = _distortion(lens)
         lines = [
             f"image_width: {width}",
             f"image_height: {height}",
-            f"camera_name: {quoted(rig.names[row])}",
-            *ros_matrix("camera_matrix", lens.matrix),
+            f'camera_name: "{name}"',
+            *matrix("camera_matrix", lens.matrix),
             f"distortion_model: {model}",
-            *ros_matrix("distortion_coefficients", [terms]),
-            *ros_matrix("rectification_matrix", turn),
-            *ros_matrix("projection_matrix", projection),
+            *matrix("distortion_coefficients", [terms]),
+            *matrix("rectification_matrix", turn),
+            *matrix("projection_matrix", projection),
         ]
         found[f"{rig.files[row]}.yaml"] = "\n".join([*lines, ""]).encode()
     return found
