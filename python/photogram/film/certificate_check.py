@@ -91,14 +91,10 @@ class DistanceDifference:
         if not self.explanations:
             return f"{said}; no single change of a typed figure explains it" if self.beyond else said
         first, *others = self.explanations
-        more = (
-            f", or {len(others)} other single changes"
-            if len(others) > 1
-            else f", or {others[0]}"
-            if others
-            else ""
-        )
-        return f"{said}; perhaps {first}{more}"
+        found = f"{said}; perhaps {first}"
+        if len(others) > 1:
+            return f"{found}, or {len(others)} other single changes"
+        return f"{found}, or {others[0]}" if others else found
 
 
 def difference_of(

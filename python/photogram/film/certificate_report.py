@@ -15,7 +15,6 @@ from photogram.film.certificate_tables import (
     distortion,
     facts,
     marks,
-    matrix_of,
     observed,
     parameters,
     terms,
@@ -29,7 +28,7 @@ from photogram.show.lines import marks as marked
 from photogram.show.methods import document_of, page_of, report_of
 from photogram.show.page import Drawing, Facts, Page, Part, Section
 from photogram.show.pictures import new_figure
-from photogram.show.quantity import records
+from photogram.show.quantity import Quantity, records
 from photogram.show.sections import Section as Lines
 from photogram.show.sections import composed, headline, verdict_sections
 from photogram.show.style import FAINT, INK, MARKED, in_style
@@ -44,6 +43,8 @@ __all__ = ["certificate_document", "certificate_page", "certificate_report", "li
 @report_of.register(Certificate)
 def certificate_report(certificate: Certificate) -> str:
     """Return the report of a certificate."""
+    own = cameras(certificate)
+    made = [(f"Camera {each.model}", _columns(parameters(each), *_PARAMETERS)) for each in own]
     sections: list[Lines] = [
         *verdict_sections(certificate.verdict),
         ("Certificate", fact_lines(facts(certificate))),
@@ -51,7 +52,7 @@ def certificate_report(certificate: Certificate) -> str:
         ("Explained by a single change", _explained(certificate)),
         *_marks(certificate),
         *_lens(certificate),
-        *((f"Camera {each.model}", _camera(each)) for each in cameras(certificate)),
+        *made,
     ]
     return composed(headline("certificate", certificate.name), sections)
 
@@ -84,24 +85,17 @@ def _marks(certificate: Certificate) -> list[Lines]:
     if not (certificate.places or certificate.distances):
         return []
     found = certificate.fiducials()
-    names, xy, sd = marks(found)
-    lines = table_lines(
-        [
-            *field(names, 8, head="mark"),
-            *field(xy, 13, ".4f"),
-            *field(sd, 11, ".1f", "sd {name} {unit}"),
-        ]
-    )
+    lines = _columns(marks(found), (8, "", "mark"), (13, ".4f"), (11, ".1f", "sd {name} {unit}"))
     sections: list[Lines] = [("Marks", lines)]
     if found.adjusted is not None:
-        names, value, sd_, residual, redundancy, w, error = observed(
+        names, value, sd, residual, redundancy, w, error = observed(
             found.adjusted, limit_of(len(found.adjusted.rows))
         )
         lines = table_lines(
             [
                 *field(names, 32, head="observed"),
                 *field(value, 12, ".3f", "value"),
-                *field(sd_, 9, ".2f", "sd"),
+                *field(sd, 9, ".2f", "sd"),
                 *field(residual, 10, ".2f", "residual"),
                 *field(redundancy, 11, ".3f", "redundancy", gap=" "),
                 *field(w, 9, ".2f", "w"),
@@ -114,51 +108,33 @@ def _marks(certificate: Certificate) -> list[Lines]:
     return sections
 
 
+def _columns(table: list[Quantity], *columns: tuple[Any, ...]) -> list[str]:
+    """Return the first quantities of a table as text: width, form, head and gap of each as of `field`."""
+    pairs = zip(table, columns, strict=False)
+    return table_lines([each for quantity, column in pairs for each in field(quantity, *column)])
+
+
+_DISTORTION = (
+    *((12, ".2f", "angle {unit}"), (12, ".3f", "radius {unit}"), (16, ".1f", "distortion {unit}")),
+    *((14, ".2f", "residual {unit}"), (11, ".3f", "redundancy", " "), (8, ".2f", "w")),
+)
+_TERMS = (
+    *((6, ".0f", "terms"), (12, ".3f", "omega"), (5, ".0f", "f"), (10, ".3g", "p"), (10, ".2f", "gain")),
+    (0, "", "{name} {unit}", "  "),
+)
+_RADII = ((12, ".1f", "radius {unit}"), (16, ".2f", "distortion {unit}"), (9, ".2f", "sd {unit}"))
+_PARAMETERS = ((8,), (20, ".10g", "value"), (14, ".4g", "sd"), (0, "", "{name} {unit}", "  "))
+
+
 def _lens(certificate: Certificate) -> list[Lines]:
     if certificate.radial is None:
         return []
     own = certificate.curve()
-    angle, radius, given, residual, redundancy, w = distortion(certificate, own)
-    table = [
-        *field(angle, 12, ".2f", "angle {unit}"),
-        *field(radius, 12, ".3f", "radius {unit}"),
-        *field(given, 16, ".1f", "distortion {unit}"),
-        *field(residual, 14, ".2f", "residual {unit}"),
-        *field(redundancy, 11, ".3f", "redundancy", gap=" "),
-        *field(w, 8, ".2f", "w"),
-    ]
-    count, omega, freedom, p, gain, said, *_ = terms(certificate.curves(), own.terms)
-    fits = [
-        *field(count, 6, ".0f", "terms"),
-        *field(omega, 12, ".3f", "omega"),
-        *field(freedom, 5, ".0f", "f"),
-        *field(p, 10, ".3g", "p"),
-        *field(gain, 10, ".2f", "gain"),
-        *field(said, 0, gap="  "),
-    ]
-    at, value, sd = curve(own)
-    along = [
-        *field(at, 12, ".1f", "radius {unit}"),
-        *field(value, 16, ".2f", "distortion {unit}"),
-        *field(sd, 9, ".2f", "sd {unit}"),
-    ]
     return [
-        ("Radial distortion", table_lines(table)),
-        ("Odd terms beside k0", table_lines(fits)),
-        ("Curve, the last radius beyond the table", table_lines(along)),
+        ("Radial distortion", _columns(distortion(certificate, own), *_DISTORTION)),
+        ("Odd terms beside k0", _columns(terms(certificate.curves(), own.terms), *_TERMS)),
+        ("Curve, the last radius beyond the table", _columns(curve(own), *_RADII)),
     ]
-
-
-def _camera(camera: Camera) -> list[str]:
-    names, value, sd, unit = parameters(camera)
-    return table_lines(
-        [
-            *field(names, 8),
-            *field(value, 20, ".10g", "value"),
-            *field(sd, 14, ".4g", "sd"),
-            *field(unit, 0, gap="  "),
-        ]
-    )
 
 
 @document_of.register(Certificate)
@@ -222,12 +198,13 @@ def _mark_members(certificate: Certificate) -> dict[str, Any]:
 
 
 def _camera_members(camera: Camera) -> dict[str, Any]:
-    names, matrix = matrix_of(camera)
+    assert camera.covariance is not None
+    names, matrix = camera.covariance
     return {
         "model": camera.model,
         "unit": camera.unit,
         "parameters": dict(camera.parameters),
-        "covariance": {"order": names, "matrix": matrix},
+        "covariance": {"order": [*names], "matrix": np.asarray(matrix)},
     }
 
 
@@ -236,7 +213,12 @@ def certificate_page(certificate: Certificate) -> Page:
     """Return the report of a certificate for the browser."""
     named = facts(certificate)
     sections = [
-        Section("distances", "Distances beside coordinates", _compared_parts(certificate), _COMPARED),
+        Section(
+            "distances",
+            "Distances beside coordinates",
+            [page_table("Distances", compared(certificate))] if certificate.check() else [],
+            _COMPARED,
+        ),
         Section("marks", "Marks", _mark_parts(certificate)),
         Section("lens", "Lens", _lens_parts(certificate)),
         Section(
@@ -259,10 +241,6 @@ _COMPARED = (
     "Beyond 0.010 mm a distance and its coordinates contradict each other. Single changes of a typed figure"
     " that would explain it are guesses: no figure was changed."
 )
-
-
-def _compared_parts(certificate: Certificate) -> list[Part]:
-    return [page_table("Distances", compared(certificate))] if certificate.check() else []
 
 
 def _mark_parts(certificate: Certificate) -> list[Part]:

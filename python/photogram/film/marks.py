@@ -21,16 +21,7 @@ DataStrip = Literal["left", "top"]
 SIDES = ("ll", "ur", "ul", "lr", "ml", "mr", "mt", "mb")
 """The marks in the order of their numbers in USGS certificates, 1 to 8."""
 _LETTERS = {"a": "ml", "b": "mr", "c": "mb", "d": "mt"}
-_LEFT_OF_TOP = {
-    "ul": "ll",
-    "ll": "lr",
-    "lr": "ur",
-    "ur": "ul",
-    "mt": "ml",
-    "ml": "mb",
-    "mb": "mr",
-    "mr": "mt",
-}
+_TURNED = {"ul": "ll", "ll": "lr", "lr": "ur", "ur": "ul", "mt": "ml", "ml": "mb", "mb": "mr", "mr": "mt"}
 """What the sides of a frame with the strip on top are when the strip lies at the left."""
 
 
@@ -45,12 +36,25 @@ def by_side(name: str) -> str:
 
 def turned_name(name: str, data_strip: DataStrip) -> str:
     """Return what a side is called once the data strip lies at the left; own names as they are."""
-    return _LEFT_OF_TOP.get(name, name) if data_strip == "top" else name
+    return _TURNED.get(name, name) if data_strip == "top" else name
 
 
 def turned(xy: Floats, data_strip: DataStrip) -> Floats:
     """Return places (..., 2) once the data strip lies at the left: from the top (x, y) -> (-y, x)."""
     return np.stack([-xy[..., 1], xy[..., 0]], axis=-1) if data_strip == "top" else xy
+
+
+_SIGNS = {
+    "ll": (-1, -1),
+    "ur": (1, 1),
+    "ul": (-1, 1),
+    "lr": (1, -1),
+    "ml": (-1, 0),
+    "mr": (1, 0),
+    "mt": (0, 1),
+    "mb": (0, -1),
+}
+"""In which direction marks lie from the centre."""
 
 
 @dataclass(frozen=True)
@@ -72,16 +76,11 @@ class UsualPlaces:
 
     def places(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
         """Return the places of marks by their sides; own names have none."""
-        signs = {"l": (-1, -1), "u": (-1, 1)}
         found = {}
         for name in names:
-            if name in ("ll", "ul", "ur", "lr"):
-                _, y = signs[name[0]]
-                x = -1 if name[1] == "l" else 1
-                found[name] = (x * self.corner, y * self.corner)
-            elif name in SIDES:
-                x, y = {"ml": (-1, 0), "mr": (1, 0), "mt": (0, 1), "mb": (0, -1)}[name]
-                found[name] = (x * self.middle, y * self.middle)
+            if name in _SIGNS:
+                (x, y), away = _SIGNS[name], self.middle if name.startswith("m") else self.corner
+                found[name] = (x * away, y * away)
         return found
 
     def sd(self, name: str) -> float:

@@ -60,10 +60,7 @@ class Pattern:
     @cached_property
     def point_sd(self) -> Floats:
         """(n, 3) expected standard deviations along `axes`, linear unit; NaN for points left out."""
-        lengths: Floats = self.result.point_sd * geometry.lengths_of_units(
-            self.result.point_positions, self.block.spheroid
-        )
-        return lengths
+        return self.result.point_sd * self._point_units
 
     @cached_property
     def photo_sd(self) -> Floats:
@@ -75,10 +72,7 @@ class Pattern:
     @cached_property
     def control_sd(self) -> Floats:
         """(n, 3) a priori standard deviations of control, linear unit; infinite where not held."""
-        lengths: Floats = self.block.point_sd * geometry.lengths_of_units(
-            self.result.point_positions, self.block.spheroid
-        )
-        return lengths
+        return self.block.point_sd * self._point_units
 
     @property
     def new_points(self) -> NDArray[np.bool_]:
@@ -137,8 +131,7 @@ class Pattern:
         """What `rms_sd` of all new points would be, were the readout times known; None where they are."""
         if self.known is None or not self.new_points.any():
             return None
-        lengths = geometry.lengths_of_units(self.result.point_positions, self.block.spheroid)
-        sd = (self.known.point_sd * lengths)[self.new_points]
+        sd = (self.known.point_sd * self._point_units)[self.new_points]
         x, y, z = np.sqrt((sd**2).mean(axis=0)).tolist()
         return x, y, z
 
@@ -146,6 +139,11 @@ class Pattern:
     def control(self) -> list[ControlQuality]:
         """Held components of control, by axis."""
         return control_quality(self.result, self.control_sd, self.axes)
+
+    @cached_property
+    def _point_units(self) -> Floats:
+        """(n, 3) how long a unit of the coordinates of points is, linear unit."""
+        return geometry.lengths_of_units(self.result.point_positions, self.block.spheroid)
 
     @cached_property
     def _scales(self) -> Floats:

@@ -8,6 +8,7 @@ blocks is usually tabulated: weak at the border, where rays are few and come fro
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,6 @@ from photogram.network.block import Block
 from photogram.network.hull import hull
 from photogram.network.trajectories import Readout
 from photogram.results.result import Result
-from photogram.results.trajectories import AdjustedTrajectory
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
 __all__ = [
@@ -142,16 +142,13 @@ def _looked_at(block: Block) -> dict[str, Floats]:
 
 def photo_redundancy(result: Result) -> Floats:
     """(P, 6) redundancy numbers of what is given of positions and attitudes, of photos that move too."""
-    own = {each.photo for each in result.block.timed if each.trajectory is None}
+    moving = {each.photo for each in result.block.timed if each.trajectory is None}
     found = result.photo_redundancy.copy()
     for row, name in enumerate(result.block.photo_ids):
-        if name in own:
-            found[row] = _first(result.trajectories[name])
+        if name in moving:
+            own = result.trajectories[name]
+            found[row] = [*own.position_redundancy[0], *own.rotation_redundancy[0]]
     return found
-
-
-def _first(trajectory: AdjustedTrajectory) -> Floats:
-    return np.concatenate([trajectory.position_redundancy[0], trajectory.rotation_redundancy[0]])
 
 
 def with_known_readout(block: Block) -> Block | None:
@@ -287,8 +284,8 @@ def _group(result: Result, point_sd: Floats, grouping: str, group: str, chosen: 
         grouping=grouping,
         group=group,
         points=int(chosen.sum()),
-        rms_sd=_triple([_rms(column) for column in point_sd[chosen].T]),
-        max_sd=_triple([_largest(column) for column in point_sd[chosen].T]),
+        rms_sd=cast("Triple", tuple(_rms(column) for column in point_sd[chosen].T)),
+        max_sd=cast("Triple", tuple(_largest(column) for column in point_sd[chosen].T)),
         redundancy=_mean(redundancy),
         unchecked=1 - _mean(checked.astype(np.float64)),
         detectable=_median(detectable[checked]),
@@ -330,11 +327,6 @@ def control_quality(result: Result, control_sd: Floats, axes: tuple[str, str, st
             )
         )
     return qualities
-
-
-def _triple(values: list[float]) -> Triple:
-    x, y, z = values
-    return x, y, z
 
 
 def _rms(values: Floats) -> float:
