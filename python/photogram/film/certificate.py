@@ -16,13 +16,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.certificate_check import DistanceDifference, difference_of
 from photogram.film.certificate_file import REFERENCES, read_table, read_toml
-from photogram.film.distances import (
-    AdjustedMarks,
-    Crossing,
-    MarkDistance,
-    RightAngle,
-    adjust_distances,
-)
+from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
 from photogram.film.lens_table import (
     Curve,
     LensParameters,

@@ -98,10 +98,7 @@ class DistanceDifference:
 
 
 def difference_of(
-    first: str,
-    second: str,
-    typed: Mapping[str, str],
-    usual: Mapping[str, tuple[float, float]],
+    first: str, second: str, typed: Mapping[str, str], usual: Mapping[str, tuple[float, float]]
 ) -> DistanceDifference:
     """Compare a distance with the coordinates of its marks; explain what differs by more than 0.010 mm.
 

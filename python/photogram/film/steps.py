@@ -52,14 +52,12 @@ class StepsCompared(Paged, Brief):
     @property
     def median_sd(self) -> Floats:
         """(2, 3) medians of standard deviations."""
-        found: Floats = np.median(self.sd, axis=1)
-        return found
+        return np.asarray(np.median(self.sd, axis=1))
 
     @property
     def percent(self) -> Floats:
         """(3,) by how much those of two steps are larger than those of one: the median of single points."""
-        found: Floats = 100.0 * (np.median(self.sd[1] / self.sd[0], axis=0) - 1.0)
-        return found
+        return np.asarray(100.0 * (np.median(self.sd[1] / self.sd[0], axis=0) - 1.0))
 
     @property
     def sentence(self) -> str:

@@ -77,8 +77,7 @@ class Pattern:
     @property
     def new_points(self) -> NDArray[np.bool_]:
         """(n,) which points are to be determined: those that take part and are not control."""
-        new: NDArray[np.bool_] = self.result.used_points & (self.result.point_kinds != "control")
-        return new
+        return np.asarray(self.result.used_points & (self.result.point_kinds != "control"))
 
     @cached_property
     def point_plan(self) -> Floats:
@@ -149,8 +148,7 @@ class Pattern:
     def _scales(self) -> Floats:
         photos = self.block.image_photos[self.result.used_images]
         depths = image_depths(self.block)[self.result.used_images]
-        scales: Floats = depths / self.block.camera_scales()[photos]
-        return scales
+        return np.asarray(depths / self.block.camera_scales()[photos])
 
     def _plan(self, positions: Floats) -> Floats:
         spheroid = self.block.spheroid
@@ -167,5 +165,4 @@ class Pattern:
         stations = geometry.geographic_to_geocentric(self.result.photo_positions, spheroid)
         centre = stations.mean(axis=0)
         frame = geometry.local_frames(geometry.geocentric_to_geographic(centre[np.newaxis], spheroid))[0]
-        plan: Floats = (xyz - centre) @ frame[:2].T
-        return plan
+        return np.asarray((xyz - centre) @ frame[:2].T)

@@ -49,8 +49,7 @@ def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
     axes = _axes(stations)
     turned, extent = points @ axes.T, stations @ axes.T
     beyond = (turned < extent.min(axis=0)) | (turned > extent.max(axis=0))
-    found: NDArray[np.str_] = np.array(LOCATIONS)[2 - beyond.sum(axis=1)]
-    return found
+    return np.asarray(np.array(LOCATIONS)[2 - beyond.sum(axis=1)])
 
 
 def _axes(points: Floats) -> Floats:
@@ -66,8 +65,7 @@ def _axes(points: Floats) -> Floats:
     c, s = (sides[lengths > 0] / lengths[lengths > 0, np.newaxis]).T
     frames = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
     extents = np.ptp(np.einsum("kij,nj->kin", frames, corners), axis=2)
-    axes: Floats = frames[np.argmin(extents.prod(axis=1))]
-    return axes
+    return np.asarray(frames[np.argmin(extents.prod(axis=1))])
 
 
 PLACES = 25

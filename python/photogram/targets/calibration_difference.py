@@ -155,10 +155,7 @@ class CameraDifference(Brief):
         shift = ", ".join(f"{each:.3g}" for each in self.translation)
         moved = f", {shift} {self.unit}" if self.fitted.finite else ""
         rows = [
-            (
-                "motion",
-                f"{self.rotation:.4g} degrees{moved}",
-            ),
+            ("motion", f"{self.rotation:.4g} degrees{moved}"),
             ("difference", f"rms {self.rms:.3g} px, largest {self.largest:.3g} px where the board was seen"),
         ]
         return self.title, rows + [("", each) for each in self.remarks]

@@ -284,8 +284,7 @@ def _roots(source: Camera, known: tuple[list[int], Floats], points: Floats) -> F
     covariances = partials @ matrix @ partials.transpose(0, 2, 1)
     mean = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 2
     lower = np.linalg.cholesky(covariances + (FIRMEST * mean or 1.0) * np.eye(2))
-    found: Floats = np.linalg.inv(lower)
-    return found
+    return np.asarray(np.linalg.inv(lower))
 
 
 def _passed_on(

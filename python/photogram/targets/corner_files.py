@@ -9,14 +9,7 @@ from photogram.io.files import read_beginning, reading
 from photogram.lazy_dataclasses import dataclass
 from photogram.targets.board import Board
 from photogram.targets.board_files import is_board
-from photogram.targets.corner_tables import (
-    is_headless,
-    is_table,
-    is_vnl,
-    read_headless,
-    read_table,
-    read_vnl,
-)
+from photogram.targets.corner_tables import is_headless, is_table, is_vnl, read_headless, read_table, read_vnl
 from photogram.targets.corner_views import Measured
 from photogram.targets.opencv_corners import BEGIN, is_npz, is_storage, read_npz, read_storage
 

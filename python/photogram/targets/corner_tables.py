@@ -216,8 +216,7 @@ def _seconds(table: ColumnTable, times: Floats, first: list[int]) -> Floats:
     missing = np.flatnonzero(np.isnan(own))
     if len(missing):
         raise table.error(first[int(missing[0])], "column time: is empty")
-    found: Floats = own * (1e-9 if own.max(initial=0.0) > NANOSECONDS else 1.0)
-    return found
+    return np.asarray(own * (1e-9 if own.max(initial=0.0) > NANOSECONDS else 1.0))
 
 
 def _points(table: ColumnTable, board: Board | None) -> Indices:
@@ -258,5 +257,4 @@ def _of_tags(table: ColumnTable, board: Board) -> Indices:
     corner = _whole(table, "corner", 4)
     right, up = np.array([0, 1, 1, 0])[corner], np.array([0, 0, 1, 1])[corner]
     row, column = np.divmod(tag, board.columns)
-    found: Indices = (2 * row + up) * (2 * board.columns) + 2 * column + right
-    return found
+    return np.asarray((2 * row + up) * (2 * board.columns) + 2 * column + right)

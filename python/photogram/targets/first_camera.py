@@ -20,13 +20,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
-from photogram.targets.homographies import (
-    angles_apart,
-    focal_lengths,
-    homographies,
-    poses,
-    ray_homographies,
-)
+from photogram.targets.homographies import angles_apart, focal_lengths, homographies, poses, ray_homographies
 from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
 from photogram.targets.sightings import Sightings
 from photogram.targets.vision import photo_poses, vision_poses
@@ -179,8 +173,7 @@ class Trial:
 
 def rays_of(camera: Camera, xy: Floats) -> Floats:
     """Return (P, n, 3) rays, axes of vision, of (P, n, 2) pixels; NaN where there are none."""
-    found: Floats = (camera.rays(xy.reshape(-1, 2)) * [1.0, -1.0, -1.0]).reshape(*xy.shape[:2], 3)
-    return found
+    return np.asarray((camera.rays(xy.reshape(-1, 2)) * [1.0, -1.0, -1.0]).reshape(*xy.shape[:2], 3))
 
 
 def misfits(seen: Sightings, rays: Floats) -> Floats:

@@ -47,8 +47,7 @@ def homographies(places: Floats, xy: Floats) -> Floats:
     board, of_board = _scaled(np.broadcast_to(places, (len(xy), *places.shape)), seen)
     image, of_image = _scaled(xy, seen)
     found = _smallest(_equations(board, _with_one(image))[:, :, :2], seen)
-    made: Floats = np.linalg.inv(of_image) @ found @ of_board
-    return made
+    return np.asarray(np.linalg.inv(of_image) @ found @ of_board)
 
 
 def ray_homographies(places: Floats, rays: Floats) -> Floats:
@@ -77,8 +76,7 @@ def angles_apart(places: Floats, rays: Floats, found: Floats) -> Floats:
     """Return (P, n) the angles (rad) between rays and what H makes of places; NaN where not seen."""
     there = np.einsum("pij,nj->pni", found, _with_one(places))
     across = np.linalg.norm(np.cross(rays, there), axis=-1)
-    angles: Floats = np.arctan2(across, np.einsum("pni,pni->pn", rays, there))
-    return angles
+    return np.asarray(np.arctan2(across, np.einsum("pni,pni->pn", rays, there)))
 
 
 def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
@@ -136,14 +134,12 @@ def nearest_rotations(matrices: Floats) -> Floats:
     """Return (k, 3, 3) the rotations nearest to matrices."""
     left, _, right = np.linalg.svd(matrices)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, np.newaxis]
-    found: Floats = left @ right
-    return found
+    return np.asarray(left @ right)
 
 
 def centres(of_boards: Floats) -> Floats:
     """Return (P, 3) where the cameras are in the axes of the board, C = -R't."""
-    found: Floats = -np.einsum("pji,pj->pi", of_boards[:, :3, :3], of_boards[:, :3, 3])
-    return found
+    return np.asarray(-np.einsum("pji,pj->pi", of_boards[:, :3, :3], of_boards[:, :3, 3]))
 
 
 def frontal_tilts(of_boards: Floats) -> Floats:
@@ -186,5 +182,4 @@ def _smallest(rows: Floats, seen: Bools) -> Floats:
     """Return (P, 3, m + 1) the H of norm 1 that make rows (P, n, k, 3 (m + 1)) of points seen least."""
     used = np.where(seen[..., np.newaxis, np.newaxis], rows, 0.0).reshape(len(rows), -1, rows.shape[-1])
     _, vectors = np.linalg.eigh(used.transpose(0, 2, 1) @ used)
-    found: Floats = vectors[:, :, 0].reshape(len(rows), 3, -1)
-    return found
+    return np.asarray(vectors[:, :, 0].reshape(len(rows), 3, -1))

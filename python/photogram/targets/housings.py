@@ -131,8 +131,7 @@ def _weight_of_sensor(calibrated: Calibrated, camera: int) -> Floats:
     """Return (6, 6) of the observation of a sensor, by its steps dt, w."""
     back = np.linalg.inv(sensor_steps(calibrated.sensors[camera]))
     sd = np.asarray(calibrated.calibration.sd_sensors)[camera]
-    found: Floats = back.T @ np.diag(1 / sd**2) @ back
-    return found
+    return np.asarray(back.T @ np.diag(1 / sd**2) @ back)
 
 
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:

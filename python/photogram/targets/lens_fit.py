@@ -187,14 +187,12 @@ BEYOND = 1.1
 def grid_of_pixels(size: tuple[int, int], radius: float = math.inf) -> Floats:
     """Return (m, 2) pixels over a picture, the outermost included, within a radius of its middle."""
     _, _, found = image_grid(size, GRID)
-    kept: Floats = found[within(found, size, radius)]
-    return kept
+    return np.asarray(found[within(found, size, radius)])
 
 
 def within(pixels: Floats, size: tuple[int, int], radius: float) -> Bools:
     """Return (m,) whether pixels lie within a radius of the middle of a picture."""
-    found: Bools = np.hypot(*(pixels - (np.array(size) - 1) / 2).T) <= radius
-    return found
+    return np.asarray(np.hypot(*(pixels - (np.array(size) - 1) / 2).T) <= radius)
 
 
 def is_perspective(camera: Camera) -> bool:

@@ -150,12 +150,10 @@ def _centres(tags: Floats) -> Floats:
     """Return (n, 2) where the diagonals of (n, 4, 2) corners meet: images of the centres of squares."""
     a, b, c, d = np.concatenate([tags, np.ones((*tags.shape[:2], 1))], axis=2).transpose(1, 0, 2)
     meet = np.cross(np.cross(a, c), np.cross(b, d))
-    found: Floats = meet[:, :2] / meet[:, 2:]
-    return found
+    return np.asarray(meet[:, :2] / meet[:, 2:])
 
 
 def _mapped(plane: Floats, xy: Floats) -> Floats:
     """Return (..., 2) places behind a homography."""
     found = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1) @ plane.T
-    mapped: Floats = found[..., :2] / found[..., 2:]
-    return mapped
+    return np.asarray(found[..., :2] / found[..., 2:])

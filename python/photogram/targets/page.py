@@ -52,10 +52,7 @@ def calibration_page(calibrated: Calibrated) -> Page:
     ]
     highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]
     return replace(
-        page,
-        what="Calibration with targets",
-        highlights=highlights,
-        sections=[*sections, *page.sections],
+        page, what="Calibration with targets", highlights=highlights, sections=[*sections, *page.sections]
     )
 
 

@@ -186,8 +186,7 @@ class Start(Valued, Brief):
     @property
     def tied(self) -> Bools:
         """(K,) whether a camera is tied to another, its reference."""
-        found: Bools = np.asarray(self.references) != np.arange(len(self.cameras))
-        return found
+        return np.asarray(np.asarray(self.references) != np.arange(len(self.cameras)))
 
     def picture_poses(self) -> Floats:
         """Return (P, 4, 4) the pose of each picture: board -> its camera."""
@@ -198,8 +197,7 @@ class Start(Valued, Brief):
             steps = corners.times + late - dated(corners, self.tied)[corners.views]
             steps = np.where(self.tied[corners.cameras], steps, 0.0)
             poses = moved(poses, np.nan_to_num(np.asarray(self.motion))[corners.views], steps)
-        found: Floats = sensors[corners.cameras] @ poses
-        return found
+        return np.asarray(sensors[corners.cameras] @ poses)
 
     @property
     def shape(self) -> Shape:

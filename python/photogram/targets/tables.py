@@ -68,8 +68,7 @@ def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:
 
 def _sums(view: Indices, values: Floats, count: int) -> Floats:
     """Return the sums of (m, 2) values over the corners of each view."""
-    found: Floats = np.bincount(view, weights=values.sum(axis=1), minlength=count).astype(float)
-    return found
+    return np.asarray(np.bincount(view, weights=values.sum(axis=1), minlength=count).astype(float))
 
 
 def board_facts(calibrated: Calibrated) -> list[Fact]:

@@ -136,8 +136,7 @@ def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: F
             moved = np.linalg.norm(step, axis=1) / np.linalg.norm(points, axis=1)
         if not (moved > CLOSE).any():
             break
-    found: Floats = np.where((moved <= 1e3 * CLOSE)[:, np.newaxis], points, np.nan)
-    return found
+    return np.asarray(np.where((moved <= 1e3 * CLOSE)[:, np.newaxis], points, np.nan))
 
 
 def _rows(
@@ -172,11 +171,7 @@ Axes = Literal["axes", "corners"]
 
 
 def triangulate(
-    result: Calibrated,
-    cameras: Sequence[int | str],
-    pixels: ArrayLike,
-    pixel_sd: float,
-    datum: Axes = "axes",
+    result: Calibrated, cameras: Sequence[int | str], pixels: ArrayLike, pixel_sd: float, datum: Axes = "axes"
 ) -> Triangulated:
     """Return points by their images in cameras of a rig, with both parts of their covariance.
 
