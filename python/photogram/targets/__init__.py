@@ -74,21 +74,8 @@ __all__ = [
     "uncertainty_map",
 ]
 
-_MADE = {
-    "Calibrated",
-    "CameraDifference",
-    "Conversion",
-    "CrossValidation",
-    "FirstCalibration",
-    "NewView",
-    "PlannedView",
-    "Suggestions",
-    "Triangulated",
-    "UncertaintyCurve",
-    "UncertaintyMap",
-    "ViewPlan",
-    "Worth",
-}
+_GIVEN = {"Board", "Calibration", "Candidate", "Corners", "WorthOptions"}
+_MADE = {name for name in __all__ if name[0].isupper()} - _GIVEN
 """What functions make, and users do not."""
 
 _HOMES = {

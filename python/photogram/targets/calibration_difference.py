@@ -200,23 +200,11 @@ def compared(
     radius: float | None = None,
     grid: tuple[int, int] = (60, 40),
 ) -> CameraDifference:
-    """Compare two cameras.
+    """Compare two cameras at some distances over the pictures of a, `size` their width and height.
 
-    Parameters
-    ----------
-    a, b
-        The cameras.
-    size, unit
-        Width and height of the pictures of a, and the unit of lengths.
-    distances
-        At which they are compared.
-    criterion
-        What is least when the motion between them is fitted.
-    radius
-        Pixels about the middle that count in the fit; None: all where both are known, each with its weight,
-        else a sixth of the shorter side.
-    grid
-        Pixels across and down.
+    `criterion` says what is least when the motion between them is fitted, `radius` which pixels about the
+    middle count in the fit; None: all where both are known, each with its weight, else a sixth of the shorter
+    side. The grid is pixels across and down.
     """
     columns, rows, pixels = image_grid(size, grid)
     known = a.covariance is not None and b.covariance is not None

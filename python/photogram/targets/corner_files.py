@@ -36,10 +36,6 @@ class Form:
     clear: bool = True
 
 
-def _of_model(path: Path) -> bool:
-    return path.suffix == MODEL or (path.suffix == ".txt" and KEY in read_beginning(path, BEGIN))
-
-
 _FORMS = (
     Form("corners of mrcal", is_vnl, read_vnl),
     Form("storage of OpenCV", is_storage, read_storage),
@@ -74,7 +70,7 @@ def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Pa
             continue
         if is_board(each):
             boards.append(each)
-        elif _of_model(each):
+        elif each.suffix == MODEL or (each.suffix == ".txt" and KEY in read_beginning(each, BEGIN)):
             models.append(each)
         elif (form := next((own for own in _FORMS if own.knows(each)), None)) is not None:
             corners.setdefault(form, []).append(each)

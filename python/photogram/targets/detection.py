@@ -39,24 +39,11 @@ ROUND, FLAT = 0.5, 0.05
 def detected(
     path: Path, files: Sequence[Path], board: Board, progress: Callable[[str], None] | None = None
 ) -> Measured:
-    """Find a board in photographs.
+    """Find a board in photographs; where these lie in several folders, each folder is a camera.
 
-    Parameters
-    ----------
-    path
-        What was asked for, which errors name.
-    files
-        The pictures. Where they lie in several folders, each folder is a camera.
-    board
-        What to look for.
-    progress
-        Is told which picture is searched.
-
-    Raises
-    ------
-    InputError
-        OpenCV is absent, a board whose targets nobody knows by their look, a file that is no picture, a board
-        that no picture shows.
+    Errors name `path`, what was asked for; `progress` is told which picture is searched. InputError: OpenCV
+    is absent, a board whose targets nobody knows by their look, a file that is no picture, a board that no
+    picture shows.
     """
     cv2 = _opencv(path)
     find = _finder(cv2, board, path)
@@ -137,11 +124,12 @@ def _finder(cv2: Any, board: Board, path: Path) -> Callable[[Picture], Found | N
         tags = charuco_tags(cv2, board) if board.kind == "charuco" else grid_tags(cv2, board)
         return tags.corners
     ways = {"chessboard": _chessboard, "circles": _circles, "asymmetric_circles": _circles}
-    return lambda picture: _numbered(ways[board.kind](cv2, board, picture))
 
+    def found(picture: Picture) -> Found | None:
+        xy = ways[board.kind](cv2, board, picture)
+        return None if xy is None else (np.arange(len(xy)), xy)
 
-def _numbered(xy: Floats | None) -> Found | None:
-    return None if xy is None else (np.arange(len(xy)), xy)
+    return found
 
 
 def _chessboard(cv2: Any, board: Board, picture: Picture) -> Floats | None:

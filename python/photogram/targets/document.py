@@ -17,8 +17,8 @@ from photogram.show.methods import document_of
 from photogram.show.quantity import Quantity, records
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.calibration_result import Calibrated, Worth
-from photogram.targets.cross_validation import CrossValidation, changes_between
-from photogram.targets.maps import UncertaintyMap
+from photogram.targets.cross_validation import CrossValidation, DifferenceTest, changes_between
+from photogram.targets.maps import UncertaintyMap, map_name
 from photogram.targets.new_views import Suggestions
 from photogram.targets.splined import splines
 from photogram.targets.tables import STRETCHES, board_fit, prior_shift, views
@@ -84,7 +84,7 @@ def worth_files(worth: Worth) -> dict[str, bytes]:
     """Return the maps as tables and arrays, by their names: `map-left-infinity.csv`."""
     files = {}
     for each in worth.maps:
-        name = f"map-{each.camera}-{_distance(each.distance)}"
+        name = f"map-{map_name(each)}"
         files[f"{name}.csv"], files[f"{name}.npz"] = each.to_csv(), each.to_npz()
     return files
 
@@ -98,10 +98,6 @@ def worth_members(worth: Worth) -> dict[str, Any]:
         "suggested_views": [_suggested(each) for each in worth.suggestions],
         "worth": worth.sentences,
     }
-
-
-def _distance(distance: float) -> str:
-    return "infinity" if math.isinf(distance) else f"{distance:g}"
 
 
 def _map(found: UncertaintyMap) -> dict[str, Any]:
@@ -127,10 +123,7 @@ def _cross(found: CrossValidation) -> dict[str, Any]:
         "splits": [
             {
                 "views": [list(part) for part in parts],
-                "tests": [
-                    {"name": each.name, "chi2": each.chi2, "dof": each.dof, "p": each.probability}
-                    for each in tests
-                ],
+                "tests": [_test(each) for each in tests],
                 "dk": changes_between(*housings)[0][: found.whole.board.start].tolist(),
             }
             for parts, tests, housings in zip(found.parts, found.tests, found.housings, strict=True)
@@ -138,8 +131,11 @@ def _cross(found: CrossValidation) -> dict[str, Any]:
     }
 
 
+def _test(test: DifferenceTest) -> dict[str, Any]:
+    return {"name": test.name, "chi2": test.chi2, "dof": test.dof, "p": test.probability}
+
+
 def _difference(found: CameraDifference) -> dict[str, Any]:
-    test = found.test
     return {
         "cameras": list(found.cameras),
         "distances": [each if math.isfinite(each) else None for each in found.distances],
@@ -148,7 +144,7 @@ def _difference(found: CameraDifference) -> dict[str, Any]:
         "rms": found.rms,
         "largest": found.largest,
         "shared_corners": found.shared,
-        "test": test and {"name": test.name, "chi2": test.chi2, "dof": test.dof, "p": test.probability},
+        "test": found.test and _test(found.test),
         "columns": found.columns.tolist(),
         "rows": found.rows.tolist(),
         "vectors": found.vectors,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,19 +15,14 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted, listed
 from photogram.network.knots import KNOTTED
 from photogram.results.findings import block_findings
-from photogram.results.snooping_result import Snooped
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
-from photogram.targets.calibration_result import Calibrated, UnknownWeight, deviation_of_corners
-from photogram.targets.cross_validation import EXPLAINED
+from photogram.targets.calibration_result import Calibrated, UnknownWeight, Worth, deviation_of_corners
+from photogram.targets.cross_validation import EXPLAINED, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.picture_parts import PARTS, parts_of
 from photogram.targets.vision import rays
-
-if TYPE_CHECKING:
-    from photogram.targets.calibration_result import Worth
-    from photogram.targets.cross_validation import CrossValidation
 
 __all__ = ["Showing", "findings", "judged", "showings"]
 
@@ -119,17 +113,9 @@ def showings(calibrated: Calibrated) -> list[Showing]:
         if not len(views):
             continue
         poses = calibrated.sensors[number] @ calibrated.poses[views]
-        parts, empty = _parts(calibrated, number)
-        found.append(
-            Showing(
-                camera.name,
-                board.unit,
-                parts,
-                empty,
-                np.linalg.norm((poses @ middle)[:, :3], axis=1),
-                np.degrees(np.arccos(np.clip(np.abs(poses[:, 2, 2]), 0.0, 1.0))),
-            )
-        )
+        distances = np.linalg.norm((poses @ middle)[:, :3], axis=1)
+        tilts = np.degrees(np.arccos(np.clip(np.abs(poses[:, 2, 2]), 0.0, 1.0)))
+        found.append(Showing(camera.name, board.unit, *_parts(calibrated, number), distances, tilts))
     return found
 
 
@@ -173,8 +159,7 @@ def judged(calibrated: Calibrated, worth: Worth | None = None) -> Calibrated:
 
 def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
     """Return the tests of the block, with what is said of calibrations in the place of control."""
-    judge: Snooped | object = calibrated.snooped or calibrated.result
-    found = findings_of(judge)
+    found = findings_of(calibrated.snooped or calibrated.result)
     shown = showings(calibrated)
     cross = () if worth is None else worth.cross
     wrong = [_systematic(each) for each in cross if not each.explained]

@@ -27,21 +27,11 @@ __all__ = [
 
 
 def homographies(places: Floats, xy: Floats) -> Floats:
-    """Return the homography of the board to each picture, by direct linear transformation.
+    """Return (P, 3, m + 1) the homography of the board to each picture, by direct linear transformation.
 
-    Both sides are counted from their centroids and scaled to a mean distance of sqrt 2, in space of sqrt 3.
-
-    Parameters
-    ----------
-    places
-        (n, m) places of the points.
-    xy
-        (P, n, 2) pixels; NaN where not seen. Each picture has four points of a plane at least, no three of
-        them on a line; else six, not in a plane.
-
-    Returns
-    -------
-    (P, 3, m + 1), each of norm 1 in the scaled coordinates; the sign is not defined.
+    Both sides are counted from their centroids and scaled to a mean distance of sqrt 2, in space of sqrt 3;
+    in these each has norm 1, and no sign. Places are (n, m), pixels (P, n, 2), NaN where not seen: each
+    picture has four points of a plane at least, no three of them on a line; else six, not in a plane.
     """
     seen = np.isfinite(xy[..., 0])
     board, of_board = _scaled(np.broadcast_to(places, (len(xy), *places.shape)), seen)
@@ -51,18 +41,10 @@ def homographies(places: Floats, xy: Floats) -> Floats:
 
 
 def ray_homographies(places: Floats, rays: Floats) -> Floats:
-    """Return the homography of the board to the rays of each picture: ray x H (x, y, 1) = 0, or (x, y, z, 1).
+    """Return (P, 3, m + 1) homographies of the board to rays: ray x H (x, y, 1) = 0, or (x, y, z, 1).
 
-    Parameters
-    ----------
-    places
-        (n, m) places of the points.
-    rays
-        (P, n, 3) of length 1; NaN where not seen.
-
-    Returns
-    -------
-    (P, 3, m + 1) with the sign by which most points lie on the side of their rays.
+    Places are (n, m), rays (P, n, 3) of length 1, NaN where not seen. The sign is that by which most points
+    lie on the side of their rays.
     """
     seen = np.isfinite(rays[..., 0])
     board, of_board = _scaled(np.broadcast_to(places, (len(rays), *places.shape)), seen)
@@ -87,12 +69,8 @@ def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
 
         a1 b1 X + a2 b2 Y = -a3 b3,    (a1^2 - b1^2) X + (a2^2 - b2^2) Y = -(a3^2 - b3^2).
 
-    Parameters
-    ----------
-    found
-        (P, 3, m + 1) homographies to pixels. Of points that lie in no plane each has a camera matrix.
-    middle
-        (2,) the principal point; of a camera matrix it is its own.
+    Homographies are (P, 3, m + 1) to pixels; of points that lie in no plane each has a camera matrix, with a
+    principal point of its own, else it is the (2,) middle.
     """
     own = found.copy()
     own[:, :2] -= middle[:, np.newaxis] * found[:, 2:]

@@ -14,7 +14,7 @@ from photogram.network.hull import hull, outside
 from photogram.show.summary import Brief, Rows
 from photogram.targets.projection import DatumName, worst
 
-__all__ = ["UncertaintyCurve", "UncertaintyMap", "distance_text", "image_grid"]
+__all__ = ["UncertaintyCurve", "UncertaintyMap", "distance_text", "image_grid", "map_name"]
 
 
 def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
@@ -139,6 +139,12 @@ class UncertaintyMap(Brief):
                 "variance_row": flat[:, 1, 1],
             }
         )
+
+
+def map_name(found: UncertaintyMap) -> str:
+    """Return what files and pictures call a map: `left-infinity`."""
+    away = "infinity" if math.isinf(found.distance) else f"{found.distance:g}"
+    return f"{found.camera}-{away}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -223,20 +223,9 @@ def best_views(
     """Return views that make the largest standard deviation of a map smallest, each with those before it.
 
     Of splined lenses the root mean square counts: a view says something of the knots that it touches alone,
-    and hardly any makes the largest smaller.
-
-    Parameters
-    ----------
-    housing
-        The cameras.
-    functions
-        (n, 2, c) J of the map by the common unknowns, in a datum that stays as it is; by none of the board.
-    candidates
-        Views that may be taken, each once.
-    sizes, sd
-        (K, 2) of pictures, and the standard deviation of a corner in pixels.
-    count
-        How many views.
+    and hardly any makes the largest smaller. Functions are (n, 2, c) J of the map by the common unknowns, in
+    a datum that stays as it is; by none of the board. Candidates may be taken once each; sizes are (K, 2) of
+    pictures, `sd` that of a corner in pixels.
     """
     seen = [(each, added_by(housing, each.pose, sizes, sd)) for each in candidates]
     left = [(each, added) for each, added in seen if added is not None]

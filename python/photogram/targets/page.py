@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -17,7 +16,7 @@ from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.calibration_result import Calibrated, Worth
 from photogram.targets.drawing import draw_cross_validation, draw_difference, draw_uncertainty
 from photogram.targets.grouping import Groups, residual_groups
-from photogram.targets.maps import UncertaintyMap, distance_text
+from photogram.targets.maps import UncertaintyMap, distance_text, map_name
 from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
 from photogram.targets.splined import spline_lines
 from photogram.targets.tables import board_facts, prior_shift, views, worst_points
@@ -121,12 +120,15 @@ def worth_section(worth: Worth | None) -> Section:
 
 def drawings(worth: Worth) -> list[Drawing]:
     """Return all pictures, still to be drawn."""
-    found = [_of_map(each) for each in worth.maps]
+    found = [
+        Drawing(f"map-{map_name(each)}", _title(each), CAPTION, _figure(partial(draw_uncertainty, each)))
+        for each in worth.maps
+    ]
     for cross in worth.cross:
         for own in worth.maps:
             if own.camera in cross.cameras:
                 draw = partial(draw_cross_validation, cross, own)
-                name = f"cross-validation-{_name(own)}"
+                name = f"cross-validation-{map_name(own)}"
                 found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, _figure(draw)))
     return found + [_of_difference(each) for each in worth.differences]
 
@@ -141,10 +143,6 @@ def _tests(worth: Worth) -> list[Fact]:
     return found
 
 
-def _of_map(found: UncertaintyMap) -> Drawing:
-    return Drawing(f"map-{_name(found)}", _title(found), CAPTION, _figure(partial(draw_uncertainty, found)))
-
-
 def _of_difference(found: CameraDifference) -> Drawing:
     name = f"difference-{found.cameras[0]}-{found.cameras[1]}".replace(" ", "-")
     return Drawing(name, "Difference", APART, _figure(partial(draw_difference, found)))
@@ -152,11 +150,6 @@ def _of_difference(found: CameraDifference) -> Drawing:
 
 def _title(found: UncertaintyMap) -> str:
     return f"{found.camera} {distance_text(found.distance, found.unit)}"
-
-
-def _name(found: UncertaintyMap) -> str:
-    away = "infinity" if math.isinf(found.distance) else f"{found.distance:g}"
-    return f"{found.camera}-{away}"
 
 
 def _figure(draw: partial[object]) -> partial[Figure]:

@@ -41,16 +41,9 @@ def settled(
     """Return corners that agree with their neighbours, refined, and the numbers of their points.
 
     Those that do not are looked for again where their neighbours put them, and left out if not there. Seven
-    corners or fewer say nothing of each other, and are left out.
-
-    Parameters
-    ----------
-    points, xy
-        (n,) numbers and (n, 2) first places in the picture.
-    places
-        (b, 2) points of the board.
-    half
-        Of the window of a corner, over the distance between the nearest points of the board.
+    corners or fewer say nothing of each other, and are left out. Points and xy are (n,) numbers and (n, 2)
+    first places in the picture, `places` (b, 2) points of the board; `half` is that of the window of a
+    corner, over the distance between the nearest points of the board.
     """
     own = places[points]
     sides = half * _scales(own, xy)

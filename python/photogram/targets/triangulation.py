@@ -83,20 +83,11 @@ class Triangulated:
 def triangulated(
     housing: Housing, cameras: Sequence[int], pixels: Floats, pixel_sd: float, still: Floats | None = None
 ) -> Triangulated:
-    """Return points by their images in k cameras.
+    """Return points by their (n, k, 2) images in k cameras of a housing, 2 or more, by their numbers.
 
-    Parameters
-    ----------
-    housing, cameras
-        The cameras, and the numbers of k of them, 2 or more.
-    pixels
-        (n, k, 2) images of n points.
-    pixel_sd
-        Standard deviation of an image coordinate, pixels.
-    still
-        (6, c + 6) the motion of the axes of camera 0 that goes with the unknowns
-        (:func:`~photogram.targets.projection.housing_rows`), where points are fixed to the housing; None:
-        they are in the axes of camera 0 themselves.
+    `pixel_sd` is that of an image coordinate. Where points are fixed to the housing, `still` is (6, c + 6)
+    the motion of the axes of camera 0 that goes with the unknowns
+    (:func:`~photogram.targets.projection.housing_rows`); None: they are in the axes of camera 0 themselves.
     """
     points = _settled(housing, cameras, pixels, _met(housing, cameras, pixels))
     residuals, by_point, by_common = _rows(housing, cameras, pixels, points)

@@ -34,19 +34,10 @@ ABSENT = -1.0
 def mrcal_models(rig: Rig, valid: dict[int, Floats] | None = None) -> dict[str, bytes]:
     """Return a file a camera.
 
-    Parameters
-    ----------
-    rig
-        The cameras; `optimization_inputs` go with them where the calibration is at hand and mrcal could have
-        made it: a board on a grid, its shape held or two parabolas, cameras of one model, no single term of a
-        lens held.
-    valid
-        (n, 2) by the numbers of cameras: the closed outline of what is known well enough.
-
-    Raises
-    ------
-    InputError
-        A lens that mrcal has not, pictures of unknown size.
+    `optimization_inputs` go with the cameras where the calibration is at hand and mrcal could have made it: a
+    board on a grid, its shape held or two parabolas, cameras of one model, no single term of a lens held.
+    `valid` is (n, 2) by the numbers of cameras: the closed outline of what is known well enough. InputError:
+    a lens that mrcal has not, pictures of unknown size.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     inputs = None if rig.calibrated is None else _inputs(rig, rig.calibrated, lenses)
