@@ -118,8 +118,8 @@ class Uncertainty:
             Reads and adjusts another one, with the options of this.
         """
         from photogram.targets.appraisal import appraise
-        from photogram.targets.differences import difference
         from photogram.targets.findings import judged
+        from photogram.targets.uncertainty import difference
 
         with job.status("uncertainty") as status:
             own = appraise(found, self.asked(), None if status is None else status.update)

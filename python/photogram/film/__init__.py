@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
     from photogram.film.interior import Affine, Interior, interior_orientation
     from photogram.film.lens_table import Curve, LensParameters, RadialTable, Tangential
-    from photogram.film.mark_identity import FilmWay, WhichMark, which_mark
+    from photogram.film.marks import FilmWay, WhichMark, which_mark
     from photogram.film.steps import StepsCompared, compare_steps
     from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
@@ -58,7 +58,7 @@ _HOMES = {
     "DatedCamera": "years",
     "DistanceDifference": "certificate_check",
     "Explanation": "certificate_check",
-    "FilmWay": "mark_identity",
+    "FilmWay": "marks",
     "Interior": "interior",
     "interior_orientation": "interior",
     "LensParameters": "lens_table",
@@ -67,8 +67,8 @@ _HOMES = {
     "RightAngle": "distances",
     "StepsCompared": "steps",
     "Tangential": "lens_table",
-    "which_mark": "mark_identity",
-    "WhichMark": "mark_identity",
+    "which_mark": "marks",
+    "WhichMark": "marks",
 }
 """The module of each name, loaded when it is first asked for: most blocks are not on film."""
 

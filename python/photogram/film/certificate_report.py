@@ -37,7 +37,7 @@ from photogram.statistics.distributions import LEVEL, bonferroni, critical_norma
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["certificate_document", "certificate_page", "certificate_report", "limit_of"]
+__all__ = ["certificate_document", "certificate_page", "certificate_report"]
 
 
 @report_of.register(Certificate)

@@ -22,7 +22,6 @@ from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
 __all__ = [
-    "LOCATIONS",
     "ControlQuality",
     "MotionQuality",
     "PhotoQuality",
@@ -31,7 +30,6 @@ __all__ = [
     "locations",
     "motion_quality",
     "photo_quality",
-    "photo_redundancy",
     "point_quality",
     "with_known_readout",
 ]

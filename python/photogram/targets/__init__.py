@@ -8,16 +8,14 @@ from photogram.arguments.annotations import check_arguments
 from photogram.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from photogram.targets.appraisal import appraise
+    from photogram.targets.appraisal import appraise, cross_validate
     from photogram.targets.board import Board
     from photogram.targets.calibration import Calibration, simulate_corners
     from photogram.targets.calibration_difference import CameraDifference
     from photogram.targets.calibration_result import Calibrated, Worth, WorthOptions
     from photogram.targets.conversion import Conversion, convert_lens
     from photogram.targets.corners import Corners
-    from photogram.targets.cross_validated import cross_validate
     from photogram.targets.cross_validation import CrossValidation
-    from photogram.targets.differences import difference
     from photogram.targets.first_calibration import FirstCalibration, first_values
     from photogram.targets.grouping import corner_components, residual_groups
     from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
     from photogram.targets.suggestions import suggest_views
     from photogram.targets.triangulation import Triangulated, distance_uncertainty, triangulate
     from photogram.targets.uncertainty import (
+        difference,
         projection_uncertainty,
         uncertainty_against_distance,
         uncertainty_map,
@@ -90,9 +89,9 @@ _HOMES = {
     "convert_lens": "conversion",
     "corner_components": "grouping",
     "Corners": "corners",
-    "cross_validate": "cross_validated",
+    "cross_validate": "appraisal",
     "CrossValidation": "cross_validation",
-    "difference": "differences",
+    "difference": "uncertainty",
     "distance_uncertainty": "triangulation",
     "first_values": "first_calibration",
     "FirstCalibration": "first_calibration",

@@ -27,7 +27,7 @@ from photogram.targets.regularisation import regularised
 from photogram.targets.start import Start
 from photogram.targets.vision import FLIP, photo_poses
 
-__all__ = ["Calibration", "checked_clocks", "marked_as_mrcal", "simulate_corners", "weighted_block"]
+__all__ = ["Calibration", "simulate_corners", "weighted_block"]
 
 
 class Calibration(Start):

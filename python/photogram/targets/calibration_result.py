@@ -35,9 +35,7 @@ from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
 __all__ = [
-    "STEPS",
     "Calibrated",
-    "Part",
     "UnknownWeight",
     "Worth",
     "WorthOptions",

@@ -27,7 +27,6 @@ from photogram.targets.projection import common_partials, datum_rows
 from photogram.targets.vision import unknown_of, values_of
 
 __all__ = [
-    "CrossMap",
     "CrossValidation",
     "DifferenceTest",
     "Into",

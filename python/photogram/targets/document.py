@@ -20,8 +20,7 @@ from photogram.targets.calibration_result import Calibrated, Worth
 from photogram.targets.cross_validation import CrossValidation, DifferenceTest, changes_between
 from photogram.targets.maps import UncertaintyMap, map_name
 from photogram.targets.new_views import Suggestions
-from photogram.targets.splined import splines
-from photogram.targets.tables import STRETCHES, board_fit, prior_shift, views
+from photogram.targets.tables import STRETCHES, board_fit, prior_shift, splines, views
 
 __all__ = ["calibration_document", "to_json", "worth_files", "worth_members"]
 

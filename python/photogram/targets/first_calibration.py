@@ -20,7 +20,7 @@ from photogram.targets.orders import Pictures, rays_shown
 from photogram.targets.sightings import LISTED, Listings, Sightings
 from photogram.targets.vision import composed, inverted
 
-__all__ = ["FirstCalibration", "Rig", "connected", "first_values", "mean_pose"]
+__all__ = ["FirstCalibration", "connected", "first_values", "mean_pose"]
 
 AGREE = 0.2
 """Radians, or parts of the distance of boards: poses that are apart by less are of one sensor."""

@@ -24,7 +24,7 @@ from photogram.show.quantity import Axis, Quantity
 from photogram.targets.calibration import weighted_block
 from photogram.targets.calibration_result import Calibrated
 
-__all__ = ["CELLS", "CornerBasis", "Groups", "corner_components", "mean_residuals", "residual_groups"]
+__all__ = ["Groups", "corner_components", "mean_residuals", "residual_groups"]
 
 Groups = Literal["camera", "level", "point", "cell", "radius"]
 """What residuals are summed up by."""

@@ -28,7 +28,6 @@ __all__ = [
     "GRID",
     "HELD",
     "KNOTS",
-    "LENS_TERMS",
     "Moved",
     "Points",
     "field_of",

@@ -28,7 +28,7 @@ from photogram.targets.corners import Corners
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
 
-__all__ = ["PREFIX", "freed", "lens_of_mrcal", "read_lens", "read_model"]
+__all__ = ["PREFIX", "read_lens", "read_model"]
 
 PREFIX = "LENSMODEL_"
 CORE = ("fx", "fy", "cx", "cy")

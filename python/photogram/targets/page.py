@@ -18,13 +18,12 @@ from photogram.targets.drawing import draw_cross_validation, draw_difference, dr
 from photogram.targets.grouping import Groups, residual_groups
 from photogram.targets.maps import UncertaintyMap, distance_text, map_name
 from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
-from photogram.targets.splined import spline_lines
-from photogram.targets.tables import board_facts, prior_shift, views, worst_points
+from photogram.targets.tables import board_facts, prior_shift, spline_lines, views, worst_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["calibration_page", "drawings", "worth_facts", "worth_section"]
+__all__ = ["calibration_page", "drawings", "worth_facts"]
 
 
 @page_of.register(Calibrated)

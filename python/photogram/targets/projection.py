@@ -23,11 +23,9 @@ __all__ = [
     "datum_rows",
     "fixed_points",
     "housing_rows",
-    "image_partials",
     "of_functions",
     "point_partials",
     "projection_cofactors",
-    "with_motion",
     "worst",
 ]
 

@@ -17,7 +17,6 @@ from photogram.network.cameras import Camera
 __all__ = [
     "FLIP",
     "TURNED",
-    "Imaged",
     "composed",
     "cross_matrices",
     "imaged",

@@ -9,7 +9,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import is_mirrored, mirror_message, side_residuals, true_places
-from photogram.film.mark_identity import which_mark
+from photogram.film.marks import which_mark
 from photogram.formats.plain.film_sides import Laid, Lying, Seen, way_by_images
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine
