@@ -16,11 +16,10 @@ if TYPE_CHECKING:
     from photogram.targets.conversion import Conversion, convert_lens
     from photogram.targets.corners import Corners
     from photogram.targets.cross_validation import CrossValidation
-    from photogram.targets.first_calibration import FirstCalibration, first_values
+    from photogram.targets.first_calibration import FirstCalibration, first_values, nominal_camera
     from photogram.targets.grouping import corner_components, residual_groups
     from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
     from photogram.targets.new_views import Candidate, NewView, Suggestions
-    from photogram.targets.nominal import nominal_camera
     from photogram.targets.output.formats import camera_files
     from photogram.targets.reading import read
     from photogram.targets.suggestions import suggest_views
@@ -96,7 +95,7 @@ _HOMES = {
     "first_values": "first_calibration",
     "FirstCalibration": "first_calibration",
     "NewView": "new_views",
-    "nominal_camera": "nominal",
+    "nominal_camera": "first_calibration",
     "plan_views": "view_plan",
     "PlannedView": "view_plan_result",
     "projection_uncertainty": "uncertainty",

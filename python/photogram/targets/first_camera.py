@@ -20,9 +20,15 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
-from photogram.targets.homographies import angles_apart, focal_lengths, homographies, poses, ray_homographies
 from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
-from photogram.targets.sightings import Sightings
+from photogram.targets.sightings import (
+    Sightings,
+    angles_apart,
+    focal_lengths,
+    homographies,
+    poses,
+    ray_homographies,
+)
 from photogram.targets.vision import photo_poses, vision_poses
 
 __all__ = [

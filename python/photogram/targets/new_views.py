@@ -194,15 +194,16 @@ def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added 
     cameras, points = np.repeat(np.arange(len(shown)), [len(own) for own in shown]), np.concatenate(shown)
     if not len(points):
         return None
-    rows, before = view_rows(housing, pose, cameras, points), housing.board.start
-    by_cameras = rows.by_common[:, :, :before].reshape(-1, before) / sd
+    _, by_common, by_pose, by_place = view_rows(housing, pose, cameras, points)
+    before = housing.board.start
+    by_cameras = by_common[:, :, :before].reshape(-1, before) / sd
     touched = np.flatnonzero(by_cameras.any(axis=0))
     return Added(
         touched=touched,
         by_cameras=by_cameras[:, touched],
         places=before + 3 * points[:, np.newaxis] + np.arange(3),
-        by_place=rows.by_point / sd,
-        by_pose=rows.by_pose.reshape(-1, 6) / sd,
+        by_place=by_place / sd,
+        by_pose=by_pose.reshape(-1, 6) / sd,
         corners=np.bincount(cameras, minlength=len(housing.cameras)),
     )
 
@@ -258,30 +259,13 @@ def _rounded(value: float) -> float:
     return float(f"{value:.6g}")
 
 
-@dataclass(frozen=True, eq=False)
-class ViewRows:
-    """Images of n points in one view.
+def view_rows(
+    housing: Housing, pose: Floats, cameras: Indices, points: Indices
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return (n, 2) images of points of the board, each in one of the cameras, and their partials.
 
-    Attributes
-    ----------
-    xy
-        (n, 2) images, pixels.
-    by_common, by_pose
-        (n, 2, c) and (n, 2, 6) partials by the common unknowns and by the step (dt, w) of the pose.
-    by_point
-        (n, 2, 3) partials by the place of the point on the board.
-    """
-
-    xy: Floats
-    by_common: Floats
-    by_pose: Floats
-    by_point: Floats
-
-
-def view_rows(housing: Housing, pose: Floats, cameras: Indices, points: Indices) -> ViewRows:
-    """Return the images of points of the board, each in one of the cameras, and their partials.
-
-    The pose is (4, 4) board -> camera 0 of the view; cameras and points are (n,) of each image.
+    By the c common unknowns, (n, 2, c), by the step (dt, w) of the pose, (n, 2, 6), and by the place of the
+    point on the board, (n, 2, 3). The pose is (4, 4) board -> camera 0; cameras and points are (n,) of each.
     """
     xy, by_pose, by_point = (np.empty((len(points), 2, *more)) for more in ((), (6,), (3,)))
     by_common = np.zeros((len(points), 2, housing.common))
@@ -292,4 +276,4 @@ def view_rows(housing: Housing, pose: Floats, cameras: Indices, points: Indices)
         by_point[own] = in_first @ pose[:3, :3]
         by_common[own, :, housing.board] = by_point[own] @ housing.points_by_board[points[own]]
         by_pose[own] = in_first @ motion_partials(turned[own])
-    return ViewRows(xy, by_common, by_pose, by_point)
+    return xy, by_common, by_pose, by_point

@@ -9,8 +9,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.targets.first_camera import POOR, adjusted_views, rays_of
-from photogram.targets.homographies import angles_apart, centres, poses, ray_homographies
-from photogram.targets.sightings import LISTED, Sightings
+from photogram.targets.sightings import LISTED, Sightings, angles_apart, centres, poses, ray_homographies
 
 __all__ = ["Pictures", "rays_shown"]
 
