@@ -201,7 +201,7 @@ def calibrate(
         if planned.asked:
             planned.run(job, seen, uncertainty, documents, out)
             return
-        from photogram.targets.appraisal_page import drawings
+        from photogram.targets.page import drawings
 
         if path is None:
             path = job.packaged(*EXAMPLE)
@@ -254,7 +254,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     from photogram.formats.targets.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
-    from photogram.targets.appraisal_files import worth_files
+    from photogram.targets.document import worth_files
     from photogram.targets.tables import views
 
     files = {"report.txt": found.report().encode(), **table_files(found.result)}
@@ -271,7 +271,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
 def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[str, bytes]:
     """Make the files of the cameras in the formats of other programs, and their joint covariance."""
     from photogram.targets import camera_files
-    from photogram.targets.output.covariances import FILE, cameras_covariance
+    from photogram.targets.output.formats import FILE, cameras_covariance
 
     made = {
         f"{name}/{file}": content

@@ -14,7 +14,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
-    from photogram.targets.appraisal_report import WorthOptions
+    from photogram.targets.calibration_result import WorthOptions
     from photogram.targets.cross_validation import Into
 
 __all__ = ["NOT_GOOD_ENOUGH", "Uncertainty", "distances_of"]
@@ -68,7 +68,7 @@ class Uncertainty:
 
     def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""
-        from photogram.targets.appraisal_report import WorthOptions
+        from photogram.targets.calibration_result import WorthOptions
 
         return WorthOptions(
             distances=self.distances,
@@ -106,8 +106,8 @@ class Uncertainty:
             Reads and adjusts another one, with the options of this.
         """
         from photogram.targets.appraisal import appraise
-        from photogram.targets.differences import difference
         from photogram.targets.findings import judged
+        from photogram.targets.uncertainty import difference
 
         with job.status("uncertainty") as status:
             own = appraise(found, self.asked(), None if status is None else status.update)

@@ -11,7 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
-from photogram.film.datum import with_datum
+from photogram.film.distances import with_datum
 from photogram.film.validity import age_remark, changed_remark, valid_certificate
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.tables import Tables

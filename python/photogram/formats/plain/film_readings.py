@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import conformal, is_mirrored, mirror_message, side_residuals, true_places
-from photogram.film.mark_identity import which_mark
+from photogram.film.marks import which_mark
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.images import Images
 from photogram.formats.plain.photos import Photos
