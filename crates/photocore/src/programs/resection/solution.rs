@@ -1,10 +1,11 @@
 //! The adjusted photo.
+//!
+//! What an adjustment from one start has led to.
 
+use super::adjust::{At, SinglePhoto};
 use super::degenerate::{Degeneracy, outside_cylinder};
-use super::model::{At, SinglePhoto};
-use super::solved::{Solved, absolute};
 use super::{Pose, Resection};
-use crate::adjustment::{Adjustment, leading_matrix, standardized};
+use crate::adjustment::{Adjustment, Problem, Status, leading_matrix, standardized};
 
 /// A control point after the adjustment.
 #[derive(Debug, Clone, Copy)]
@@ -186,4 +187,38 @@ fn images(
         }
     };
     (0..points.len()).map(image).collect()
+}
+
+/// An adjustment, and the problem it solved.
+pub(super) struct Solved {
+    pub problem: Problem<SinglePhoto>,
+    pub adjustment: Adjustment,
+    pub start: Pose,
+    pub origin: [f64; 3],
+}
+
+impl Solved {
+    pub fn pose(&self) -> Pose {
+        absolute(&self.adjustment.unknowns[self.problem.layout().all_retained()], self.origin)
+    }
+
+    /// Weighted sum of squares at the end.
+    pub fn sum_of_squares(&self) -> f64 {
+        let last = self.adjustment.iterations.last();
+        last.map_or(self.adjustment.initial_sum_of_squares, |iteration| iteration.sum_of_squares)
+    }
+
+    pub fn behind(&self) -> Vec<usize> {
+        self.problem.model.behind(&self.adjustment.unknowns)
+    }
+
+    pub fn converged(&self) -> bool {
+        self.adjustment.status == Status::Converged
+    }
+}
+
+/// A pose counted from the origin of the object space again.
+pub(super) fn absolute(values: &[f64], origin: [f64; 3]) -> Pose {
+    let local = Pose::from_unknowns(values);
+    local.counted_from(origin.map(|value| -value))
 }
