@@ -1,14 +1,21 @@
 //! Observations of a network beside its images (lengths, differences of coordinates, positions and attitudes of photos ...).
 //!
-//! Each kind is a file with a type that implements [`ObservationModel`], and a line of `kinds!` below. It writes observed minus
-//! computed, and the partials of the computed values by positions and rotations; [`Rows`] turns these into the columns of the unknowns.
+//! Each kind is a type that implements [`ObservationModel`], in a file of its own or in one with others that are of the same things, and
+//! a line of `kinds!` below. It writes observed minus computed, and the partials of the computed values by positions and rotations; [`Rows`] turns these into the columns of the unknowns.
 
 mod adjusted;
+mod equal_height;
 mod fault;
+mod film;
 mod model;
+mod motion;
+mod on_figure;
+mod photos;
+mod points;
 mod precision;
 mod rows;
 mod tied;
+mod unknowns;
 
 use nalgebra::DMatrix;
 
@@ -16,9 +23,9 @@ use self::model::{deviation, in_own_axes, nine, own_axes, rotates, rows_of, thre
 use super::commons::{Common, CommonKind};
 
 pub use adjusted::{AdjustedObservation, KindSums};
-pub(super) use attitude::misalignment;
 pub use fault::Fault;
 pub use model::{Named, ObservationModel, Quantity, Touches};
+pub(super) use photos::misalignment;
 pub use precision::Precision;
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
 pub use rows::{Rows, Sites};
@@ -26,8 +33,7 @@ pub(super) use tied::{TiedModel, TiedObservation};
 
 macro_rules! kinds {
     ($($module:ident::$name:ident;)*) => {
-        $(mod $module;
-        pub use $module::$name;)*
+        $(pub use $module::$name;)*
 
         /// An observation of any kind.
         #[derive(Debug, Clone, PartialEq)]
@@ -121,24 +127,24 @@ macro_rules! kinds {
 }
 
 kinds! {
-    control::Control;
-    distance::Distance;
-    difference::Difference;
+    points::Control;
+    points::Distance;
+    points::Difference;
     equal_height::EqualHeight;
-    on_level::OnLevel;
-    on_plane::OnPlane;
-    on_plumb_line::OnPlumbLine;
-    on_line::OnLine;
-    range::Range;
-    position::Position;
-    attitude::Attitude;
-    relative::Relative;
-    base::Base;
-    prior::Prior;
-    velocity::Velocity;
-    rate::Rate;
-    smoothness::Smoothness;
-    fiducial::Fiducial;
+    on_figure::OnLevel;
+    on_figure::OnPlane;
+    on_figure::OnPlumbLine;
+    on_figure::OnLine;
+    photos::Range;
+    photos::Position;
+    photos::Attitude;
+    photos::Relative;
+    unknowns::Base;
+    unknowns::Prior;
+    motion::Velocity;
+    motion::Rate;
+    unknowns::Smoothness;
+    film::Fiducial;
     film::Film;
 }
 

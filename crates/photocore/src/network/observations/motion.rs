@@ -1,4 +1,4 @@
-//! Rates of rotation from gyroscopes.
+//! How a photo on a trajectory moves: velocities from GNSS, rates of rotation from gyroscopes.
 
 use nalgebra::DMatrix;
 
@@ -7,6 +7,67 @@ use super::{
     three,
 };
 use crate::geometry::{Matrix3, Vector3};
+
+/// The velocity of the antenna of a photo or record on a trajectory, in the cartesian axes of the object space.
+///
+/// `C' + A [w]x l`, with the partials `I` by C', `-A [l]x` by w, `-A [w x l]x` by rho and `A [w]x` by l.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Velocity {
+    /// The photo, which is on a trajectory.
+    pub photo: usize,
+    /// Units of the object space in a second.
+    pub velocity: [f64; 3],
+    /// l, from the projection centre to the antenna in the photo's axes.
+    pub lever_arm: Quantity<Vector3>,
+    /// Of X, Y, Z.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Velocity {
+    const NAME: &'static str = "velocity";
+
+    /// The velocity, l where it is known; the lever arm.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[photo], &[lever_arm]) = (of.photos, of.commons) else { return None };
+        let lever_arm = Quantity::new(lever_arm, three(values, 3)?.into());
+        let precision = Precision::Covariance(covariance);
+        Some(Self { photo, velocity: three(values, 0)?, lever_arm, precision })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::photos(&[self.photo]).and(self.lever_arm.common(), CommonKind::LeverArm)
+    }
+
+    fn moves(&self) -> bool {
+        true
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let Some(moving) = sites.moving(0) else { return };
+        let attitude = sites.pose(0).attitude;
+        let lever_arm = match self.lever_arm {
+            Quantity::Known(lever_arm) => lever_arm,
+            Quantity::Common(_) => sites.common(0).vector(),
+        };
+        let around = moving.rate.cross(&lever_arm);
+        let computed = moving.velocity + attitude * around;
+        rows.residual(0, (Vector3::from(self.velocity) - computed).as_slice());
+        rows.by_velocity(0, 0, &Matrix3::identity());
+        rows.by_rate(0, 0, &(-attitude * lever_arm.cross_matrix()));
+        rows.by_rotation(0, 0, &(-attitude * around.cross_matrix()));
+        if self.lever_arm.common().is_some() {
+            rows.by_offset(0, 0, &(attitude * moving.rate.cross_matrix()));
+        }
+    }
+}
 
 /// The rate of the body that carries a camera, about its own axes, at a photo or record on a trajectory.
 ///
