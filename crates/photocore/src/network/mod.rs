@@ -80,6 +80,7 @@ mod screens;
 mod selection;
 mod solution;
 mod state;
+mod station_values;
 mod stations;
 mod surroundings;
 mod suspects;

@@ -1,0 +1,104 @@
+//! The unknowns of photos, shared cameras and common unknowns before the adjustment: values, observed values, standard deviations.
+
+use super::median::median;
+use super::model::Bundle;
+use super::surroundings::Surroundings;
+use super::{Camera, Network, Photo};
+use crate::geometry::{ObjectSpace, Orientation, POSE, PoseNumbers, Vector3, nearest_turns};
+
+impl Network {
+    /// The projection centre of given six unknowns.
+    pub(super) fn centre(&self, pose: &[f64; POSE]) -> Vector3 {
+        match self.poses {
+            PoseNumbers::Angles(_) => self.space.cartesian([pose[0], pose[1], pose[2]]),
+            PoseNumbers::Vectors => Orientation::new(self.poses, self.space, pose).centre(),
+        }
+    }
+
+    /// A point near the photos: coordinates are counted from it while the network is adjusted, so that no digits are lost in
+    /// large ones. Medians, so that a single photo with a wrong position does not move it. Geographic coordinates stay as they
+    /// are, differences being formed in geocentric space; so do poses in vectors, whose translations turn with the rotation, and
+    /// coordinates on a body that turns under inertial tables, which are counted from its centre.
+    pub(super) fn origin(&self, middle: [f64; 3]) -> [f64; 3] {
+        let turns = self.trajectories.iter().any(|own| own.course.body.is_some());
+        match (self.space, self.poses) {
+            (ObjectSpace::Rectangular, PoseNumbers::Angles(_)) if !turns => middle.map(f64::round),
+            _ => [0.0; 3],
+        }
+    }
+
+    /// The medians of the coordinates of the photos.
+    pub(super) fn middle(&self) -> [f64; 3] {
+        let middle = |k: usize| median(self.photos.iter().map(|photo| photo.pose[k]).collect());
+        std::array::from_fn(|k| middle(k).unwrap_or_default())
+    }
+
+    pub(super) fn camera(&self, photo: &Photo) -> &Camera {
+        &self.cameras[photo.camera]
+    }
+
+    /// Standard deviations of the unknowns of photos, shared cameras and common unknowns; those of `unused` and of carried photos, of
+    /// cameras that have no others, and of common unknowns that nothing which takes part is of, are held.
+    pub(super) fn station_sd(
+        &self,
+        model: &Bundle,
+        surroundings: &Surroundings,
+        unused: impl Fn(usize) -> bool,
+    ) -> Vec<f64> {
+        let mut all = Vec::new();
+        let mut used = vec![false; self.cameras.len()];
+        surroundings.cameras().into_iter().for_each(|camera| used[camera] = true);
+        let (commons, photos) = (surroundings.commons(), surroundings.photos());
+        let of_commons = |own: &[usize], elsewhere: bool| {
+            let of_common = |&common: &usize| {
+                let is_used = elsewhere || model.commons[common].uses > 0 || commons.contains(&common);
+                self.commons[common].sd.iter().map(move |&sd| if is_used { sd } else { 0.0 })
+            };
+            own.iter().flat_map(of_common).collect::<Vec<f64>>()
+        };
+        for (index, photo) in self.photos.iter().enumerate() {
+            let own = if model.has_own_camera(index) { &self.camera(photo).sd[..] } else { &[] };
+            used[photo.camera] |= !unused(index);
+            let held = unused(index) || model.is_carried(index);
+            all.extend(photo.sd.iter().chain(own).map(|&sd| if held { 0.0 } else { sd }));
+            all.extend(of_commons(model.blocks.commons_of(index), photos.contains(&index)));
+        }
+        for &camera in &model.blocks.shared {
+            all.extend(self.cameras[camera].sd.iter().map(|&sd| if used[camera] { sd } else { 0.0 }));
+        }
+        model.blocks.commons.iter().for_each(|own| all.extend(of_commons(own, false)));
+        all
+    }
+
+    /// The values of the unknowns of photos, with the given poses, of shared cameras and common unknowns.
+    pub(super) fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; POSE]) -> Vec<f64> {
+        let mut all = Vec::new();
+        for (index, photo) in self.photos.iter().enumerate() {
+            all.extend(pose(photo));
+            if model.has_own_camera(index) {
+                all.extend(self.camera(photo).camera.parameters());
+            }
+            // Common unknowns count from what is given.
+            all.resize(all.len() + model.of_block(index).len() - model.of_photo(index).len(), 0.0);
+        }
+        all.extend(model.blocks.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
+        all.resize(model.of_stations().len(), 0.0);
+        all
+    }
+
+    /// The observed pose of a photo, as near to the initial one as whole turns bring it.
+    pub(super) fn observed_pose(&self, photo: &Photo) -> [f64; POSE] {
+        let near = nearest_turns(photo.observed, photo.pose);
+        let turning = |k: usize| match self.poses {
+            PoseNumbers::Angles(_) => k >= 3 || k == 0 && self.space != ObjectSpace::Rectangular,
+            PoseNumbers::Vectors => false,
+        };
+        std::array::from_fn(|k| if turning(k) { near[k] } else { photo.observed[k] })
+    }
+
+    /// Whether a photo's attitude steps by a rotation vector: a fixed angle keeps its bits.
+    pub(super) fn turns(&self, photo: usize) -> bool {
+        let fixed = self.photos[photo].sd[3..].contains(&0.0);
+        !fixed && matches!(self.poses, PoseNumbers::Angles(_))
+    }
+}
