@@ -180,7 +180,7 @@ impl<'a> Run<'a, '_> {
         Ok((before, found))
     }
 
-    /// The second-order term a of a step (see [`super::acceleration`]), and a^T (N + damping) a.
+    /// The second-order term a of a step, and a^T (N + damping) a.
     fn second_order(&mut self, state: &State<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
         let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));

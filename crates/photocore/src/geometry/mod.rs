@@ -9,8 +9,7 @@
 //! * [`mod@film`]: from the frame of a camera to the reading of a scanned film; [`mod@correction`]: readings of comparators and scanners;
 //! * [`lens`]: radial and decentering distortion, forward and inverse;
 //! * [`plate_lens`]: the lens of a star plate;
-//! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates;
-//! * [`mod@pointing`]: the attitude of a camera under the sky;
+//! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates, the attitude of a camera under the sky;
 //! * [`refraction`]: how air and water displace a point, [`atmosphere`]: the air;
 //! * [`mod@nearest`]: the nearest of many points in a plane;
 //! * [`mod@trajectory`]: poses as functions of time;

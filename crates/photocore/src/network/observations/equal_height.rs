@@ -47,3 +47,14 @@ impl ObservationModel for EqualHeight {
         sites.up()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::agrees;
+    use super::EqualHeight;
+
+    #[test]
+    fn partials_agree_with_differences() {
+        agrees(&EqualHeight { points: [0, 1], difference: 0.2, sd: 0.01 }.into());
+    }
+}

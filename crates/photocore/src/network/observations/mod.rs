@@ -4,18 +4,11 @@
 //! a line of `kinds!` below. It writes observed minus computed, and the partials of the computed values by positions and rotations; [`Rows`] turns these into the columns of the unknowns.
 
 mod adjusted;
-mod equal_height;
 mod fault;
-mod film;
 mod model;
-mod motion;
-mod on_figure;
-mod photos;
-mod points;
 mod precision;
 mod rows;
 mod tied;
-mod unknowns;
 
 use nalgebra::DMatrix;
 
@@ -32,9 +25,13 @@ pub use rows::{Rows, Sites};
 pub(super) use tied::{TiedModel, TiedObservation};
 
 macro_rules! kinds {
-    ($($module:ident::$name:ident;)*) => {
-        $(pub use $module::$name;)*
-
+    ($($module:ident::$($name:ident)? $({$($member:ident),*})?;)*) => {
+        $(mod $module;
+        $(pub use $module::$name;)?
+        $(pub use $module::{$($member),*};)?)*
+        kinds! { @kinds $($($name)? $($($member)*)?)* }
+    };
+    (@kinds $($name:ident)*) => {
         /// An observation of any kind.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Observation {
@@ -127,25 +124,13 @@ macro_rules! kinds {
 }
 
 kinds! {
-    points::Control;
-    points::Distance;
-    points::Difference;
+    points::{Control, Distance, Difference};
     equal_height::EqualHeight;
-    on_figure::OnLevel;
-    on_figure::OnPlane;
-    on_figure::OnPlumbLine;
-    on_figure::OnLine;
-    photos::Range;
-    photos::Position;
-    photos::Attitude;
-    photos::Relative;
-    unknowns::Base;
-    unknowns::Prior;
-    motion::Velocity;
-    motion::Rate;
-    unknowns::Smoothness;
-    film::Fiducial;
-    film::Film;
+    on_figure::{OnLevel, OnPlane, OnPlumbLine, OnLine};
+    photos::{Range, Position, Attitude, Relative};
+    unknowns::{Base, Prior};
+    motion::{Velocity, Rate, Smoothness};
+    film::{Fiducial, Film};
 }
 
 impl Observation {

@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 use super::error::{Cause, SimilarityError};
 use super::misclosures::Weighted;
 use super::model::{AsControl, CHANGES, SCALE};
-use super::moments::Chosen;
 use super::solution::Solution;
+use super::start::Chosen;
 use super::transform::Similarity;
-use super::{Method, Options, Start, Station, determinacy, moments, published};
+use super::{Method, Options, Start, Station, determinacy, published, start};
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Event, Problem, Status, Stop};
 use crate::normals::{Layout, Ordering, System};
@@ -35,7 +35,7 @@ pub fn orient_on(
     determinacy::check_counts(stations, held)?;
     // The solvers of the library ask how many threads there are: elsewhere that would start those of the whole process.
     let chosen = threads.install(|| {
-        let chosen = moments::choose(stations, options.start, options.scale)?;
+        let chosen = start::choose(stations, options.start, options.scale)?;
         determinacy::check_geometry(stations, &chosen.similarity, held).map(|()| chosen)
     })?;
     match options.method {
@@ -53,7 +53,7 @@ pub fn orient_on(
 /// Control that does not determine the parameters, or a mirror image.
 pub fn closed_form(stations: &[Station]) -> Result<Similarity, SimilarityError> {
     determinacy::check_counts(stations, false)?;
-    Ok(moments::choose(stations, Start::ClosedForm, None)?.similarity)
+    Ok(start::choose(stations, Start::ClosedForm, None)?.similarity)
 }
 
 /// Adjusts by the engine; after the cycles of the bulletin only for cofactors and statistics.

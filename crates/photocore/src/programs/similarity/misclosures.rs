@@ -10,7 +10,7 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 
 use super::model::SCALE;
-use super::moments::Chosen;
+use super::start::Chosen;
 use super::transform::{Matrix7, Similarity, propagate};
 use super::{SimilarityError, Station, determinacy};
 use crate::geometry::cramer::solve;

@@ -34,15 +34,16 @@ mod model;
 mod moments;
 mod published;
 mod solution;
+mod start;
 mod transform;
 
 use crate::geometry::Vector3;
 
 pub use adjust::{closed_form, orient, orient_on};
 pub use error::{Cause, SimilarityError};
-pub use moments::Started;
 pub use published::{Trace, gauss_crout};
 pub use solution::{AdjustedStation, Solution};
+pub use start::Started;
 pub use transform::{Matrix7, Parameters, Similarity};
 
 /// A station: a point of the model with some of its control coordinates.

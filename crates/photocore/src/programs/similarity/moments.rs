@@ -8,18 +8,14 @@
 //! With s held S(A) = sum_j a_j^T M_j a_j - 2 s sum_j a_j . c_j + s^2 V.
 //!
 //! Its minima over all rotations are found without the stations and without initial values.
-//!
-//! Initial values.
 
 use nalgebra::Matrix4;
 
-use super::determinacy::{known_mean, spread};
 use super::transform::Similarity;
-use super::{SimilarityError, Start, Station};
+use super::{SimilarityError, Station};
 use crate::geometry::angle_axis::quaternion_rotation;
 use crate::geometry::cramer::solve;
 use crate::geometry::{Matrix3, Vector3, rotation};
-use crate::sorting::sort_by;
 
 /// Steps of one descent at the most, and the rotation (rad) below which it has arrived.
 const STEPS: usize = 100;
@@ -212,135 +208,4 @@ impl Moments {
 
 fn closer(a: &Matrix3, b: &Matrix3, limit: f64) -> bool {
     (a - b).amax() < limit
-}
-
-/// Another minimum fits as well when its sum of squares is at most this multiple of the least.
-const AS_WELL: f64 = 4.0;
-/// Initial values with direction cosines as near as this to those of the goal lead there.
-const CLOSE: f64 = 0.5;
-/// Rotations whose direction cosines are as near as this are one minimum.
-const ALIKE: f64 = 1e-4;
-/// Misclosures below this fraction of the size of the model are rounding.
-const NOTHING: f64 = 1e-9;
-
-/// Which initial values were taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Started {
-    /// Those of a former result.
-    Restart,
-    /// Those of the report.
-    Report,
-    /// Those of the closed form.
-    ClosedForm,
-}
-
-/// Initial values, and what else might have been taken.
-#[derive(Debug)]
-pub struct Chosen {
-    pub similarity: Similarity,
-    pub started: Started,
-    /// Other orientations that fit as well.
-    pub alternatives: Vec<Similarity>,
-}
-
-/// Chooses initial values as asked; the scale may be held.
-pub fn choose(stations: &[Station], start: Start, held: Option<f64>) -> Result<Chosen, SimilarityError> {
-    let (control_centre, model_centre) = centres(stations);
-    let only = |similarity, started| Chosen { similarity, started, alternatives: vec![] };
-    match start {
-        Start::Given(parameters) => {
-            let mut given = Similarity::from_parameters(&parameters, control_centre, model_centre);
-            given.scale = held.unwrap_or(given.scale);
-            Ok(only(given, Started::Restart))
-        }
-        Start::Report => Ok(only(report(stations, control_centre, model_centre, held)?, Started::Report)),
-        Start::ClosedForm | Start::Auto => {
-            let moments = Moments::new(stations, control_centre, model_centre, held);
-            let mut minima = moments.best()?;
-            let report = report(stations, control_centre, model_centre, held).ok();
-            let report = report.filter(|_| start == Start::Auto);
-            let sum = |similarity: &Similarity| sum_of_squares(stations, similarity);
-            sort_by(&mut minima, &|a, b| sum(a).total_cmp(&sum(b)));
-            let Some(best) = minima.first().copied() else {
-                // Only mirror images fit: let the report's values show it.
-                return report.map(|r| only(r, Started::Report)).ok_or(SimilarityError::Scale(f64::NAN));
-            };
-            let rounding = (NOTHING * spread(stations)).powi(2);
-            let as_well = |similarity: &Similarity| sum(similarity) <= AS_WELL * sum(&best) + rounding;
-            let reached = report.and_then(|r| moments.descend(&r.rotation, &[])).filter(&as_well);
-            let goal = reached.unwrap_or(best);
-            let (similarity, started) = match report {
-                Some(report) if apart(&report, &goal) < CLOSE => (report, Started::Report),
-                _ => (goal, Started::ClosedForm),
-            };
-            let other = |minimum: &Similarity| as_well(minimum) && apart(minimum, &goal) > ALIKE;
-            Ok(Chosen { similarity, started, alternatives: minima.into_iter().filter(other).collect() })
-        }
-    }
-}
-
-/// Means of the known control coordinates and of the model.
-fn centres(stations: &[Station]) -> (Vector3, Vector3) {
-    let control = |k: usize, _| known_mean(stations, |s| s.known()[k].then(|| s.control[k]));
-    let model = |k: usize, _| known_mean(stations, |s| Some(s.model[k]));
-    (Vector3::from_fn(control), Vector3::from_fn(model))
-}
-
-fn sum_of_squares(stations: &[Station], similarity: &Similarity) -> f64 {
-    let squares = |station: &Station| -> f64 {
-        let u = similarity.misclosure(&station.control, &station.model);
-        u.iter().zip(station.known()).filter(|(_, known)| *known).map(|(u, _)| u * u).sum()
-    };
-    stations.iter().map(squares).sum()
-}
-
-/// Largest difference of the direction cosines of two rotations.
-fn apart(a: &Similarity, b: &Similarity) -> f64 {
-    (a.rotation - b.rotation).amax()
-}
-
-/// Initial values from the first two stations (TB 19, section 3, with kappa = theta_X - theta_x in its right quadrant):
-/// omega = phi = 0, s from the distance, translations as means.
-fn report(
-    stations: &[Station],
-    control_centre: Vector3,
-    model_centre: Vector3,
-    held: Option<f64>,
-) -> Result<Similarity, SimilarityError> {
-    let [first, second, ..] = stations else {
-        return Err(SimilarityError::FirstStations("are not there"));
-    };
-    if !(first.pair() && second.pair()) {
-        return Err(SimilarityError::FirstStations("have no horizontal coordinates"));
-    }
-    let [mut control, mut model] = [second.control - first.control, second.model - first.model];
-    let ([x, y, _], [p, q, _]): ([f64; 3], [f64; 3]) = (control.into(), model.into());
-    let kappa = (y * p - x * q).atan2(x * p + y * q);
-    if !(first.elevation() && second.elevation()) {
-        (control.z, model.z) = (0.0, 0.0);
-    }
-    let length = |v: Vector3| v[0].hypot(v[1]).hypot(v[2]);
-    let scale = held.unwrap_or(length(model) / length(control));
-    if !(x.hypot(y) > 0.0 && p.hypot(q) > 0.0) {
-        return Err(SimilarityError::FirstStations("coincide in plan"));
-    }
-    let mut similarity = Similarity {
-        rotation: rotation([0.0, 0.0, kappa]),
-        scale,
-        shift: Vector3::zeros(),
-        control_centre,
-        model_centre,
-    };
-    // With omega = phi = 0 neither sum needs a coordinate that is missing.
-    let shift = |station: &Station, j: usize| {
-        let known = station.known();
-        let centred = similarity.centred(&station.control);
-        let needed = Vector3::from_fn(|k, _| if known[k] { centred[k] } else { 0.0 });
-        similarity.reduced(&station.model)[j] - scale * (similarity.rotation * needed)[j]
-    };
-    similarity.shift = Vector3::from_fn(|j, _| {
-        let counts = |s: &Station| if j < 2 { s.pair() } else { s.elevation() };
-        known_mean(stations, |station| counts(station).then(|| shift(station, j)))
-    });
-    Ok(similarity)
 }

@@ -3,8 +3,8 @@
 use super::error::{Cause, SimilarityError};
 use super::misclosures::Weighted;
 use super::model::AsControl;
-use super::moments::{Chosen, Started};
 use super::published::{Cycles, Trace};
+use super::start::{Chosen, Started};
 use super::transform::{Matrix7, Similarity};
 use super::{Station, determinacy, misclosures};
 use crate::adjustment::{Adjustment, Iteration, Problem, Status, leading_matrix};
