@@ -166,3 +166,21 @@ def test_what_is_known_of_sensors_and_of_the_bend_stays_known(tmp_path):
     assert found.sd_bend == pytest.approx([1e-4, np.inf])
     with pytest.raises(InputError, match="sd_sensors are positive"):
         given.replace(sd_sensors=0.0)
+
+
+def test_what_is_known_of_a_bend_together_is_read_and_written(tmp_path):
+    project = project_of(rig_small("bend"))
+    files = formats.to_files(project, "plain")
+    rows = ["kind,name,first,second,covariance", "bend,board,x,x,1e-06", "bend,board,y,x,2e-07"]
+    files["covariances.csv"] = "\n".join([*rows, "bend,board,y,y,4e-06"]).encode()
+    for name, content in files.items():
+        (tmp_path / name).write_bytes(content)
+    found = formats.read(tmp_path)
+    (prior,) = found.block.observations
+    assert np.array_equal(prior.covariance, [[1e-6, 2e-7], [2e-7, 4e-6]])
+    (figure,) = found.block.passages
+    assert prior.unknown is figure.bend
+    assert again(found, tmp_path).block.observations[0].covariance == pytest.approx(prior.covariance)
+    # A calibration has no place for it, and does not leave it out silently.
+    with pytest.raises(InputError, match=r"nothing of what else was observed \(prior board\)"):
+        calibration_of(found)

@@ -326,5 +326,6 @@ def _first_images(photos: Indices, points: Indices, count: int) -> tuple[Indices
     everything = np.arange(len(pairs))
     if len(pairs) < 2 or (np.diff(pairs) > 0).all():
         return everything, everything[:0]
-    first = np.sort(np.unique(pairs, return_index=True)[1])
-    return first, np.setdiff1d(everything, first)
+    others = np.ones(len(pairs), dtype=bool)
+    others[np.unique(pairs, return_index=True)[1]] = False
+    return everything[~others], everything[others]

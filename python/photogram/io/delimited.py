@@ -602,19 +602,29 @@ def _by_pandas(
     if len(frame) != count:
         return None
     ready: dict[str, Floats | Names] = {}
+    empty = False
     for each in columns:
         if each in numbers:
             values = frame[each].to_numpy()
-            if not np.isfinite(values).all():
+            if np.isinf(values).any():
                 return None
+            empty = empty or bool(np.isnan(values).any())
             ready[each] = values
         else:
             codes, texts = pd.factorize(frame[each])
             if (codes < 0).any():
                 return None
             ready[each] = _merged(codes.astype(np.int64), [str(text).strip() for text in texts])
+    if empty and not _empty_cells(body, delimiter, count, len(columns)):
+        return None
     records = range(head.record + 1, head.record + 1 + count)
     return ColumnTable(path, head, tuple(columns), count, {}, records, delimiter, ready)
+
+
+def _empty_cells(body: str, delimiter: str, count: int, width: int) -> bool:
+    """Whether all that pandas has no number of must be empty cells: no row is short, and none says NaN."""
+    whole = '"' not in body and body.count(delimiter) == count * (width - 1)
+    return whole and "nan" not in body.casefold()
 
 
 def _all_apart(names: Sequence[str]) -> bool:

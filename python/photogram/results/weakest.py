@@ -142,12 +142,13 @@ def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
     distance = _distances(result, network)
     order = np.lexsort((distance, -ratio))
     near = np.flatnonzero(distance < NEAR)
-    chosen = [*near[np.argsort(distance[near])], *order[np.isfinite(ratio[order]) | np.isinf(ratio[order])]]
+    worst = order[~np.isnan(ratio[order])][:count]
+    chosen = [*near[np.argsort(distance[near])].tolist(), *worst.tolist()]
     return [
         WeakestPoint(
             result.given.point_ids[row], float(ratio[row]), float(distance[row]), int(result.point_rays[row])
         )
-        for row in list(dict.fromkeys(int(each) for each in chosen))[:count]
+        for row in list(dict.fromkeys(chosen))[:count]
     ]
 
 

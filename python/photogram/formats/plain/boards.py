@@ -92,25 +92,24 @@ def read_regularised(tables: Tables) -> str | None:
     return word or None
 
 
-def read_bends(tables: Tables, boards: Mapping[str, Board], block: Block) -> Block:
-    """Return a block whose boards bend, where the table says so.
+def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
+    """Return how boards bend, where the table says so.
 
     Raises
     ------
     InputError
-        A standard deviation that is none, points of the board that the block does not have.
+        A standard deviation that is none.
     """
     table = tables.read("boards")
     if table is None or all(each.shape != "bend" for each in boards.values()):
-        return block
+        return []
     values = np.nan_to_num(table.vectors(BENDS))
     sd = table.vectors(deviation_columns(BENDS), np.inf, infinite=True)
-    bends = [
+    return [
         Figure(Bend(name, values[row], sd[row]), own.names, own.shifts())
         for row, (name, own) in enumerate(boards.items())
         if own.shape == "bend"
     ]
-    return block.replace(passages=bends)
 
 
 def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | None) -> dict[str, Any]:

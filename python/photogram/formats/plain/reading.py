@@ -113,14 +113,16 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     )
     places = {name: row for row, name in enumerate(points.names)}
     observations = read_observations(tables, transform, subjects, places, rigs)
-    observations += read_covariances(tables).priors(_unknowns(observations, mounts, timed))
+    boards = read_boards(tables)
+    bends = read_bends(tables, boards)
+    common = [*_unknowns(observations, mounts, timed), *(each.bend for each in bends)]
+    observations += read_covariances(tables).priors(common)
     if trajectories and transform.frame != settings.frame:
         raise InputError(
             "trajectories are in the frame of the project, and nothing says where that is: [frame] has no"
             f" origin, and tables with a crs go into one that is {transform.frame}",
             file=settings.path,
         )
-    boards = read_boards(tables)
     assumed = not sd_is_given(tables, images.table)
     project = assembled(
         path=settings.path,
@@ -141,7 +143,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         image_xy=xy,
         image_sd=sd,
         observations=[*observations, *photos.observed, *points.observed, *scanned.observations],
-        passages=scanned.scans,
+        passages=[*scanned.scans, *bends],
         mounts=mounts,
         timed=timed,
         frame=transform.frame,
@@ -164,7 +166,6 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         features=settings.features,
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
-    project = project.replace(block=read_bends(tables, boards, project.block))
     _check_features(settings, points.names)
     if control is not None and given is not None:
         from photogram.formats.control_system import check_systems

@@ -17,6 +17,8 @@ from photogram.messages import listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.knots import Knot
+from photogram.network.observations import Prior
 from photogram.network.passages import Figure
 from photogram.network.unknowns import Sensor
 from photogram.targets.board import Board
@@ -104,7 +106,7 @@ def calibration_of(project: Project) -> Calibration:
     ------
     InputError
         A project without a board, points that are not those of the board, cameras that are not in pixels,
-        photos on other trajectories than those of views.
+        photos on other trajectories than those of views, observations of which a calibration knows nothing.
     """
     block = project.block
     if not project.boards:
@@ -113,6 +115,18 @@ def calibration_of(project: Project) -> Calibration:
         raise InputError("a calibration has images in pixels", file=project.path)
     if (block.image_sd[:, 0] != block.image_sd[:, 1]).any():
         raise InputError("corners of a calibration are as good in x as in y", file=project.path)
+    # Those of knots are their cameras'.
+    others = [
+        each.name
+        for each in block.observations
+        if not (isinstance(each, Prior) and isinstance(each.unknown, Knot))
+    ]
+    if others:
+        raise InputError(
+            "a calibration has images and a board, and nothing of what else was observed"
+            f" ({listed(others)}): `photogram adjust` takes all",
+            file=project.path,
+        )
     (board,) = project.boards.values()
     number = _numbers_of(project, board)
     assumed = bool(project.details.get(ASSUMED))
