@@ -1,8 +1,8 @@
-//! Common unknowns that were determined before.
+//! Common unknowns alone: those that were determined before, bases of rigs.
 
 use nalgebra::DMatrix;
 
-use super::{Named, ObservationModel, Precision, Rows, Sites, Touches};
+use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation};
 
 /// What was observed of common unknowns as one observation with its full covariance, from an adjustment of its own.
 ///
@@ -65,19 +65,52 @@ impl ObservationModel for Prior {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::tests::{PLANE, SENSORS, agrees};
-    use super::{Precision, Prior};
+/// The distance between two sensors on a frame, or of one from the frame itself: a base that was measured gives a rig its scale.
+///
+/// s = |c_2 - c_1|, with the partials e = (c_2 - c_1)/s by c_2 and -e by c_1, c_1 being zero where there is one sensor alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Base {
+    /// The first sensor; None for that which is the frame.
+    pub first: Option<usize>,
+    /// The second sensor.
+    pub second: usize,
+    /// The observed length in the unit of the object space.
+    pub length: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
 
-    #[test]
-    fn partials_agree_with_differences() {
-        for (commons, components) in
-            [(vec![SENSORS[0]], vec![6]), (vec![PLANE], vec![3]), (vec![PLANE, SENSORS[0]], vec![3, 6])]
-        {
-            let count = components.iter().sum();
-            let (precision, observed) = (Precision::Deviations(vec![0.01; count]), vec![0.5; count]);
-            agrees(&Prior { commons, components, observed, precision }.into());
+impl ObservationModel for Base {
+    const NAME: &'static str = "base";
+
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[first, Some(second)], &[length]) = (of.commons, values) else { return None };
+        Some(Self { first, second, length, sd: deviation(&covariance) })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::default().and(Some(self.second), CommonKind::Sensor).and(self.first, CommonKind::Sensor)
+    }
+
+    fn rows(&self) -> usize {
+        1
+    }
+
+    fn precision(&self) -> Precision {
+        Precision::Deviations(vec![self.sd])
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let mut difference = sites.common(0).vector();
+        if self.first.is_some() {
+            difference -= sites.common(1).vector();
+        }
+        let distance = difference.norm();
+        let direction = (difference / distance).transpose();
+        rows.residual(0, &[self.length - distance]);
+        rows.by_offset(0, 0, &direction);
+        if self.first.is_some() {
+            rows.by_offset(0, 1, &-direction);
         }
     }
 }
