@@ -10,12 +10,10 @@ from textwrap import wrap
 import numpy as np
 
 from photogram import comparator
+from photogram.comparator.fits import fit_rigid
 from photogram.comparator.gridfile import adjusted_grid, corrected_grid
-from photogram.comparator.listing.joint import tests_page
-from photogram.comparator.listing.parameters import combined_linear_page
-from photogram.comparator.listing.summary import variance_lines
-from photogram.comparator.rigid import fit_rigid
-from photogram.comparator.years.example import simulated_years
+from photogram.comparator.listing.parameters import combined_linear_page, tests_page, variance_lines
+from photogram.comparator.simulation import simulated_years
 
 
 @cache

@@ -18,7 +18,7 @@ from photogram import Camera
 from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes
 from photogram.targets import Board, Calibration, Corners
-from photogram.targets.simulation import simulate_corners
+from photogram.targets.calibration import simulate_corners
 
 SEED = 37
 SIZE = (1600, 1200)

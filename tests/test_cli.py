@@ -16,7 +16,7 @@ from rich.markup import render
 import photogram
 from photogram.cli.commands import app, application
 from photogram.cli.simulate import simulate as simulate_command
-from photogram.cli.simulated_motion import MotionOptions
+from photogram.cli.simulation_options import MotionOptions
 from photogram.giant import read_project
 from photogram.network.simulation import simulate as simulate_function
 

@@ -20,8 +20,8 @@ from photogram.comparator import Grid, compare, listing, simulate_calibration, t
 from photogram.comparator import calibrate as calibrate_comparator
 from photogram.giant import Project, write_project
 from photogram.perspective_center import run_deck
-from photogram.perspective_center.document import to_json as run_to_json
-from photogram.perspective_center.summary import summary
+from photogram.perspective_center.report import summary
+from photogram.perspective_center.report import to_json as run_to_json
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import page_of
 
@@ -377,9 +377,9 @@ def test_plates(changes, code):
 def test_nights(pixel_sd):
     pytest.importorskip("erfa")
     from photogram.stellar.night_calibration import calibrate_night
-    from photogram.stellar.night_document import to_json as night_to_json
     from photogram.stellar.night_file import read_night
     from photogram.stellar.night_report import report
+    from photogram.stellar.night_report import to_json as night_to_json
 
     night = read_night(Path(str(EXAMPLES / "exposures" / "night.toml")))
     found = calibrate_night(night if pixel_sd is None else replace(night, pixel_sd=pixel_sd))

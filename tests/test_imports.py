@@ -22,7 +22,7 @@ import photogram
         ("from photogram.adjustment import adjust, Progress", "adjust"),
         ("import photogram.adjustment", "photogram.adjust"),
         ("from photogram.distributed import adjust_in_parts", "adjust_in_parts"),
-        ("import photogram.io.writing.guard", "photogram.io.writing.guard.check_outputs"),
+        ("import photogram.io.writing.targets", "photogram.io.writing.targets.check_outputs"),
     ],
 )
 def test_every_way_to_import_works_in_a_new_process(statement, name):

@@ -9,11 +9,10 @@ from moving_blocks import rolling, scanned
 from photogram import InputError, adjust, formats, predict
 from photogram.absolute_orientation import relative_model
 from photogram.formats.carrying import is_free
-from photogram.formats.millimetres import in_pixels
+from photogram.formats.format_coordinates import in_pixels, in_topocentric
 from photogram.formats.project import Repeated
 from photogram.formats.registry import FORMATS, cannot_hold, to_files
 from photogram.formats.supplements import repeated_remarks
-from photogram.formats.topocentric import in_topocentric
 from photogram.network.block import of_images_alone
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed

@@ -8,7 +8,7 @@ import pytest
 from orientation_golden import array, cases, csv_of, load, stations
 
 from photogram import orient
-from photogram.absolute_orientation.trace import trace_text
+from photogram.absolute_orientation.report import trace_text
 from photogram.errors import InputError
 
 PRINTS = [

@@ -8,11 +8,9 @@ import pytest
 from plates import ARCSEC, LINEAR, QUICK, STRAIGHT, bent, case_2, document, noisy, printed_correction
 
 from photogram.comparator import Correction, Decomposition, Grid, Options, calibrate, simulate_calibration
-from photogram.comparator.affine import fit_affine
-from photogram.comparator.decomposition import decomposition_jacobian, rotation_matrix
-from photogram.comparator.orientation import locations
+from photogram.comparator.case import locations
+from photogram.comparator.fits import decomposition_jacobian, fit_affine, fit_rigid, rotation_matrix
 from photogram.comparator.polynomial import Frame, Polynomial, design, fit_polynomial
-from photogram.comparator.rigid import fit_rigid
 
 POINTS = np.arange(1, 26)
 GRID = Grid.square().xy_um

@@ -111,7 +111,7 @@ def test_without_matplotlib_there_are_no_pictures(run, tables, monkeypatch):
     real = importlib.util.find_spec
     without = lambda name, *rest: None if name == "matplotlib" else real(name, *rest)  # noqa: E731
     monkeypatch.setattr("photogram.cli.comparator.find_spec", without)
-    monkeypatch.setattr("photogram.cli.html.find_spec", without)
+    monkeypatch.setattr("photogram.cli.documents.find_spec", without)
     result = run(*tables, "--out", "out")
     assert result.exit_code == 0
     assert "pip install 'photogram[report]'" in result.stderr

@@ -7,11 +7,10 @@ import pytest
 from plates import case_2, document, printed_correction, printed_polynomial, table
 
 from photogram.comparator import built_in_grid
-from photogram.comparator.averages import LocationAverages, PlateAverages
-from photogram.comparator.gridsigma import listed_grid_sigma
-from photogram.comparator.listing.correction import table_nodes
-from photogram.comparator.orientation import exchanged
-from photogram.comparator.rigid import fit_rigid
+from photogram.comparator.averages import LocationAverages, PlateAverages, listed_grid_sigma
+from photogram.comparator.case import exchanged
+from photogram.comparator.fits import fit_rigid
+from photogram.comparator.listing.parameters import table_nodes
 from photogram.comparator.variance import AxisSigma, difference
 
 

@@ -22,11 +22,10 @@ from photogram.comparator import (
     to_csv,
 )
 from photogram.comparator.cards import join_least_count
+from photogram.comparator.case import detect_orientation, intersect_legs, reduce_legs
 from photogram.comparator.closeout import close_out
 from photogram.comparator.gridfile import corrected_grid
-from photogram.comparator.grouping import group, group_as_listed
-from photogram.comparator.legs import intersect_legs, reduce_legs
-from photogram.comparator.orientation import detect_orientation
+from photogram.comparator.pointing import group, group_as_listed
 from photogram.errors import InputError
 
 

@@ -17,13 +17,12 @@ from photogram.comparator import (
     simulate_calibration,
     to_json,
 )
-from photogram.comparator.decomposition import rotation_matrix
-from photogram.comparator.gridsigma import listed_grid_sigma, text_grid_sigma
+from photogram.comparator.averages import listed_grid_sigma, text_grid_sigma
+from photogram.comparator.case import exchanged
+from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.joint import Weights, adjust_jointly
-from photogram.comparator.listing.correction import correction_table, table_nodes
-from photogram.comparator.orientation import exchanged
-from photogram.comparator.significance import _f_max_tail, compare_case_variances
-from photogram.comparator.variance import AxisSigma, difference
+from photogram.comparator.listing.parameters import correction_table, table_nodes
+from photogram.comparator.variance import AxisSigma, _f_max_tail, compare_case_variances, difference
 from photogram.errors import AdjustmentError, InputError
 
 
@@ -646,9 +645,9 @@ def test_cases_of_unequal_quality_are_found():
 
 
 def test_without_scipy_there_are_statistics_but_no_probabilities(monkeypatch):
-    from photogram.comparator import significance
+    from photogram.comparator import variance
 
-    monkeypatch.setattr(significance, "find_spec", lambda _name: None)
+    monkeypatch.setattr(variance, "find_spec", lambda _name: None)
     calibration = calibrate(noisy(9), QUICK)
     assert calibration.polynomial_tests.probability is None
     assert calibration.polynomial_tests.ratio > 0

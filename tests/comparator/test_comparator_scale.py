@@ -9,11 +9,10 @@ from plates import QUICK, STRAIGHT, noisy
 
 from photogram import OutOfMemoryError
 from photogram.comparator import Grid, calibrate, listing, simulate_calibration, to_json
+from photogram.comparator.averages import unbiased_grid_sigma
 from photogram.comparator.calibration import needed_memory
-from photogram.comparator.gridsigma import unbiased_grid_sigma
-from photogram.comparator.grouping import group_as_listed, rows_by_point
-from photogram.comparator.orientation import locations
-from photogram.comparator.pointing import read_points
+from photogram.comparator.case import locations
+from photogram.comparator.pointing import group_as_listed, read_points, rows_by_point
 
 
 def plate(columns):

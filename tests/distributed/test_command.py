@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 import photogram
 from photogram import adjust, adjust_in_parts, read_result
 from photogram.cli.commands import app
+from photogram.cli.in_parts import TAKEN
 from photogram.cli.job import _option
-from photogram.cli.on_disk import TAKEN
 from photogram.cli.projects import Additions
 from photogram.distributed import Division
 from photogram.formats import read

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from photogram.io.writing import guard, markers, outputs, staging, targets
+from photogram.io.writing import outputs, staging, targets
 
 CALLS = (
     "open",
@@ -70,7 +70,7 @@ def faulty(monkeypatch, at, **options):
     """Let the writer run on a system of which a call fails."""
     system = Faulty(at, **options)
     with monkeypatch.context() as patch:
-        for module in (guard, markers, outputs, staging, targets):
+        for module in (outputs, staging, targets):
             if hasattr(module, "os"):
                 patch.setattr(module, "os", system)
         yield system

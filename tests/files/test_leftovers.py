@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from photogram.io.writing import OutputSet, write_whole
-from photogram.io.writing.interruption import deferred
-from photogram.io.writing.markers import doubtful
+from photogram.io.writing.outputs import deferred
+from photogram.io.writing.staging import doubtful
 
 DEATH = """\
 import os, sys

@@ -8,7 +8,7 @@ import pytest
 
 from photogram import Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
-from photogram.diagnosis.film_axes import _fitted, axis_hints
+from photogram.diagnosis.film_marks import _fitted, axis_hints
 from photogram.formats import Wishes, read
 
 ARCHIVE = files("photogram") / "examples" / "archive"

@@ -10,7 +10,7 @@ import pytest
 from photogram import InputError, _photocore, adjust
 from photogram.comparator import Correction, Frame, Polynomial
 from photogram.film import Certificate, interior_orientation
-from photogram.film.datum import with_datum
+from photogram.film.distances import with_datum
 from photogram.formats import read, to_files
 from photogram.formats.project import Project
 from photogram.network.films import Film, FilmPlacement, FilmSize
@@ -101,7 +101,7 @@ def test_marks_by_distances_have_a_datum_that_changes_nothing(
     text = by_distances(tmp_path)
     results = []
     for held in (1e-2, 1e-3):
-        monkeypatch.setattr("photogram.film.datum.HELD", held)
+        monkeypatch.setattr("photogram.film.distances.HELD", held)
         own = certified(tmp_path, text)
         results.append(adjust(own.block, tolerance=1e-9))
         project(tmp_path)

@@ -7,7 +7,7 @@ from example_scripts import load
 from photogram import adjust
 from photogram.arguments.types import Floats
 from photogram.diagnosis.after_adjustment import diagnosed
-from photogram.diagnosis.film_lines import line_hints
+from photogram.diagnosis.film_scans import line_hints
 from photogram.formats import read
 from photogram.network.block import Block
 

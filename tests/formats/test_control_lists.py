@@ -10,7 +10,7 @@ from photogram import InputError, formats
 from photogram.formats.column_words import column_of, role_of, unit_of
 from photogram.formats.columns import columns_given, degrees
 from photogram.formats.supplements import with_control
-from photogram.io.marks import marks_of
+from photogram.io.numbers import marks_of
 
 LISTS = Path(__file__).parents[1] / "data" / "control_lists"
 CHECKS = {"102", "103", "105"}

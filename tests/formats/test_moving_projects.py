@@ -15,7 +15,7 @@ from test_plain_project import change, written
 import test_moving
 from photogram import Attitudes, InputError, adjust, formats
 from photogram.formats import Wishes
-from photogram.formats.motion_summary import motions
+from photogram.formats.block_contents import motions
 from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network.lens import Lens
 from photogram.network.motion import about

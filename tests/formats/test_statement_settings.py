@@ -10,7 +10,7 @@ import pytest
 
 from photogram import InputError, adjust, formats
 from photogram.formats.names import with_names
-from photogram.formats.sentences import read_sentences
+from photogram.formats.plain.statement_settings import read_sentences
 from photogram.formats.supplements import with_control
 from photogram.results.statement.request import Asked
 from shared_data import SHARED

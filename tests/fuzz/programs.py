@@ -10,7 +10,7 @@ from io import StringIO
 from pathlib import Path
 from pkgutil import iter_modules
 from random import Random
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -111,7 +111,7 @@ def _giant(place: Path, rng: Random, quiet: bool) -> list[str]:
         json=place / "result.json",
         listing=listing,
         as_published=rng.random() < 0.25,
-        ordering=rng.choice(list(OrderingName)),
+        ordering=rng.choice(get_args(OrderingName)),
         threads=1,
         no_html=_without_page(rng),
         quiet=quiet,
@@ -129,7 +129,7 @@ def _collection(place: Path, rng: Random, quiet: bool) -> list[str]:
         problem=place / "in" / "input",
         out=place / "out",
         json=place / "result.json",
-        loss=rng.choice(list(collection.Loss)),
+        loss=rng.choice(("squares", "huber", "cauchy")),
         sd=rng.choice((1.0, 0.1)),
         max_iterations=60,
         covariance=rng.random() < 0.8,
@@ -148,9 +148,9 @@ def _orientation(place: Path, rng: Random, quiet: bool) -> list[str]:
         json=place / "result.json",
         out=place / "out",
         reject=["S1"] if rng.random() < 0.1 else None,
-        method=rng.choices(list(absolute_orientation.Method), (6, 1, 1))[0],
-        start=rng.choice((None, None, *absolute_orientation.Start)),
-        unit_variance=rng.choice(list(absolute_orientation.UnitVariance)),
+        method=rng.choices(("rigorous", "report", "fill-in"), (6, 1, 1))[0],
+        start=rng.choice((None, None, "auto", "report", "closed-form")),
+        unit_variance=rng.choice(("estimated", "unity")),
         zero_missing=rng.random() < 0.2,
         no_html=_without_page(rng),
         quiet=quiet,
@@ -176,7 +176,7 @@ def _perspective(place: Path, rng: Random, quiet: bool) -> list[str]:
         json=place / "result.json",
         out=place / "out",
         as_published=rng.random() < 0.3,
-        weights=rng.choice(list(perspective_center.Weights)),
+        weights=rng.choice(("equal", "readings", "deviations")),
         no_html=_without_page(rng),
         quiet=quiet,
     )

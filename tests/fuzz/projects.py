@@ -10,14 +10,13 @@ from functools import cache
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 import photogram
 from photogram import Block, formats
 from photogram.cli import adjust as adjusting
-from photogram.cli import choices
 from photogram.cli.components import UnitVarianceName
 from photogram.distributed import Division
 from photogram.formats.format import Wishes
@@ -136,7 +135,7 @@ def project_run(main: str) -> Callable[[Path, Random, bool], list[str]]:
         options = {
             "datum": rng.choice(("inner", "minimum", "control")) if rng.random() < 0.2 else None,
             "loss": rng.choice(("huber", "cauchy")) if rng.random() < 0.15 else None,
-            "unit_variance": rng.choice(list(UnitVarianceName)) if rng.random() < 0.3 else None,
+            "unit_variance": rng.choice(get_args(UnitVarianceName)) if rng.random() < 0.3 else None,
         }
         calibrated = rng.choice(PARAMETERS) if rng.random() < 0.15 else ""
         with _disk(rng):
@@ -157,11 +156,7 @@ def _command(
     rng: Random,
     quiet: bool,
 ) -> list[str]:
-    chosen = {
-        "datum": options["datum"] and choices.DatumName(options["datum"]),
-        "loss": options["loss"] and choices.LossName(options["loss"]),
-        "unit_variance": options["unit_variance"],
-    }
+    chosen = dict(options)
     if control is not None:
         chosen |= {"control": control, "control_crs": crs, "sd": ["control=0.02"]}
     adjusting.adjust(

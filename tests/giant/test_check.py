@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from photogram import diagnose, simulate
 from photogram.cli import app
-from photogram.diagnosis.heights import neighbours
 from photogram.diagnosis.orientation import MIRRORS
 from photogram.diagnosis.predictions import exchange
 from photogram.diagnosis.robust import critical, fit, mad_sd
+from photogram.diagnosis.stations import neighbours
 from photogram.diagnosis.structure import parts_of
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check

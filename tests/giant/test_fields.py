@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from photogram.arguments.naming import natural_order
+from photogram.arguments.arrays import natural_order
 from photogram.giant.fields import (
     format_angle,
     format_deviations,
@@ -20,7 +20,7 @@ from photogram.giant.fields import (
     parse_angle,
     parse_name,
 )
-from photogram.io.fields import parse_integer, parse_real
+from photogram.io.records import parse_integer, parse_real
 
 GOLDEN = json.loads((Path(__file__).parents[1] / "data" / "giant" / "golden_cases.json").read_text())
 

@@ -16,17 +16,10 @@ import pytest
 
 from photogram import AsPublished, Block, Refraction, Result, adjust, simulate
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame, Project, listing, read_project
-from photogram.giant.printout.control import control_pages
-from photogram.giant.printout.corrections import correction_pages
-from photogram.giant.printout.formats import Space, attitude, dms, exponential, fixed
-from photogram.giant.printout.frames import Station, frame_pages
-from photogram.giant.printout.iterations import iteration_pages
-from photogram.giant.printout.options import options_page
-from photogram.giant.printout.pages import paginate
-from photogram.giant.printout.points import propagated_point_pages
-from photogram.giant.printout.residuals import PointResiduals, residual_pages, statistics
-from photogram.giant.printout.stations import station_pages
-from photogram.giant.printout.warnings import warning_pages
+from photogram.giant.printout.forms import Space, attitude, dms, exponential, fixed, paginate
+from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
+from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
+from photogram.giant.printout.results import correction_pages, propagated_point_pages, station_pages
 
 DATA = Path(__file__).parents[1] / "data" / "giant"
 SNAPSHOT = DATA / "listing_galveston.txt"

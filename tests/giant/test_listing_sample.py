@@ -17,18 +17,15 @@ import pytest
 
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame
 from photogram.giant.fields import printed_order
-from photogram.giant.printout.control import control_pages
-from photogram.giant.printout.corrections import correction_pages
-from photogram.giant.printout.formats import Space
-from photogram.giant.printout.frames import Station, frame_pages
-from photogram.giant.printout.iterations import iteration_pages
-from photogram.giant.printout.matrices import matrix_rows
-from photogram.giant.printout.options import options_page
-from photogram.giant.printout.pages import printout
-from photogram.giant.printout.points import point_pages, propagated_point_pages
-from photogram.giant.printout.residuals import PointResiduals, residual_pages, statistics
-from photogram.giant.printout.stations import station_pages
-from photogram.giant.printout.warnings import warning_pages
+from photogram.giant.printout.forms import Space, matrix_rows, printout
+from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
+from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
+from photogram.giant.printout.results import (
+    correction_pages,
+    point_pages,
+    propagated_point_pages,
+    station_pages,
+)
 from photogram.results.iteration import Iteration
 from photogram.results.result import SumsOfSquares
 

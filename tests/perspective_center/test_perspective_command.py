@@ -13,9 +13,9 @@ import pytest
 
 from photogram import InputError
 from photogram.perspective_center import read_deck, run_deck
-from photogram.perspective_center.document import to_json
 from photogram.perspective_center.listing import listing
 from photogram.perspective_center.plot import draw
+from photogram.perspective_center.report import to_json
 
 pytestmark = pytest.mark.usefixtures("sketched")
 REPOSITORY = Path(__file__).parents[2]

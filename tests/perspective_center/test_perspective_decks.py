@@ -10,7 +10,7 @@ import pytest
 from photogram import InputError
 from photogram.io.records import Source
 from photogram.perspective_center import read_deck, run_deck
-from photogram.perspective_center.formats import CardFormat
+from photogram.perspective_center.deck import CardFormat
 
 PLATE = [(-90, -90), (0, -90), (90, -90), (-90, 90), (0, 0), (90, 90)]
 

@@ -7,8 +7,7 @@ import pytest
 
 from photogram import InputError
 from photogram.perspective_center import Grid, Run, determine
-from photogram.perspective_center.document import to_json
-from photogram.perspective_center.summary import summary
+from photogram.perspective_center.report import summary, to_json
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import browser as browsers
 import photogram
 from photogram import InnerConstraints, adjust, simulate
 from photogram.adjustment.snooping import snoop
-from photogram.cli import html as cli_html
+from photogram.cli import documents
 
 EXAMPLES = str(Path(photogram.__file__).parent / "examples")
 NETWORK = ["Verdict", "Plan of the network", "How much, how good", "Image residuals", "Redundancy", "Tests"]
@@ -327,7 +327,7 @@ def test_the_report_goes_where_it_is_asked_for_or_nowhere(run, tmp_path):
 def test_without_the_extra_there_is_a_remark_and_an_error_only_where_it_was_asked_for(
     run, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(cli_html, "find_spec", lambda name: None)
+    monkeypatch.setattr(documents, "find_spec", lambda name: None)
     done = run("giant", "--example")
     assert done.exit_code == 0
     assert "no report.html: pip install 'photogram[report]'" in done.stderr

@@ -9,7 +9,7 @@ from golden_statement import block_path
 
 import photogram
 from photogram.formats import read
-from photogram.formats.topocentric import in_topocentric
+from photogram.formats.format_coordinates import in_topocentric
 
 FILES = (
     *("budget.csv", "check_points.csv", "leave_one_out.csv"),

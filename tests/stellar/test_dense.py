@@ -9,7 +9,7 @@ import star_plates as plates
 from photogram._photocore import pointing_matrix
 from photogram.stellar import calibrate
 from photogram.stellar.adjustment import free_parameters
-from photogram.stellar.combination import modify
+from photogram.stellar.movement import modify
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.problem import Axis
 

@@ -11,8 +11,7 @@ from photogram import _photocore
 from photogram.show.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.inertial import inertial_attitude
-from photogram.stellar.places import Earth, apparent_places, sidereal_time
+from photogram.stellar.places import Earth, apparent_places, inertial_attitude, sidereal_time
 from photogram.stellar.sky import Effects
 
 UTC = "2024-03-01T21:03:05.25"

@@ -8,9 +8,9 @@ import star_plates as plates
 from nights import MAKER
 
 from photogram.stellar import calibrate
-from photogram.stellar.lens_tests import equal
-from photogram.stellar.lens_tests import test_scale as scale_of
-from photogram.stellar.lens_tests import test_terms as terms_of
+from photogram.stellar.lens_choice import equal
+from photogram.stellar.lens_choice import test_scale as scale_of
+from photogram.stellar.lens_choice import test_terms as terms_of
 from photogram.stellar.listing import listing
 from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_report import report

@@ -19,13 +19,11 @@ from photogram.stellar import Air, Site
 from photogram.stellar.cameras import BrownCamera
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_document import to_json
 from photogram.stellar.night_file import inputs, read_night
-from photogram.stellar.night_report import report
+from photogram.stellar.night_report import report, to_json
 from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.pointing import attitude_of, axis_of
+from photogram.stellar.pointing import attitude_of, axis_of, pole_matrix, terrestrial
 from photogram.stellar.sky_calibration import calibrate_exposures, project_sky, stars_near
-from photogram.stellar.transformation import pole_matrix, terrestrial
 
 pytestmark = pytest.mark.usefixtures("sketched")
 TRUTH = MAKER["CAMERA"].values

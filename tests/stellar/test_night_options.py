@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import fields
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def line(text, name):
 
 
 def test_the_words_of_the_options_are_those_of_the_package():
-    assert {lens.value for lens in Lens} == {*LENSES, AUTO}
+    assert {*get_args(Lens)} == {*LENSES, AUTO}
     assert {effect.name.lower() for effect in Effect} == {one.name for one in fields(Effects)}
 
 

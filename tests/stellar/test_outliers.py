@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from photogram.cli import app
 from photogram.statistics.verdict import EXIT_NOT_USABLE
 from photogram.stellar import calibrate
-from photogram.stellar.combination import combine
+from photogram.stellar.movement import combine
 from photogram.stellar.parameters import INDEX, NAMES
 
 pytestmark = pytest.mark.usefixtures("sketched")

@@ -12,7 +12,7 @@ from given_targets import DATA, NAMES, golden
 
 from photogram import Camera, _photocore
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
-from photogram.targets.view_rows import view_rows
+from photogram.targets.new_views import view_rows
 from photogram.targets.vision import composed, of_vectors
 
 VIEWS = 20
@@ -138,11 +138,12 @@ def dense(housing):
 def rows_of_view(housing, view):
     """Return whitened partials by the common unknowns and by the pose of a view; observed less computed."""
     seen = housing.seen[housing.seen.views == view]
-    rows, sd = view_rows(housing, housing.poses[view], seen.cameras, seen.points), seen.sd[:, np.newaxis]
+    xy, by_common, by_pose, _ = view_rows(housing, housing.poses[view], seen.cameras, seen.points)
+    sd = seen.sd[:, np.newaxis]
     return (
-        (rows.by_common / sd[:, :, np.newaxis]).reshape(-1, housing.common),
-        (rows.by_pose / sd[:, :, np.newaxis]).reshape(-1, 6),
-        ((seen.xy - rows.xy) / sd).ravel(),
+        (by_common / sd[:, :, np.newaxis]).reshape(-1, housing.common),
+        (by_pose / sd[:, :, np.newaxis]).reshape(-1, 6),
+        ((seen.xy - xy) / sd).ravel(),
     )
 
 

@@ -7,8 +7,8 @@ import pytest
 from given_targets import DATA, golden, left_table, poses_of, rig_small
 
 from photogram.targets import read
-from photogram.targets.prior_shift import prior_shift
 from photogram.targets.regularisation import regularised
+from photogram.targets.tables import prior_shift
 
 REGULARISED = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "cx", "cy")
 

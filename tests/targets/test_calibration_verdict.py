@@ -7,10 +7,9 @@ from seen_boards import seen
 from photogram import Camera
 from photogram.targets import Board, Calibration
 from photogram.targets.appraisal import appraise
-from photogram.targets.appraisal_report import WorthOptions
-from photogram.targets.coverage import showings
+from photogram.targets.calibration_result import WorthOptions
 from photogram.targets.document import calibration_document
-from photogram.targets.findings import judged
+from photogram.targets.findings import judged, showings
 
 BOARD = Board(columns=9, rows=7, spacing=0.03, shape="held")
 TRUTH = Camera(

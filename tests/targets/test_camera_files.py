@@ -14,8 +14,7 @@ from golden_boards import left, needs_golden, rig
 from photogram.errors import InputError
 from photogram.targets import Calibration, camera_files, first_values
 from photogram.targets.mrcal_model import read_model
-from photogram.targets.output.covariances import cameras_covariance
-from photogram.targets.output.formats import CAMERA_FORMATS
+from photogram.targets.output.formats import CAMERA_FORMATS, cameras_covariance
 from photogram.targets.projection import worst
 from photogram.targets.uncertainty import projection_uncertainty, uncertainty_map
 

@@ -8,8 +8,7 @@ from given_targets import DATA, rig_small
 
 from photogram import Camera, InputError
 from photogram.targets import Board
-from photogram.targets.corner_files import holds_targets, sorted_files
-from photogram.targets.corner_tables import read_table, read_vnl
+from photogram.targets.corner_files import holds_targets, read_table, read_vnl, sorted_files
 from photogram.targets.corner_views import Grouping, grouped
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz, read_storage

@@ -5,10 +5,16 @@ import pytest
 from golden_boards import golden, left, needs_golden, wide
 
 from photogram import Camera
-from photogram.targets.families import misfits, rays_of, trials
-from photogram.targets.families import wide as best_field
-from photogram.targets.homographies import focal_lengths, frontal_tilts, homographies, poses, ray_homographies
-from photogram.targets.sightings import Sightings
+from photogram.targets.first_camera import misfits, rays_of, trials
+from photogram.targets.first_camera import wide as best_field
+from photogram.targets.sightings import (
+    Sightings,
+    focal_lengths,
+    frontal_tilts,
+    homographies,
+    poses,
+    ray_homographies,
+)
 
 pytestmark = needs_golden
 

@@ -5,7 +5,7 @@ import pytest
 
 from photogram.network.attitudes import Attitudes
 from photogram.targets import Board
-from photogram.targets.sensors import connected, mean_pose
+from photogram.targets.first_calibration import connected, mean_pose
 from photogram.targets.sightings import Listings
 from photogram.targets.vision import composed, inverted, of_vectors
 

@@ -4,14 +4,13 @@ import given_targets
 import numpy as np
 import pytest
 
-from photogram.targets.cross_validated import cross_validate
+from photogram.targets.appraisal import cross_validate
+from photogram.targets.calibration import simulate_corners
 from photogram.targets.cross_validation import changes_between
-from photogram.targets.datums import datum_rows, housing_rows
 from photogram.targets.housings import housing_of
-from photogram.targets.imaging import imaged
-from photogram.targets.projection import common_partials
-from photogram.targets.simulation import simulate_corners
-from photogram.targets.stereo import triangulate
+from photogram.targets.projection import common_partials, datum_rows, housing_rows
+from photogram.targets.triangulation import triangulate
+from photogram.targets.vision import imaged
 
 DRAWS = 60
 PIXELS = np.array([[100.0, 100.0], [640.0, 480.0], [1150.0, 800.0]])

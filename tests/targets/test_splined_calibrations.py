@@ -12,12 +12,11 @@ from photogram import formats
 from photogram.errors import InputError
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, read
-from photogram.targets.cross_validated import cross_validate
-from photogram.targets.knot_weights import with_knot_sd
+from photogram.targets.appraisal import cross_validate
 from photogram.targets.output.mrcal import mrcal_models
 from photogram.targets.output.rig import rig_of
-from photogram.targets.regularisation import regularised
-from photogram.targets.splined import spline_lines, splines
+from photogram.targets.regularisation import regularised, with_knot_sd
+from photogram.targets.tables import spline_lines, splines
 from photogram.targets.uncertainty import projection_uncertainty
 from photogram.targets.vision import composed
 

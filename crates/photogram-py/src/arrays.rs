@@ -8,19 +8,24 @@ use photocore::geometry::Matrix3;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 
+/// Numbers and indices from Python, of any shape.
+pub type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
+pub type Indices<'py> = PyReadonlyArrayDyn<'py, i64>;
+/// Numbers for Python: (n,), (n, N), (n, M, N).
+pub type Vector<'py> = Bound<'py, PyArray1<f64>>;
+pub type Matrix<'py> = Bound<'py, PyArray2<f64>>;
+pub type Blocks<'py> = Bound<'py, PyArray3<f64>>;
+
 // A ValueError of the package: what catches its errors catches this one, too.
 import_exception!(photogram.errors, InputError);
 
 /// The rows of an (n, N) array.
-pub fn rows<const N: usize>(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<[f64; N]>> {
+pub fn rows<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<Vec<[f64; N]>> {
     rows_in_place(name, array).map(Cow::into_owned)
 }
 
 /// The same, not copied where they stand one after the other.
-pub fn rows_in_place<'a, const N: usize>(
-    name: &str,
-    array: &'a PyReadonlyArrayDyn<'_, f64>,
-) -> PyResult<Cow<'a, [[f64; N]]>> {
+pub fn rows_in_place<'a, const N: usize>(name: &str, array: &'a Array<'_>) -> PyResult<Cow<'a, [[f64; N]]>> {
     match array.shape() {
         [_, columns] if *columns == N => Ok(match array.as_array().to_slice() {
             Some(values) => Cow::Borrowed(values.as_chunks().0),
@@ -31,7 +36,7 @@ pub fn rows_in_place<'a, const N: usize>(
 }
 
 /// The rows of an array of so many columns, as many as only the caller knows.
-pub fn slices(name: &str, array: &PyReadonlyArrayDyn<'_, f64>, columns: usize) -> PyResult<Vec<Vec<f64>>> {
+pub fn slices(name: &str, array: &Array<'_>, columns: usize) -> PyResult<Vec<Vec<f64>>> {
     match array.shape() {
         [_, found] if *found == columns => Ok(values(array).chunks(columns).map(<[f64]>::to_vec).collect()),
         shape => Err(wrong_shape(name, &format!("(n, {columns})"), shape)),
@@ -39,10 +44,7 @@ pub fn slices(name: &str, array: &PyReadonlyArrayDyn<'_, f64>, columns: usize) -
 }
 
 /// The matrices of an (n, N, N) array.
-pub fn matrices<const N: usize>(
-    name: &str,
-    array: &PyReadonlyArrayDyn<'_, f64>,
-) -> PyResult<Vec<[[f64; N]; N]>> {
+pub fn matrices<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<Vec<[[f64; N]; N]>> {
     match array.shape() {
         [_, rows, columns] if [*rows, *columns] == [N, N] => Ok(chunks(chunks(values(array)))),
         shape => Err(wrong_shape(name, &format!("(n, {N}, {N})"), shape)),
@@ -50,7 +52,7 @@ pub fn matrices<const N: usize>(
 }
 
 /// The numbers of an (n,) array.
-pub fn numbers(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<f64>> {
+pub fn numbers(name: &str, array: &Array<'_>) -> PyResult<Vec<f64>> {
     match array.shape() {
         [_] => Ok(values(array)),
         shape => Err(wrong_shape(name, "(n,)", shape)),
@@ -58,12 +60,12 @@ pub fn numbers(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<
 }
 
 /// The indices, not negative, of an (n,) array.
-pub fn indices(name: &str, array: &PyReadonlyArrayDyn<'_, i64>) -> PyResult<Vec<usize>> {
+pub fn indices(name: &str, array: &Indices<'_>) -> PyResult<Vec<usize>> {
     Ok(indices_in_place(name, array)?.iter().map(|&index| index as usize).collect())
 }
 
 /// The same, none of them negative, not copied where they stand one after the other.
-pub fn indices_in_place<'a>(name: &str, array: &'a PyReadonlyArrayDyn<'_, i64>) -> PyResult<Cow<'a, [i64]>> {
+pub fn indices_in_place<'a>(name: &str, array: &'a Indices<'_>) -> PyResult<Cow<'a, [i64]>> {
     let [_] = array.shape() else { return Err(wrong_shape(name, "(n,)", array.shape())) };
     let view = array.as_array();
     let all = view.to_slice().map_or_else(|| Cow::Owned(view.iter().copied().collect()), Cow::Borrowed);
@@ -74,10 +76,7 @@ pub fn indices_in_place<'a>(name: &str, array: &'a PyReadonlyArrayDyn<'_, i64>) 
 }
 
 /// The rows of an (n, N) array of the numbers of groups; negative ones, of what is in none, as the largest number.
-pub fn group_rows<const N: usize>(
-    name: &str,
-    array: &PyReadonlyArrayDyn<'_, i64>,
-) -> PyResult<Vec<[usize; N]>> {
+pub fn group_rows<const N: usize>(name: &str, array: &Indices<'_>) -> PyResult<Vec<[usize; N]>> {
     let number = |&group: &i64| usize::try_from(group).unwrap_or(usize::MAX);
     match array.shape() {
         [_, columns] if *columns == N => {
@@ -89,16 +88,13 @@ pub fn group_rows<const N: usize>(
 }
 
 /// Rows as an (n, N) array.
-pub fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
+pub fn table<const N: usize>(py: Python<'_>, rows: Vec<[f64; N]>) -> PyResult<Matrix<'_>> {
     let count = rows.len();
     PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
 }
 
 /// Square matrices as an (n, N, N) array.
-pub fn squares<const N: usize>(
-    py: Python<'_>,
-    matrices: Vec<[[f64; N]; N]>,
-) -> PyResult<Bound<'_, PyArray3<f64>>> {
+pub fn squares<const N: usize>(py: Python<'_>, matrices: Vec<[[f64; N]; N]>) -> PyResult<Blocks<'_>> {
     blocks(py, matrices)
 }
 
@@ -106,7 +102,7 @@ pub fn squares<const N: usize>(
 pub fn blocks<const M: usize, const N: usize>(
     py: Python<'_>,
     matrices: Vec<[[f64; N]; M]>,
-) -> PyResult<Bound<'_, PyArray3<f64>>> {
+) -> PyResult<Blocks<'_>> {
     let count = matrices.len();
     PyArray1::from_vec(py, matrices.into_flattened().into_flattened()).reshape([count, M, N])
 }
@@ -131,7 +127,7 @@ pub fn check_lengths(first: (&str, usize), others: &[(&str, usize)]) -> PyResult
     }
 }
 
-pub fn values(array: &PyReadonlyArrayDyn<'_, f64>) -> Vec<f64> {
+pub fn values(array: &Array<'_>) -> Vec<f64> {
     let view = array.as_array();
     view.as_slice().map_or_else(|| view.iter().copied().collect(), <[f64]>::to_vec)
 }
@@ -146,7 +142,7 @@ fn wrong_shape(name: &str, expected: &str, shape: &[usize]) -> PyErr {
 }
 
 /// As an array, (rows, columns); what is symmetric may be large, and is not copied.
-pub fn matrix(py: Python<'_>, found: DMatrix<f64>, symmetric: bool) -> PyResult<Bound<'_, PyArray2<f64>>> {
+pub fn matrix(py: Python<'_>, found: DMatrix<f64>, symmetric: bool) -> PyResult<Matrix<'_>> {
     let shape = [found.nrows(), found.ncols()];
     let rows = if symmetric { found } else { found.transpose() };
     PyArray1::from_vec(py, rows.data.into()).reshape(shape)

@@ -1,19 +1,12 @@
 //! Attitudes in every representation; the documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use photocore::geometry::angle_axis::{quaternion, quaternion_rotation};
 use photocore::geometry::attitude::{quaternion_by_step, vision_axes, vision_quaternion_by_step};
 use photocore::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3};
 use pyo3::prelude::*;
 
-use crate::arrays::{InputError, from_rows, matrices, row_major, rows, squares, table};
-
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(attitudes_from_numbers, module)?)?;
-    module.add_function(wrap_pyfunction!(numbers_of_attitudes, module)?)?;
-    module.add_function(wrap_pyfunction!(nadir_boresight, module)?)
-}
+use crate::arrays::{Array, InputError, Matrix, from_rows, matrices, row_major, rows, squares, table};
 
 /// Two arrays, each of a row or matrix for every attitude.
 type Pair<'py, A, B> = PyResult<(Bound<'py, A>, Bound<'py, B>)>;
@@ -63,10 +56,10 @@ impl Representation {
 }
 
 #[pyfunction]
-fn attitudes_from_numbers<'py>(
+pub fn attitudes_from_numbers<'py>(
     py: Python<'py>,
     representation: &str,
-    numbers: PyReadonlyArrayDyn<'py, f64>,
+    numbers: Array<'py>,
     boresight: [[f64; 3]; 3],
 ) -> Pair<'py, PyArray3<f64>, PyArray3<f64>> {
     let representation = Representation::named(representation, boresight)?;
@@ -97,10 +90,10 @@ fn attitudes_from_numbers<'py>(
 }
 
 #[pyfunction]
-fn numbers_of_attitudes<'py>(
+pub fn numbers_of_attitudes<'py>(
     py: Python<'py>,
     representation: &str,
-    attitudes: PyReadonlyArrayDyn<'py, f64>,
+    attitudes: Array<'py>,
     boresight: [[f64; 3]; 3],
 ) -> Pair<'py, PyArray2<f64>, PyArray3<f64>> {
     let representation = Representation::named(representation, boresight)?;
@@ -123,6 +116,6 @@ fn numbers_of_attitudes<'py>(
 }
 
 #[pyfunction]
-fn nadir_boresight(py: Python<'_>, quarters: u8) -> PyResult<Bound<'_, PyArray2<f64>>> {
+pub fn nadir_boresight(py: Python<'_>, quarters: u8) -> PyResult<Matrix<'_>> {
     table(py, row_major(&AttitudeNumbers::nadir_boresight(quarters)).to_vec())
 }

@@ -1,30 +1,19 @@
 //! Cameras by the names of their models; their documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use photocore::geometry::camera::{LensDirection, ModelFacts, Patch, RadialLimit};
 use photocore::geometry::{Camera, Unit};
 use pyo3::prelude::*;
 
-use crate::arrays::{InputError, numbers, rows, table, values};
+use crate::arrays::{Array, Blocks, InputError, Matrix, numbers, rows, table, values};
 use crate::options::unknown;
-
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(camera_models, module)?)?;
-    module.add_function(wrap_pyfunction!(camera_images, module)?)?;
-    module.add_function(wrap_pyfunction!(camera_rays, module)?)?;
-    module.add_function(wrap_pyfunction!(camera_correct, module)?)?;
-    module.add_function(wrap_pyfunction!(camera_partials, module)?)?;
-    module.add_function(wrap_pyfunction!(camera_patches, module)?)?;
-    module.add_function(wrap_pyfunction!(radial_domain, module)?)
-}
 
 /// Formula, parameters with the power of the unit of the image that they are measured in, how many of them, the last ones, are
 /// constants, the direction of the lens, and that of the second image coordinate.
 type Facts = (&'static str, Vec<(&'static str, i32)>, usize, &'static str, &'static str);
 
 #[pyfunction]
-fn camera_models() -> Vec<(&'static str, Facts)> {
+pub fn camera_models() -> Vec<(&'static str, Facts)> {
     let power = |unit: Unit| match unit {
         Unit::Image => 1,
         Unit::PerImage(power) => -i32::from(power),
@@ -62,23 +51,19 @@ pub fn knotted(model: &str, parameters: &[f64], knots: Option<Vec<f64>>) -> PyRe
 }
 
 /// The camera of what Python gives.
-fn given(
-    model: &str,
-    parameters: &PyReadonlyArrayDyn<'_, f64>,
-    knots: Option<&PyReadonlyArrayDyn<'_, f64>>,
-) -> PyResult<Camera> {
+fn given(model: &str, parameters: &Array<'_>, knots: Option<&Array<'_>>) -> PyResult<Camera> {
     knotted(model, &numbers("parameters", parameters)?, knots.map(values))
 }
 
 #[pyfunction]
 #[pyo3(signature = (model, parameters, u, knots=None))]
-fn camera_images<'py>(
+pub fn camera_images<'py>(
     py: Python<'py>,
     model: &str,
-    parameters: PyReadonlyArrayDyn<'py, f64>,
-    u: PyReadonlyArrayDyn<'py, f64>,
-    knots: Option<PyReadonlyArrayDyn<'py, f64>>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    parameters: Array<'py>,
+    u: Array<'py>,
+    knots: Option<Array<'py>>,
+) -> PyResult<Matrix<'py>> {
     let camera = given(model, &parameters, knots.as_ref())?;
     let images = rows("u", &u)?.into_iter().map(|u: [f64; 3]| camera.image(&u.into()));
     table(py, images.collect())
@@ -86,25 +71,25 @@ fn camera_images<'py>(
 
 #[pyfunction]
 #[pyo3(signature = (model, parameters, xy, knots=None))]
-fn camera_rays<'py>(
+pub fn camera_rays<'py>(
     py: Python<'py>,
     model: &str,
-    parameters: PyReadonlyArrayDyn<'py, f64>,
-    xy: PyReadonlyArrayDyn<'py, f64>,
-    knots: Option<PyReadonlyArrayDyn<'py, f64>>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    parameters: Array<'py>,
+    xy: Array<'py>,
+    knots: Option<Array<'py>>,
+) -> PyResult<Matrix<'py>> {
     let camera = given(model, &parameters, knots.as_ref())?;
     let ray = |xy: [f64; 2]| camera.direction(xy).map_or([f64::NAN; 3], Into::into);
     table(py, rows("xy", &xy)?.into_iter().map(ray).collect())
 }
 
 #[pyfunction]
-fn camera_correct<'py>(
+pub fn camera_correct<'py>(
     py: Python<'py>,
     model: &str,
-    parameters: PyReadonlyArrayDyn<'py, f64>,
-    xy: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    parameters: Array<'py>,
+    xy: Array<'py>,
+) -> PyResult<Matrix<'py>> {
     let camera = named(model, &numbers("parameters", &parameters)?)?;
     let corrected = |xy: [f64; 2]| {
         let refused =
@@ -115,16 +100,16 @@ fn camera_correct<'py>(
 }
 
 /// Images, their partials with respect to u and to the parameters.
-type Partials<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>);
+type Partials<'py> = (Matrix<'py>, Blocks<'py>, Blocks<'py>);
 
 #[pyfunction]
 #[pyo3(signature = (model, parameters, u, knots=None))]
-fn camera_partials<'py>(
+pub fn camera_partials<'py>(
     py: Python<'py>,
     model: &str,
-    parameters: PyReadonlyArrayDyn<'py, f64>,
-    u: PyReadonlyArrayDyn<'py, f64>,
-    knots: Option<PyReadonlyArrayDyn<'py, f64>>,
+    parameters: Array<'py>,
+    u: Array<'py>,
+    knots: Option<Array<'py>>,
 ) -> PyResult<Partials<'py>> {
     let camera = given(model, &parameters, knots.as_ref())?;
     let images: Vec<_> = rows("u", &u)?.into_iter().map(|u: [f64; 3]| camera.linearize(&u.into())).collect();
@@ -139,14 +124,14 @@ fn camera_partials<'py>(
 }
 
 /// Numbers of knots and their weights, of each direction.
-type Patches<'py> = (Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>);
+type Patches<'py> = (Bound<'py, PyArray2<i64>>, Matrix<'py>);
 
 #[pyfunction]
-fn camera_patches<'py>(
+pub fn camera_patches<'py>(
     py: Python<'py>,
     model: &str,
-    parameters: PyReadonlyArrayDyn<'py, f64>,
-    u: PyReadonlyArrayDyn<'py, f64>,
+    parameters: Array<'py>,
+    u: Array<'py>,
 ) -> PyResult<Patches<'py>> {
     let camera = given(model, &parameters, None)?;
     let patch = |u: [f64; 3]| {
@@ -167,7 +152,7 @@ fn camera_patches<'py>(
 }
 
 #[pyfunction]
-fn radial_domain(model: &str, parameters: PyReadonlyArrayDyn<'_, f64>) -> PyResult<Option<(f64, f64)>> {
+pub fn radial_domain(model: &str, parameters: Array<'_>) -> PyResult<Option<(f64, f64)>> {
     let camera = named(model, &numbers("parameters", &parameters)?)?;
     Ok(camera.radial_limit().map(|RadialLimit { radius, distorted }| (radius, distorted)))
 }

@@ -8,14 +8,13 @@ use pyo3::prelude::*;
 
 use crate::options::unknown;
 
-/// Adds the names of the types and of their unknowns to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+/// The types of common unknowns, each with the names of its unknowns and what these measure.
+pub fn kinds() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {
     let facts = |kind: &CommonKind| {
-        let unknowns: Vec<(&str, &str)> =
-            kind.unknowns().iter().map(|&(name, _, measure)| (name, measured(measure))).collect();
-        (kind.name(), unknowns)
+        let unknowns = kind.unknowns().iter().map(|&(name, _, measure)| (name, measured(measure)));
+        (kind.name(), unknowns.collect())
     };
-    module.add("UNKNOWNS", CommonKind::ALL.iter().map(facts).collect::<Vec<_>>())
+    CommonKind::ALL.iter().map(facts).collect()
 }
 
 fn measured(measure: Measure) -> &'static str {
@@ -53,9 +52,9 @@ pub fn mount((photo, frame, sensor): MountRow) -> Mount {
 pub type AdjustedRow = (Vec<f64>, [f64; 3], Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize);
 
 /// What has become of a common unknown, for Python.
-pub fn adjusted_row(common: &AdjustedCommon) -> AdjustedRow {
+pub fn adjusted_row(common: AdjustedCommon) -> AdjustedRow {
     let AdjustedCommon { change, position, attitude, cofactors, with_former, redundancy, observations } =
-        common.clone();
+        common;
     (
         change,
         position,

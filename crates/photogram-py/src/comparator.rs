@@ -1,6 +1,6 @@
 //! Joint calibration of a comparator; its documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photocore::adjustment::{Method, Options, Status, Stop};
 use photocore::programs::comparator::{
     Basis, Calibration, CalibrationError, Case, Comparator, GridPoint, Measurement, Placement, Solution,
@@ -9,7 +9,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, indices, rows, squares, table};
+use crate::arrays::{Array, Indices, check_lengths, indices, rows, squares, table};
 use crate::work::{Workers, watched};
 
 create_exception!(
@@ -19,28 +19,21 @@ create_exception!(
     "The calibration cannot be adjusted: (message, cases, points)."
 );
 
-/// Adds the function and its classes to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("ComparatorError", module.py().get_type::<ComparatorError>())?;
-    module.add_class::<ComparatorSolution>()?;
-    module.add_function(wrap_pyfunction!(adjust_comparator, module)?)
-}
-
 #[pyfunction]
 #[pyo3(signature = (
     grid_xy, grid_sd, case_placements, case_left_handed, measured_cases, measured_points, measured_xy, measured_sd,
     coefficients, coefficient_sd, *, degree, centre, half_range, limit, max_iterations
 ))]
-fn adjust_comparator(
+pub fn adjust_comparator(
     py: Python<'_>,
-    grid_xy: PyReadonlyArrayDyn<'_, f64>,
-    grid_sd: PyReadonlyArrayDyn<'_, f64>,
-    case_placements: PyReadonlyArrayDyn<'_, f64>,
+    grid_xy: Array<'_>,
+    grid_sd: Array<'_>,
+    case_placements: Array<'_>,
     case_left_handed: Vec<bool>,
-    measured_cases: PyReadonlyArrayDyn<'_, i64>,
-    measured_points: PyReadonlyArrayDyn<'_, i64>,
-    measured_xy: PyReadonlyArrayDyn<'_, f64>,
-    measured_sd: PyReadonlyArrayDyn<'_, f64>,
+    measured_cases: Indices<'_>,
+    measured_points: Indices<'_>,
+    measured_xy: Array<'_>,
+    measured_sd: Array<'_>,
     coefficients: [Vec<f64>; 2],
     coefficient_sd: [Vec<f64>; 2],
     degree: u32,
@@ -84,7 +77,7 @@ fn adjust_comparator(
     };
     let workers = Workers::of(0, calibration.measurements.len());
     let solution = watched(py, workers, None, |pool, watch| calibration.adjust_on(&options, pool, watch))?;
-    solution.map(|solution| ComparatorSolution { solution }).map_err(|error| failure(&error))
+    told(py, solution.map_err(|error| failure(&error))?)
 }
 
 fn failure(error: &CalibrationError) -> PyErr {
@@ -99,77 +92,41 @@ fn failure(error: &CalibrationError) -> PyErr {
 }
 
 /// An adjusted calibration.
-#[pyclass(frozen, module = "photogram._photocore")]
-struct ComparatorSolution {
-    solution: Solution,
+#[pyclass(frozen, get_all, module = "photogram._photocore")]
+pub struct ComparatorSolution {
+    converged: bool,
+    iterations: usize,
+    comparator: Vec<f64>,
+    comparator_cofactors: Py<PyArray2<f64>>,
+    case_placements: Py<PyArray2<f64>>,
+    case_cofactors: Py<PyArray3<f64>>,
+    grid_xy: Py<PyArray2<f64>>,
+    grid_cofactors: Py<PyArray3<f64>>,
+    grid_redundancy: Py<PyArray2<f64>>,
+    residuals: Py<PyArray2<f64>>,
+    redundancy: Py<PyArray2<f64>>,
+    sum_of_squares: f64,
+    degrees_of_freedom: i64,
 }
 
-#[pymethods]
-impl ComparatorSolution {
-    #[getter]
-    fn converged(&self) -> bool {
-        self.solution.adjustment.status == Status::Converged
-    }
-
-    #[getter]
-    fn iterations(&self) -> usize {
-        self.solution.adjustment.iterations.len()
-    }
-
-    #[getter]
-    fn comparator(&self) -> Vec<f64> {
-        self.solution.comparator.clone()
-    }
-
-    #[getter]
-    fn comparator_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let unknowns = self.solution.comparator.len();
-        numpy::PyArray1::from_slice(py, &self.solution.comparator_cofactors).reshape([unknowns, unknowns])
-    }
-
-    #[getter]
-    fn case_placements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let row = |case: &Placement| [case.rotation, case.translation[0], case.translation[1]];
-        table(py, self.solution.cases.iter().map(row).collect())
-    }
-
-    #[getter]
-    fn case_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        squares(py, self.solution.case_cofactors.clone())
-    }
-
-    #[getter]
-    fn grid_xy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.points.clone())
-    }
-
-    #[getter]
-    fn grid_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        squares(py, self.solution.point_cofactors.clone())
-    }
-
-    #[getter]
-    fn grid_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.point_redundancy.clone())
-    }
-
-    #[getter]
-    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.residuals.clone())
-    }
-
-    #[getter]
-    fn redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.redundancy.clone())
-    }
-
-    #[getter]
-    fn sum_of_squares(&self) -> f64 {
-        self.solution.sum_of_squares
-    }
-
-    #[getter]
-    fn degrees_of_freedom(&self) -> i64 {
-        self.solution.degrees_of_freedom
-    }
+fn told(py: Python<'_>, found: Solution) -> PyResult<ComparatorSolution> {
+    let unknowns = found.comparator.len();
+    let row = |case: &Placement| [case.rotation, case.translation[0], case.translation[1]];
+    Ok(ComparatorSolution {
+        converged: found.adjustment.status == Status::Converged,
+        iterations: found.adjustment.iterations.len(),
+        comparator: found.comparator,
+        comparator_cofactors: PyArray1::from_vec(py, found.comparator_cofactors)
+            .reshape([unknowns, unknowns])?
+            .unbind(),
+        case_placements: table(py, found.cases.iter().map(row).collect())?.unbind(),
+        case_cofactors: squares(py, found.case_cofactors)?.unbind(),
+        grid_xy: table(py, found.points)?.unbind(),
+        grid_cofactors: squares(py, found.point_cofactors)?.unbind(),
+        grid_redundancy: table(py, found.point_redundancy)?.unbind(),
+        residuals: table(py, found.residuals)?.unbind(),
+        redundancy: table(py, found.redundancy)?.unbind(),
+        sum_of_squares: found.sum_of_squares,
+        degrees_of_freedom: found.degrees_of_freedom,
+    })
 }

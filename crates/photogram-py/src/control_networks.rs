@@ -17,23 +17,13 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::memory;
 use crate::work::{Workers, watched};
 
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(control_header, module)?)?;
-    module.add_function(wrap_pyfunction!(control_header_message, module)?)?;
-    module.add_function(wrap_pyfunction!(control_points, module)?)?;
-    module.add_function(wrap_pyfunction!(control_points_of_text, module)?)?;
-    module.add_function(wrap_pyfunction!(control_point_messages, module)?)?;
-    module.add_function(wrap_pyfunction!(control_point_text, module)?)
-}
-
 /// The header of a file: texts, number of points, lengths of messages, radii, what is not known.
 type HeaderRow<'py> = ([Option<String>; 6], Option<u64>, Vec<u64>, Vec<f64>, Bound<'py, PyBytes>);
 /// Points and measures as columns by their names, first measures.
 type PointsRow<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>, Bound<'py, PyArray1<i64>>);
 
 #[pyfunction]
-fn control_header<'py>(
+pub fn control_header<'py>(
     py: Python<'py>,
     data: &[u8],
     start: usize,
@@ -46,7 +36,7 @@ fn control_header<'py>(
 }
 
 #[pyfunction]
-fn control_header_message<'py>(
+pub fn control_header_message<'py>(
     py: Python<'py>,
     texts: [Option<String>; 6],
     points: u64,
@@ -58,7 +48,7 @@ fn control_header_message<'py>(
 }
 
 #[pyfunction]
-fn control_points<'py>(
+pub fn control_points<'py>(
     py: Python<'py>,
     data: &[u8],
     start: usize,
@@ -74,7 +64,7 @@ fn control_points<'py>(
 }
 
 #[pyfunction]
-fn control_points_of_text<'py>(
+pub fn control_points_of_text<'py>(
     py: Python<'py>,
     data: &[u8],
     file: &Bound<'py, PyAny>,
@@ -85,7 +75,7 @@ fn control_points_of_text<'py>(
 }
 
 #[pyfunction]
-fn control_point_messages<'py>(
+pub fn control_point_messages<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyDict>,
     measures: &Bound<'py, PyDict>,
@@ -98,7 +88,7 @@ fn control_point_messages<'py>(
 }
 
 #[pyfunction]
-fn control_point_text<'py>(
+pub fn control_point_text<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyDict>,
     measures: &Bound<'py, PyDict>,

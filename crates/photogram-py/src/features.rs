@@ -1,34 +1,23 @@
 //! Features through points; its documentation is in `_photocore.pyi`.
 
 use nalgebra::DMatrix;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use photocore::geometry::Vector3;
 use photocore::programs::features::{Form, Measured, distance, measure};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{InputError, rows, table};
-
-/// Adds the function to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(measured_feature, module)?)
-}
+use crate::arrays::{Array, InputError, Matrix, Vector, rows, table};
 
 /// Names and whether they are lengths, values, covariance, deviations, test.
-type Row<'py> = (
-    Vec<(&'static str, bool)>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Option<(f64, usize)>,
-);
+type Row<'py> = (Vec<(&'static str, bool)>, Vector<'py>, Matrix<'py>, Matrix<'py>, Option<(f64, usize)>);
 
 #[pyfunction]
-fn measured_feature<'py>(
+pub fn measured_feature<'py>(
     py: Python<'py>,
     kind: &str,
-    points: PyReadonlyArrayDyn<'py, f64>,
-    covariance: PyReadonlyArrayDyn<'py, f64>,
+    points: Array<'py>,
+    covariance: Array<'py>,
 ) -> PyResult<Row<'py>> {
     let points: Vec<Vector3> = rows("points", &points)?.into_iter().map(<Vector3>::from).collect();
     let covariance = match covariance.shape() {

@@ -1,23 +1,13 @@
 //! Readings of scanned films; their documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray2, PyArray3, PyReadonlyArrayDyn};
 use photocore::geometry::Vector3;
 use photocore::network::film::{FilmAt, FilmOf, Read};
 use pyo3::prelude::*;
 
-use crate::arrays::{InputError, blocks, numbers, rows, table};
-
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(film_readings, module)?)?;
-    module.add_function(wrap_pyfunction!(film_places, module)?)
-}
+use crate::arrays::{Array, Blocks, InputError, Matrix, blocks, numbers, rows, table};
 
 /// The film of given numbers, whose common unknowns are these vectors in the order of the film.
-fn film(
-    film: &PyReadonlyArrayDyn<'_, f64>,
-    vectors: &PyReadonlyArrayDyn<'_, f64>,
-) -> PyResult<(FilmOf, FilmAt)> {
+fn film(film: &Array<'_>, vectors: &Array<'_>) -> PyResult<(FilmOf, FilmAt)> {
     let vectors = rows::<3>("vectors", vectors)?;
     let all: Vec<usize> = (0..vectors.len()).collect();
     let found = FilmOf::from_numbers(&all, &numbers("film", film)?).filter(FilmOf::is_sound);
@@ -27,14 +17,14 @@ fn film(
 }
 
 /// Readings, and their partials by place, t1 .. b2 and h or g, (n, 2, 10).
-type Readings<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
+type Readings<'py> = (Matrix<'py>, Blocks<'py>);
 
 #[pyfunction]
-fn film_readings<'py>(
+pub fn film_readings<'py>(
     py: Python<'py>,
-    numbers: PyReadonlyArrayDyn<'py, f64>,
-    vectors: PyReadonlyArrayDyn<'py, f64>,
-    places: PyReadonlyArrayDyn<'py, f64>,
+    numbers: Array<'py>,
+    vectors: Array<'py>,
+    places: Array<'py>,
 ) -> PyResult<Readings<'py>> {
     let (own, at) = film(&numbers, &vectors)?;
     let places = rows::<2>("places", &places)?;
@@ -56,12 +46,12 @@ fn film_readings<'py>(
 }
 
 #[pyfunction]
-fn film_places<'py>(
+pub fn film_places<'py>(
     py: Python<'py>,
-    numbers: PyReadonlyArrayDyn<'py, f64>,
-    vectors: PyReadonlyArrayDyn<'py, f64>,
-    readings: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    numbers: Array<'py>,
+    vectors: Array<'py>,
+    readings: Array<'py>,
+) -> PyResult<Matrix<'py>> {
     let (_, at) = film(&numbers, &vectors)?;
     let place = |&xy: &[f64; 2]| at.place(xy, at.cell_of_reading(xy)).unwrap_or([f64::NAN; 2]);
     table(py, rows::<2>("readings", &readings)?.iter().map(place).collect())

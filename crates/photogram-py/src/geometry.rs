@@ -1,7 +1,8 @@
 //! The geometry functions, row by row over arrays; their documentation is in `_photocore.pyi`.
 
-use crate::arrays::{check_lengths, from_rows, matrices, numbers, row_major, rows, squares, table};
-use numpy::{PyArray2, PyArray3, PyReadonlyArrayDyn};
+use crate::arrays::{
+    Array, Blocks, Matrix, check_lengths, from_rows, matrices, numbers, row_major, rows, squares, table,
+};
 use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
     self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Point, Refraction, RotationSense, View,
@@ -10,23 +11,8 @@ use photocore::geometry::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(rotation_matrix, module)?)?;
-    module.add_function(wrap_pyfunction!(rotation_angles, module)?)?;
-    module.add_function(wrap_pyfunction!(vector_rotations, module)?)?;
-    module.add_function(wrap_pyfunction!(rotation_vectors, module)?)?;
-    module.add_function(wrap_pyfunction!(geographic_to_geocentric, module)?)?;
-    module.add_function(wrap_pyfunction!(geocentric_to_geographic, module)?)?;
-    module.add_function(wrap_pyfunction!(refraction_shift, module)?)?;
-    module.add_function(wrap_pyfunction!(project, module)?)
-}
-
 #[pyfunction]
-fn rotation_matrix<'py>(
-    py: Python<'py>,
-    angles: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
+pub fn rotation_matrix<'py>(py: Python<'py>, angles: Array<'py>) -> PyResult<Blocks<'py>> {
     let angles = rows("angles", &angles)?;
     squares(
         py,
@@ -35,42 +21,33 @@ fn rotation_matrix<'py>(
 }
 
 #[pyfunction]
-fn rotation_angles<'py>(
-    py: Python<'py>,
-    matrices: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+pub fn rotation_angles<'py>(py: Python<'py>, matrices: Array<'py>) -> PyResult<Matrix<'py>> {
     let matrices = self::matrices("matrices", &matrices)?;
     let angles = |matrix| geometry::rotation_angles(&from_rows(matrix));
     table(py, py.detach(|| matrices.into_iter().map(angles).collect()))
 }
 
 #[pyfunction]
-fn vector_rotations<'py>(
-    py: Python<'py>,
-    vectors: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
+pub fn vector_rotations<'py>(py: Python<'py>, vectors: Array<'py>) -> PyResult<Blocks<'py>> {
     let vectors = rows("vectors", &vectors)?;
     let matrix = |vector: [f64; 3]| row_major(&geometry::angle_axis_rotation(&vector.into()));
     squares(py, py.detach(|| vectors.into_iter().map(matrix).collect()))
 }
 
 #[pyfunction]
-fn rotation_vectors<'py>(
-    py: Python<'py>,
-    matrices: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+pub fn rotation_vectors<'py>(py: Python<'py>, matrices: Array<'py>) -> PyResult<Matrix<'py>> {
     let matrices = self::matrices("matrices", &matrices)?;
     let vector = |matrix| rotation_angle_axis(&from_rows(matrix)).into();
     table(py, py.detach(|| matrices.into_iter().map(vector).collect()))
 }
 
 #[pyfunction]
-fn geographic_to_geocentric<'py>(
+pub fn geographic_to_geocentric<'py>(
     py: Python<'py>,
-    positions: PyReadonlyArrayDyn<'py, f64>,
+    positions: Array<'py>,
     a: f64,
     b: f64,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let (positions, ellipsoid) = (rows("positions", &positions)?, ellipsoid((a, b))?);
     table(
         py,
@@ -79,12 +56,12 @@ fn geographic_to_geocentric<'py>(
 }
 
 #[pyfunction]
-fn geocentric_to_geographic<'py>(
+pub fn geocentric_to_geographic<'py>(
     py: Python<'py>,
-    xyz: PyReadonlyArrayDyn<'py, f64>,
+    xyz: Array<'py>,
     a: f64,
     b: f64,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let (xyz, ellipsoid) = (rows("xyz", &xyz)?, ellipsoid((a, b))?);
     let geographic = |xyz: [f64; 3]| ellipsoid.geographic(xyz.into());
     table(py, py.detach(|| xyz.into_iter().map(geographic).collect()))
@@ -94,16 +71,16 @@ fn geocentric_to_geographic<'py>(
 #[pyo3(signature = (
     points, positions, attitudes, principal_distances, *, spheroid, photo_to_ground, refraction
 ))]
-fn project<'py>(
+pub fn project<'py>(
     py: Python<'py>,
-    points: PyReadonlyArrayDyn<'py, f64>,
-    positions: PyReadonlyArrayDyn<'py, f64>,
-    attitudes: PyReadonlyArrayDyn<'py, f64>,
-    principal_distances: PyReadonlyArrayDyn<'py, f64>,
+    points: Array<'py>,
+    positions: Array<'py>,
+    attitudes: Array<'py>,
+    principal_distances: Array<'py>,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
     refraction: Option<RefractionRow>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let points: Vec<[f64; 3]> = rows("points", &points)?;
     let positions: Vec<[f64; 3]> = rows("positions", &positions)?;
     let attitudes: Vec<[f64; 3]> = rows("attitudes", &attitudes)?;
@@ -135,13 +112,13 @@ fn project<'py>(
 
 #[pyfunction]
 #[pyo3(signature = (points, positions, *, spheroid, refraction))]
-fn refraction_shift<'py>(
+pub fn refraction_shift<'py>(
     py: Python<'py>,
-    points: PyReadonlyArrayDyn<'py, f64>,
-    positions: PyReadonlyArrayDyn<'py, f64>,
+    points: Array<'py>,
+    positions: Array<'py>,
     spheroid: Option<(f64, f64)>,
     refraction: RefractionRow,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let points: Vec<[f64; 3]> = rows("points", &points)?;
     let positions: Vec<[f64; 3]> = rows("positions", &positions)?;
     check_lengths(("points", points.len()), &[("positions", positions.len())])?;

@@ -23,32 +23,94 @@ mod text;
 mod trajectories;
 mod work;
 
-use pyo3::prelude::*;
-
 #[global_allocator]
 static ALLOCATOR: memory::Reserved = memory::Reserved;
 
-#[pymodule]
-fn _photocore(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    memory::arm()?;
-    // Threads are those of the caller's pool: the solvers of the library would start a pool of the whole process beside it.
-    faer::set_global_parallelism(faer::Par::Seq);
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_function(wrap_pyfunction!(memory::give_back, module)?)?;
-    distributions::register(module)?;
-    attitude::register(module)?;
-    features::register(module)?;
-    films::register(module)?;
-    geometry::register(module)?;
-    camera::register(module)?;
-    commons::register(module)?;
-    network::register(module)?;
-    comparator::register(module)?;
-    control_networks::register(module)?;
-    resection::register(module)?;
-    similarity::register(module)?;
-    matching::register(module)?;
-    stellar::register(module)?;
-    text::register(module)?;
-    trajectories::register(module)
+/// What Python sees of the core.
+#[pyo3::pymodule]
+mod _photocore {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::attitude::{attitudes_from_numbers, nadir_boresight, numbers_of_attitudes};
+    #[pymodule_export]
+    use crate::camera::{
+        camera_correct, camera_images, camera_models, camera_partials, camera_patches, camera_rays,
+        radial_domain,
+    };
+    #[pymodule_export]
+    use crate::comparator::{ComparatorError, ComparatorSolution, adjust_comparator};
+    #[pymodule_export]
+    use crate::control_networks::{
+        control_header, control_header_message, control_point_messages, control_point_text, control_points,
+        control_points_of_text,
+    };
+    #[pymodule_export]
+    use crate::distributions::{
+        chi_square, chi_square_quantile, detectable_noncentrality, fisher, fisher_limit,
+        level_of_equal_power, log_chi_square, log_fisher, noncentral_chi_square, noncentral_fisher, normal,
+        student, student_limit,
+    };
+    #[pymodule_export]
+    use crate::features::measured_feature;
+    #[pymodule_export]
+    use crate::films::{film_places, film_readings};
+    #[pymodule_export]
+    use crate::geometry::{
+        geocentric_to_geographic, geographic_to_geocentric, project, refraction_shift, rotation_angles,
+        rotation_matrix, rotation_vectors, vector_rotations,
+    };
+    #[pymodule_export]
+    use crate::matching::{nearest_points, star_similarities};
+    #[pymodule_export]
+    use crate::memory::give_back;
+    #[pymodule_export]
+    use crate::network::block::block_network;
+    #[pymodule_export]
+    use crate::network::block_network::BlockNetwork;
+    #[pymodule_export]
+    use crate::network::collection::{CollectionNetwork, collection_images, collection_network};
+    #[pymodule_export]
+    use crate::network::covariances::BlockCovariances;
+    #[pymodule_export]
+    use crate::network::first_values::find_first_values;
+    #[pymodule_export]
+    use crate::network::node::{FormedNode, Node};
+    #[pymodule_export]
+    use crate::network::solution::{BlockSolution, CollectionSolution};
+    #[pymodule_export]
+    use crate::network::state::BlockState;
+    #[pymodule_export]
+    use crate::network::steps::{is_chord, judge_full_step, step_rules};
+    #[pymodule_export]
+    use crate::network::suspects::NetworkSuspects;
+    #[pymodule_export]
+    use crate::network::trial::NetworkTrial;
+    #[pymodule_export]
+    use crate::network::{BlockError, CollectionError};
+    #[pymodule_export]
+    use crate::resection::{ResectionError, ResectionSolution, resect};
+    #[pymodule_export]
+    use crate::similarity::{
+        SimilarityError, SimilaritySolution, gauss_crout, orient_model, similarity_partials, transform_points,
+    };
+    #[pymodule_export]
+    use crate::stellar::{
+        StellarError, StellarProblem, plate_directions, plate_images, pointing_matrix, pointing_of_matrix,
+        refraction, standard_coordinates, star_places,
+    };
+    #[pymodule_export]
+    use crate::text::{csv_rows, read_numbers};
+    #[pymodule_export]
+    use crate::trajectories::{flown, trajectory_span};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::memory::arm()?;
+        // Threads are those of the caller's pool: the solvers of the library would start a pool of the whole process beside it.
+        faer::set_global_parallelism(faer::Par::Seq);
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("CAMERAS", photocore::geometry::Camera::NAMES.to_vec())?;
+        module.add("UNKNOWNS", crate::commons::kinds())
+    }
 }

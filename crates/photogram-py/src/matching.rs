@@ -1,26 +1,17 @@
 //! Points and stars that belong together; its documentation is in `_photocore.pyi`.
 
 use nalgebra::Complex;
-use numpy::{PyArray1, PyArray2, PyReadonlyArrayDyn};
+use numpy::PyArray1;
 use photocore::geometry::nearest;
 use photocore::programs::stellar::{Agreement, Similarity, best_voted, hypotheses};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, group_rows, rows, table};
-
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(nearest_points, module)?)?;
-    module.add_function(wrap_pyfunction!(star_similarities, module)?)
-}
-
-type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Indices<'py> = PyReadonlyArrayDyn<'py, i64>;
+use crate::arrays::{Array, Indices, Matrix, check_lengths, group_rows, rows, table};
 
 #[pyfunction]
 #[pyo3(signature = (points, others, limit, but = None))]
-fn nearest_points<'py>(
+pub fn nearest_points<'py>(
     py: Python<'py>,
     points: Array<'py>,
     others: Array<'py>,
@@ -38,7 +29,7 @@ fn nearest_points<'py>(
 
 #[pyfunction]
 #[pyo3(signature = (images, stars, candidates, *, makers, tolerance, stretch, least, axis, limit, wanted))]
-fn star_similarities<'py>(
+pub fn star_similarities<'py>(
     py: Python<'py>,
     images: Array<'py>,
     stars: Array<'py>,
@@ -50,7 +41,7 @@ fn star_similarities<'py>(
     axis: Option<([f64; 2], f64)>,
     limit: f64,
     wanted: usize,
-) -> PyResult<(usize, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<(usize, Matrix<'py>)> {
     let plane = |rows: Vec<[f64; 2]>| rows.into_iter().map(|[x, y]| Complex::new(x, y)).collect::<Vec<_>>();
     let (images, stars) = (plane(rows("images", &images)?), plane(rows("stars", &stars)?));
     let pairs: Vec<(usize, usize)> =

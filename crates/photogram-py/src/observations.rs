@@ -1,19 +1,16 @@
 //! Observations beside images: rows of one kind from Python, and what has become of them.
 
 use nalgebra::DMatrix;
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::PyUntypedArrayMethods;
 use photocore::network::observations::Named;
 use photocore::network::{AdjustedObservation, Observation};
 use pyo3::prelude::*;
 
-use crate::arrays::InputError;
-
-type Indices<'py> = PyReadonlyArrayDyn<'py, i64>;
-type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
+use crate::arrays::{Array, Indices, InputError};
 
 /// Observations of one kind: its name, indices of points (n, p), photos (n, q) and common unknowns (n, c; -1 for none), values (n, v),
 /// covariance matrices (n, r, r).
-pub type Group<'py> = (String, Indices<'py>, Indices<'py>, Indices<'py>, Numbers<'py>, Numbers<'py>);
+pub type Group<'py> = (String, Indices<'py>, Indices<'py>, Indices<'py>, Array<'py>, Array<'py>);
 
 /// The observations of all groups, one group after the other.
 pub fn observations(groups: &[Group<'_>]) -> PyResult<Vec<Observation>> {
@@ -56,7 +53,7 @@ fn own<'a, T>(all: &'a [T], shape: &[usize], row: usize) -> &'a [T] {
 pub type AdjustedRow = (Vec<f64>, Vec<f64>, Vec<f64>, f64, f64);
 
 /// What has become of an observation, for Python.
-pub fn adjusted_row(observation: &AdjustedObservation) -> AdjustedRow {
-    let AdjustedObservation { residual, redundancy, standardized, square, weight } = observation.clone();
+pub fn adjusted_row(observation: AdjustedObservation) -> AdjustedRow {
+    let AdjustedObservation { residual, redundancy, standardized, square, weight } = observation;
     (residual, redundancy, standardized, square, weight)
 }

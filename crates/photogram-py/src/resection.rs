@@ -1,44 +1,37 @@
 //! Resection of one photo; its documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArray3};
 use photocore::adjustment::{Method, Options, Published, Stop};
 use photocore::programs::resection::{
-    AdjustedImage, ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError as Failure,
-    Solution,
+    AdjustedControl, AdjustedImage, ControlPoint, Degeneracy, Known, Partials, Pose, Resection,
+    ResectionError as Failure, Solution,
 };
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, numbers, rows, squares, table};
+use crate::arrays::{Array, blocks, check_lengths, numbers, rows, squares, table};
 use crate::geometry::{object_space, rotation_sense};
 use crate::solution::{IterationRow, iteration_row, status_name};
 use crate::work::{Workers, watched};
 
 create_exception!(_photocore, ResectionError, PyException, "The photo cannot be resected: (kind, message).");
 
-/// Adds the function and its classes to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("ResectionError", module.py().get_type::<ResectionError>())?;
-    module.add_class::<ResectionSolution>()?;
-    module.add_function(wrap_pyfunction!(resect, module)?)
-}
-
 #[pyfunction]
 #[pyo3(signature = (
     points, point_sd, image_xy, image_sd, principal_distance, *, known, known_sd, start, spheroid, photo_to_ground,
     at_measured, criterion, limit, max_iterations, covariance
 ))]
-fn resect(
+pub fn resect(
     py: Python<'_>,
-    points: PyReadonlyArrayDyn<'_, f64>,
-    point_sd: PyReadonlyArrayDyn<'_, f64>,
-    image_xy: PyReadonlyArrayDyn<'_, f64>,
-    image_sd: PyReadonlyArrayDyn<'_, f64>,
+    points: Array<'_>,
+    point_sd: Array<'_>,
+    image_xy: Array<'_>,
+    image_sd: Array<'_>,
     principal_distance: f64,
-    known: PyReadonlyArrayDyn<'_, f64>,
-    known_sd: PyReadonlyArrayDyn<'_, f64>,
-    start: Option<PyReadonlyArrayDyn<'_, f64>>,
+    known: Array<'_>,
+    known_sd: Array<'_>,
+    start: Option<Array<'_>>,
     spheroid: Option<(f64, f64)>,
     photo_to_ground: bool,
     at_measured: bool,
@@ -83,12 +76,10 @@ fn resect(
 fn run(py: Python<'_>, resection: &Resection, options: &Options) -> PyResult<ResectionSolution> {
     let solution =
         watched(py, Workers::CALLER, None, |pool, watch| resection.adjust_on(options, pool, watch))?;
-    solution
-        .map(|solution| ResectionSolution { solution })
-        .map_err(|error| ResectionError::new_err((kind(error), error.to_string())))
+    told(py, &solution.map_err(|error| ResectionError::new_err((kind(error), error.to_string())))?)
 }
 
-fn pose(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<[[f64; 3]; 2]> {
+fn pose(name: &str, array: &Array<'_>) -> PyResult<[[f64; 3]; 2]> {
     match numbers(name, array)?[..] {
         [a, b, c, d, e, f] => Ok([[a, b, c], [d, e, f]]),
         ref other => Err(PyValueError::new_err(format!("{name} has {} values, not 6", other.len()))),
@@ -116,128 +107,64 @@ fn degeneracy(why: Degeneracy) -> &'static str {
 }
 
 /// A resected photo.
-#[pyclass(frozen, module = "photogram._photocore")]
+#[pyclass(frozen, get_all, module = "photogram._photocore")]
 pub struct ResectionSolution {
-    solution: Solution,
+    status: &'static str,
+    iterations: Vec<IterationRow>,
+    history: Py<PyArray2<f64>>,
+    start: Py<PyArray1<f64>>,
+    pose: Py<PyArray1<f64>>,
+    cofactors: Py<PyArray2<f64>>,
+    pose_redundancy: Py<PyArray1<f64>>,
+    point_positions: Py<PyArray2<f64>>,
+    point_cofactors: Py<PyArray3<f64>>,
+    point_redundancy: Py<PyArray2<f64>>,
+    residuals: Py<PyArray2<f64>>,
+    redundancy: Py<PyArray2<f64>>,
+    standardized: Py<PyArray2<f64>>,
+    partials: Py<PyArray3<f64>>,
+    points_behind: Py<PyArray1<i64>>,
+    sum_of_squares: f64,
+    degrees_of_freedom: i64,
+    alternatives: Vec<([f64; 6], f64)>,
+    undetermined: Option<&'static str>,
+    outside_danger_cylinder: Option<f64>,
 }
 
-impl ResectionSolution {
-    fn images<'py>(
-        &self,
-        py: Python<'py>,
-        part: impl Fn(&AdjustedImage) -> [f64; 2],
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.images.iter().map(part).collect())
-    }
+fn told(py: Python<'_>, found: &Solution) -> PyResult<ResectionSolution> {
+    let of_images = |part: fn(&AdjustedImage) -> [f64; 2]| {
+        table(py, found.images.iter().map(part).collect()).map(Bound::unbind)
+    };
+    let of_points = |part: fn(&AdjustedControl) -> [f64; 3]| {
+        table(py, found.points.iter().map(part).collect()).map(Bound::unbind)
+    };
+    let behind = found.behind.iter().map(|&point| point as i64);
+    let alternatives = found.alternatives.iter();
+    Ok(ResectionSolution {
+        status: status_name(found.adjustment.status),
+        iterations: found.adjustment.iterations.iter().map(iteration_row).collect(),
+        history: table(py, found.history.iter().map(joined).collect())?.unbind(),
+        start: PyArray1::from_slice(py, &joined(&found.start)).unbind(),
+        pose: PyArray1::from_slice(py, &joined(&found.pose)).unbind(),
+        cofactors: table(py, found.cofactors.to_vec())?.unbind(),
+        pose_redundancy: PyArray1::from_slice(py, &found.redundancy).unbind(),
+        point_positions: of_points(|point| point.coordinates)?,
+        point_cofactors: squares(py, found.points.iter().map(|point| point.cofactors).collect())?.unbind(),
+        point_redundancy: of_points(|point| point.redundancy)?,
+        residuals: of_images(|image| image.residual)?,
+        redundancy: of_images(|image| image.redundancy)?,
+        standardized: of_images(|image| image.standardized)?,
+        partials: blocks(py, found.images.iter().map(|image| image.partials).collect())?.unbind(),
+        points_behind: PyArray1::from_vec(py, behind.collect()).unbind(),
+        sum_of_squares: found.sum_of_squares,
+        degrees_of_freedom: found.degrees_of_freedom,
+        alternatives: alternatives.map(|other| (joined(&other.pose), other.sum_of_squares)).collect(),
+        undetermined: found.undetermined.map(degeneracy),
+        outside_danger_cylinder: found.outside_danger_cylinder,
+    })
 }
 
 fn joined(pose: &Pose) -> [f64; 6] {
     let ([x, y, z], [omega, phi, kappa]) = (pose.position, pose.attitude);
     [x, y, z, omega, phi, kappa]
-}
-
-#[pymethods]
-impl ResectionSolution {
-    #[getter]
-    fn status(&self) -> &'static str {
-        status_name(self.solution.adjustment.status)
-    }
-
-    #[getter]
-    fn iterations(&self) -> Vec<IterationRow> {
-        self.solution.adjustment.iterations.iter().map(iteration_row).collect()
-    }
-
-    #[getter]
-    fn history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.history.iter().map(joined).collect())
-    }
-
-    #[getter]
-    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &joined(&self.solution.start))
-    }
-
-    #[getter]
-    fn pose<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &joined(&self.solution.pose))
-    }
-
-    #[getter]
-    fn cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.cofactors.to_vec())
-    }
-
-    #[getter]
-    fn pose_redundancy<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.solution.redundancy)
-    }
-
-    #[getter]
-    fn point_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.points.iter().map(|point| point.coordinates).collect())
-    }
-
-    #[getter]
-    fn point_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        squares(py, self.solution.points.iter().map(|point| point.cofactors).collect())
-    }
-
-    #[getter]
-    fn point_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.points.iter().map(|point| point.redundancy).collect())
-    }
-
-    #[getter]
-    fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.images(py, |image| image.residual)
-    }
-
-    #[getter]
-    fn redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.images(py, |image| image.redundancy)
-    }
-
-    #[getter]
-    fn standardized<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.images(py, |image| image.standardized)
-    }
-
-    #[getter]
-    fn partials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let count = self.solution.images.len();
-        let values: Vec<[[f64; 6]; 2]> = self.solution.images.iter().map(|image| image.partials).collect();
-        PyArray1::from_vec(py, values.into_flattened().into_flattened()).reshape([count, 2, 6])
-    }
-
-    #[getter]
-    fn points_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_vec(py, self.solution.behind.iter().map(|&point| point as i64).collect())
-    }
-
-    #[getter]
-    fn sum_of_squares(&self) -> f64 {
-        self.solution.sum_of_squares
-    }
-
-    #[getter]
-    fn degrees_of_freedom(&self) -> i64 {
-        self.solution.degrees_of_freedom
-    }
-
-    #[getter]
-    fn alternatives(&self) -> Vec<([f64; 6], f64)> {
-        let alternatives = &self.solution.alternatives;
-        alternatives.iter().map(|other| (joined(&other.pose), other.sum_of_squares)).collect()
-    }
-
-    #[getter]
-    fn undetermined(&self) -> Option<&'static str> {
-        self.solution.undetermined.map(degeneracy)
-    }
-
-    #[getter]
-    fn outside_danger_cylinder(&self) -> Option<f64> {
-        self.solution.outside_danger_cylinder
-    }
 }

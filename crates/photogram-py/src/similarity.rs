@@ -1,6 +1,6 @@
 //! Absolute orientation; its documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArray3};
 use photocore::programs::similarity::{
     AdjustedStation, Matrix7, Method, Options, Parameters, Similarity, SimilarityError as Failure, Solution,
     Start, Started, Station, Trace, gauss_crout as crout, orient_on,
@@ -8,8 +8,11 @@ use photocore::programs::similarity::{
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-use crate::arrays::{check_lengths, from_rows, row_major, rows, squares, table};
+use crate::arrays::{
+    Array, Blocks, Matrix, Vector, check_lengths, from_rows, row_major, rows, squares, table,
+};
 use crate::solution::{IterationRow, iteration_row, status_name};
 use crate::work::{Workers, watched};
 
@@ -19,16 +22,6 @@ create_exception!(
     PyException,
     "The model cannot be oriented: (kind, message, stations)."
 );
-
-/// Adds the functions and their classes to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("SimilarityError", module.py().get_type::<SimilarityError>())?;
-    module.add_class::<SimilaritySolution>()?;
-    module.add_function(wrap_pyfunction!(orient_model, module)?)?;
-    module.add_function(wrap_pyfunction!(transform_points, module)?)?;
-    module.add_function(wrap_pyfunction!(similarity_partials, module)?)?;
-    module.add_function(wrap_pyfunction!(gauss_crout, module)?)
-}
 
 /// Scale, rotation, shift, centre of the control, centre of the model.
 type CentredRow = (f64, [[f64; 3]; 3], [f64; 3], [f64; 3], [f64; 3]);
@@ -50,12 +43,12 @@ fn from_row((scale, rotation, shift, control_centre, model_centre): CentredRow) 
 
 #[pyfunction]
 #[pyo3(signature = (control, control_sd, model, model_sd, *, method, start, former, max_iterations, tolerance, threads, trace, scale=None))]
-fn orient_model(
+pub fn orient_model(
     py: Python<'_>,
-    control: PyReadonlyArrayDyn<'_, f64>,
-    control_sd: PyReadonlyArrayDyn<'_, f64>,
-    model: PyReadonlyArrayDyn<'_, f64>,
-    model_sd: PyReadonlyArrayDyn<'_, f64>,
+    control: Array<'_>,
+    control_sd: Array<'_>,
+    model: Array<'_>,
+    model_sd: Array<'_>,
     method: &str,
     start: &str,
     former: Option<(f64, [[f64; 3]; 3], [f64; 3])>,
@@ -113,7 +106,7 @@ fn run(
 ) -> PyResult<SimilaritySolution> {
     let workers = Workers::of(threads, stations.len());
     let solution = watched(py, workers, None, |pool, watch| orient_on(stations, options, pool, watch))?;
-    solution.map(|solution| SimilaritySolution { solution }).map_err(|error| failure(&error))
+    told(py, solution.map_err(|error| failure(&error))?)
 }
 
 fn failure(error: &Failure) -> PyErr {
@@ -129,145 +122,80 @@ fn failure(error: &Failure) -> PyErr {
 }
 
 /// Rotation; stations, components and rows of the equations; normal equations; auxiliary table; results; parameters.
-type TraceRow<'py> = (
-    [[f64; 3]; 3],
-    (Vec<(usize, usize)>, Bound<'py, PyArray2<f64>>),
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    [f64; 7],
-    [f64; 7],
-);
-
-fn trace_row<'py>(py: Python<'py>, trace: &Trace) -> PyResult<TraceRow<'py>> {
-    let places = trace.equations.iter().map(|&(station, component, _)| (station, component)).collect();
-    let rows = table(py, trace.equations.iter().map(|(_, _, row)| *row).collect())?;
+fn trace_row(py: Python<'_>, trace: &Trace) -> PyResult<Py<PyTuple>> {
+    let equations = trace.equations.iter();
+    let places: Vec<_> = equations.clone().map(|&(station, component, _)| (station, component)).collect();
+    let rows = table(py, equations.map(|(_, _, row)| *row).collect())?;
     let [normal, auxiliary] = [trace.normal, trace.auxiliary].map(|matrix| table(py, matrix.to_vec()));
-    Ok((row_major(&trace.rotation), (places, rows), normal?, auxiliary?, trace.results, trace.parameters))
+    let rotation = row_major(&trace.rotation);
+    let row = (rotation, (places, rows), normal?, auxiliary?, trace.results, trace.parameters);
+    Ok(row.into_pyobject(py)?.unbind())
 }
 
 /// An oriented model.
-#[pyclass(frozen, module = "photogram._photocore")]
+#[pyclass(frozen, get_all, module = "photogram._photocore")]
 pub struct SimilaritySolution {
-    solution: Solution,
+    status: &'static str,
+    started: &'static str,
+    similarity: CentredRow,
+    initial: CentredRow,
+    alternatives: Vec<CentredRow>,
+    iterations: Vec<IterationRow>,
+    cycles: Option<Vec<f64>>,
+    traces: Vec<Py<PyTuple>>,
+    tangent_cofactors: Py<PyArray2<f64>>,
+    condition: f64,
+    weakness: Option<(&'static str, Vec<usize>)>,
+    sum_of_squares: f64,
+    misclosures: Py<PyArray2<f64>>,
+    model_residuals: Py<PyArray2<f64>>,
+    adjusted_control: Py<PyArray2<f64>>,
+    control_cofactors: Py<PyArray3<f64>>,
+    redundancy: Py<PyArray2<f64>>,
+    standardized: Py<PyArray2<f64>>,
 }
 
-impl SimilaritySolution {
-    fn stations<'py>(
-        &self,
-        py: Python<'py>,
-        part: impl Fn(&AdjustedStation) -> [f64; 3],
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.stations.iter().map(part).collect())
-    }
-}
-
-#[pymethods]
-impl SimilaritySolution {
-    #[getter]
-    fn status(&self) -> &'static str {
-        status_name(self.solution.status)
-    }
-
-    #[getter]
-    fn started(&self) -> &'static str {
-        match self.solution.started {
+fn told(py: Python<'_>, found: Solution) -> PyResult<SimilaritySolution> {
+    let of_stations = |part: fn(&AdjustedStation) -> [f64; 3]| {
+        table(py, found.stations.iter().map(part).collect()).map(Bound::unbind)
+    };
+    let cofactors = found.stations.iter().map(|station| row_major(&station.cofactors));
+    Ok(SimilaritySolution {
+        status: status_name(found.status),
+        started: match found.started {
             Started::Restart => "restart",
             Started::Report => "report",
             Started::ClosedForm => "closed-form",
-        }
-    }
-
-    #[getter]
-    fn similarity(&self) -> CentredRow {
-        centred_row(&self.solution.similarity)
-    }
-
-    #[getter]
-    fn initial(&self) -> CentredRow {
-        centred_row(&self.solution.initial)
-    }
-
-    #[getter]
-    fn alternatives(&self) -> Vec<CentredRow> {
-        self.solution.alternatives.iter().map(centred_row).collect()
-    }
-
-    #[getter]
-    fn iterations(&self) -> Vec<IterationRow> {
-        self.solution.iterations.iter().map(iteration_row).collect()
-    }
-
-    #[getter]
-    fn cycles(&self) -> Option<Vec<f64>> {
-        self.solution.cycles.clone()
-    }
-
-    #[getter]
-    fn traces<'py>(&self, py: Python<'py>) -> PyResult<Vec<TraceRow<'py>>> {
-        self.solution.traces.iter().map(|trace| trace_row(py, trace)).collect()
-    }
-
-    #[getter]
-    fn tangent_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        table(py, self.solution.tangent_cofactors.to_vec())
-    }
-
-    #[getter]
-    fn condition(&self) -> f64 {
-        self.solution.condition
-    }
-
-    #[getter]
-    fn weakness(&self) -> Option<(&'static str, Vec<usize>)> {
-        self.solution.weakness.as_ref().map(|(cause, stations)| (cause.name(), stations.clone()))
-    }
-
-    #[getter]
-    fn sum_of_squares(&self) -> f64 {
-        self.solution.sum_of_squares
-    }
-
-    #[getter]
-    fn misclosures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.misclosure.into())
-    }
-
-    #[getter]
-    fn model_residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.model_residual.into())
-    }
-
-    #[getter]
-    fn adjusted_control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.control.into())
-    }
-
-    #[getter]
-    fn control_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        squares(py, self.solution.stations.iter().map(|station| row_major(&station.cofactors)).collect())
-    }
-
-    #[getter]
-    fn redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.redundancy)
-    }
-
-    #[getter]
-    fn standardized<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.stations(py, |station| station.standardized)
-    }
+        },
+        similarity: centred_row(&found.similarity),
+        initial: centred_row(&found.initial),
+        alternatives: found.alternatives.iter().map(centred_row).collect(),
+        iterations: found.iterations.iter().map(iteration_row).collect(),
+        traces: found.traces.iter().map(|trace| trace_row(py, trace)).collect::<PyResult<_>>()?,
+        tangent_cofactors: table(py, found.tangent_cofactors.to_vec())?.unbind(),
+        condition: found.condition,
+        sum_of_squares: found.sum_of_squares,
+        misclosures: of_stations(|station| station.misclosure.into())?,
+        model_residuals: of_stations(|station| station.model_residual.into())?,
+        adjusted_control: of_stations(|station| station.control.into())?,
+        control_cofactors: squares(py, cofactors.collect())?.unbind(),
+        redundancy: of_stations(|station| station.redundancy)?,
+        standardized: of_stations(|station| station.standardized)?,
+        weakness: found.weakness.map(|(cause, stations)| (cause.name(), stations)),
+        cycles: found.cycles,
+    })
 }
 
 /// Positions and covariances.
-type Points<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
+type Points<'py> = (Matrix<'py>, Blocks<'py>);
 
 #[pyfunction]
-fn transform_points<'py>(
+pub fn transform_points<'py>(
     py: Python<'py>,
     similarity: CentredRow,
-    tangent_covariance: PyReadonlyArrayDyn<'py, f64>,
-    points: PyReadonlyArrayDyn<'py, f64>,
-    points_sd: PyReadonlyArrayDyn<'py, f64>,
+    tangent_covariance: Array<'py>,
+    points: Array<'py>,
+    points_sd: Array<'py>,
 ) -> PyResult<Points<'py>> {
     let similarity = from_row(similarity);
     let points: Vec<[f64; 3]> = rows("points", &points)?;
@@ -285,18 +213,15 @@ fn transform_points<'py>(
 }
 
 #[pyfunction]
-fn similarity_partials(py: Python<'_>, similarity: CentredRow) -> PyResult<Bound<'_, PyArray2<f64>>> {
+pub fn similarity_partials(py: Python<'_>, similarity: CentredRow) -> PyResult<Matrix<'_>> {
     table(py, from_row(similarity).parameter_partials().to_vec())
 }
 
 /// The auxiliary matrix D and the solution E.
-type CroutTables<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+type CroutTables<'py> = (Matrix<'py>, Vector<'py>);
 
 #[pyfunction]
-fn gauss_crout<'py>(
-    py: Python<'py>,
-    normal: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Option<CroutTables<'py>>> {
+pub fn gauss_crout<'py>(py: Python<'py>, normal: Array<'py>) -> PyResult<Option<CroutTables<'py>>> {
     let rows: Vec<[f64; 8]> = rows("normal", &normal)?;
     let normal = rows.try_into().map_err(|_| PyValueError::new_err("normal has seven rows"))?;
     match crout(&normal) {
@@ -305,7 +230,7 @@ fn gauss_crout<'py>(
     }
 }
 
-fn square7(name: &str, array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Matrix7> {
+fn square7(name: &str, array: &Array<'_>) -> PyResult<Matrix7> {
     let rows: Vec<[f64; 7]> = rows(name, array)?;
     rows.try_into().map_err(|_| PyValueError::new_err(format!("{name} has seven rows")))
 }

@@ -1,6 +1,6 @@
 //! Stellar camera calibration; its documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArrayMethods};
 use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
 use photocore::geometry::{Air, Camera as Lens, Station, pointing, pointing_angles};
@@ -13,7 +13,10 @@ use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{check_lengths, from_rows, indices, matrices, numbers, row_major, rows, squares, table};
+use crate::arrays::{
+    Array, Indices, Matrix, Vector, check_lengths, from_rows, indices, matrices, numbers, row_major, rows,
+    squares, table,
+};
 use crate::options::unknown;
 use crate::solution::{iteration_row, status_name};
 use crate::work::{Workers, watched};
@@ -25,26 +28,11 @@ create_exception!(
     "The camera cannot be calibrated: (kind, message, indices of stars or parameters)."
 );
 
-/// Adds the class and the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("StellarError", module.py().get_type::<StellarError>())?;
-    module.add_class::<StellarProblem>()?;
-    module.add_function(wrap_pyfunction!(refraction, module)?)?;
-    module.add_function(wrap_pyfunction!(standard_coordinates, module)?)?;
-    module.add_function(wrap_pyfunction!(star_places, module)?)?;
-    module.add_function(wrap_pyfunction!(pointing_matrix, module)?)?;
-    module.add_function(wrap_pyfunction!(pointing_of_matrix, module)?)?;
-    module.add_function(wrap_pyfunction!(plate_images, module)?)?;
-    module.add_function(wrap_pyfunction!(plate_directions, module)?)
-}
-
-type Array<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Indices<'py> = PyReadonlyArrayDyn<'py, i64>;
 /// Latitude (rad), constant of diurnal aberration (rad), temperature (K), pressure (mm of mercury).
 type Place = (f64, f64, f64, f64);
 /// What is not estimated of a camera.
 #[derive(FromPyObject)]
-enum CameraKind {
+pub enum CameraKind {
     /// Of plates: reference principal distance (none: scale first), Brown's decentering, common scale.
     #[pyo3(transparent)]
     Plate((Option<f64>, bool, bool)),
@@ -95,14 +83,14 @@ fn fixed_size<const N: usize>(name: &str, array: &Array<'_>) -> PyResult<[f64; N
 }
 
 #[pyfunction]
-fn refraction<'py>(
+pub fn refraction<'py>(
     py: Python<'py>,
     zenith_distances: Array<'py>,
     temperature: f64,
     pressure: f64,
     tau: Array<'py>,
     observed: bool,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+) -> PyResult<Vector<'py>> {
     let (air, tau) = (Air::new(temperature, pressure), fixed_size("tau", &tau)?);
     let angle = |&z: &f64| if observed { air.refraction(z, &tau).angle } else { z - air.observed(z, &tau) };
     let values = numbers("zenith_distances", &zenith_distances)?;
@@ -110,13 +98,13 @@ fn refraction<'py>(
 }
 
 #[pyfunction]
-fn standard_coordinates<'py>(
+pub fn standard_coordinates<'py>(
     py: Python<'py>,
     places: Array<'py>,
     sidereal_times: Array<'py>,
     place: Place,
     tau: Array<'py>,
-) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let (station, tau) = (station(place), fixed_size("tau", &tau)?);
     let (places, times) = (rows("places", &places)?, numbers("sidereal_times", &sidereal_times)?);
     check_lengths(("places", places.len()), &[("sidereal_times", times.len())])?;
@@ -125,13 +113,13 @@ fn standard_coordinates<'py>(
 }
 
 #[pyfunction]
-fn star_places<'py>(
+pub fn star_places<'py>(
     py: Python<'py>,
     standard: Array<'py>,
     sidereal_times: Array<'py>,
     place: Place,
     tau: Array<'py>,
-) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let (station, tau) = (station(place), fixed_size("tau", &tau)?);
     let (standard, times) = (rows("standard", &standard)?, numbers("sidereal_times", &sidereal_times)?);
     check_lengths(("standard", standard.len()), &[("sidereal_times", times.len())])?;
@@ -140,25 +128,25 @@ fn star_places<'py>(
 }
 
 #[pyfunction]
-fn pointing_matrix<'py>(py: Python<'py>, angles: Array<'py>) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+pub fn pointing_matrix<'py>(py: Python<'py>, angles: Array<'py>) -> PyResult<Matrix<'py>> {
     table(py, row_major(&pointing(fixed_size("angles", &angles)?)).to_vec())
 }
 
 #[pyfunction]
-fn pointing_of_matrix<'py>(py: Python<'py>, matrix: Array<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+pub fn pointing_of_matrix<'py>(py: Python<'py>, matrix: Array<'py>) -> PyResult<Vector<'py>> {
     let matrix: Vec<[f64; 3]> = rows("matrix", &matrix)?;
     let matrix = matrix.try_into().map_err(|_| PyValueError::new_err("matrix does not have 3 rows"))?;
     Ok(PyArray1::from_vec(py, pointing_angles(&from_rows(matrix)).to_vec()))
 }
 
 #[pyfunction]
-fn plate_images<'py>(
+pub fn plate_images<'py>(
     py: Python<'py>,
     standard: Array<'py>,
     angles: Array<'py>,
     interior: Array<'py>,
     camera: CameraKind,
-) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let camera = camera_of(camera, &interior)?;
     let attitude = Attitude::new(fixed_size("angles", &angles)?);
     let standard: Vec<[f64; 2]> = rows("standard", &standard)?;
@@ -167,7 +155,7 @@ fn plate_images<'py>(
 
 #[pyfunction]
 #[pyo3(signature = (xy, angles, interior, camera, *, tolerance, passes))]
-fn plate_directions<'py>(
+pub fn plate_directions<'py>(
     py: Python<'py>,
     xy: Array<'py>,
     angles: Array<'py>,
@@ -175,7 +163,7 @@ fn plate_directions<'py>(
     camera: CameraKind,
     tolerance: f64,
     passes: usize,
-) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let camera = camera_of(camera, &interior)?;
     let attitude = Attitude::new(fixed_size("angles", &angles)?);
     let xy: Vec<[f64; 2]> = rows("xy", &xy)?;
@@ -388,7 +376,7 @@ impl StellarProblem {
         Ok(dict)
     }
 
-    fn directions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+    fn directions<'py>(&self, py: Python<'py>) -> PyResult<Matrix<'py>> {
         table(py, self.calibration.directions().map_err(|error| failure(&error))?)
     }
 }

@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 use std::io::{self, Write};
 
+use crate::arrays::Vector;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,14 +13,8 @@ use rayon::prelude::*;
 
 use crate::work::{Workers, watched};
 
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(read_numbers, module)?)?;
-    module.add_function(wrap_pyfunction!(csv_rows, module)?)
-}
-
 #[pyfunction]
-fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Bound<'py, PyArray1<f64>>, bool) {
+pub fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Vector<'py>, bool) {
     let number =
         |word: &[u8]| str::from_utf8(word).ok()?.parse().ok().filter(|value: &f64| value.is_finite());
     let (numbers, whole): (Vec<f64>, bool) = py.detach(|| {
@@ -35,7 +30,7 @@ fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Bound<'py, PyArray1<f64>>
 const STRETCH: usize = 8192;
 
 /// A column of a table.
-enum Column {
+pub enum Column {
     Floats(Vec<f64>),
     Integers(Vec<i64>),
     Truths(Vec<bool>),
@@ -90,7 +85,7 @@ fn write_text(text: &str, to: &mut Vec<u8>) -> io::Result<()> {
 }
 
 #[pyfunction]
-fn csv_rows<'py>(py: Python<'py>, columns: Vec<Column>) -> PyResult<Bound<'py, PyBytes>> {
+pub fn csv_rows<'py>(py: Python<'py>, columns: Vec<Column>) -> PyResult<Bound<'py, PyBytes>> {
     let rows = columns.first().map_or(0, Column::len);
     if columns.iter().any(|column| column.len() != rows) {
         return Err(PyValueError::new_err("columns differ in length"));

@@ -1,6 +1,5 @@
 //! Trajectories, and photos on them.
 
-use numpy::{PyArray2, PyReadonlyArrayDyn};
 use photocore::geometry::trajectory::{
     Attitudes, Axes, Basis, Flight, Interpolation, Positions, Rotations, Trajectory as Course,
 };
@@ -9,24 +8,22 @@ use photocore::network::Trajectory;
 use photocore::network::mounts::OnTrajectory;
 use pyo3::prelude::*;
 
-use crate::arrays::{InputError, rows, table};
+use crate::arrays::{Array, InputError, Matrix, rows, table};
 use crate::options::unknown;
-
-type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 /// Name, degree, and the numbers of a basis: reference and scale of a polynomial, knots of a spline.
 type BasisRow = (String, usize, Vec<f64>);
 
 /// Times and rotation matrices, and how they are joined.
-type AttitudesRow<'py> = (Vec<f64>, Numbers<'py>, String);
+type AttitudesRow<'py> = (Vec<f64>, Array<'py>, String);
 
 /// A trajectory as Python says it.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct TrajectoryRow<'py> {
     times: Vec<f64>,
-    positions: Numbers<'py>,
-    velocities: Option<Numbers<'py>>,
+    positions: Array<'py>,
+    velocities: Option<Array<'py>>,
     interpolation: String,
     attitudes: AttitudesRow<'py>,
     position_basis: BasisRow,
@@ -48,7 +45,7 @@ pub fn on_trajectory((photo, trajectory, time, rate, offset): TimedRow) -> OnTra
 
 /// The trajectory of a row.
 pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
-    let vectors = |name, array: &Numbers<'_>| -> PyResult<Vec<Vector3>> {
+    let vectors = |name, array: &Array<'_>| -> PyResult<Vec<Vector3>> {
         Ok(rows::<3>(name, array)?.into_iter().map(Vector3::from).collect())
     };
     let velocities = row.velocities.as_ref().map(|own| vectors("velocities", own)).transpose()?;
@@ -78,36 +75,23 @@ pub fn trajectory(row: TrajectoryRow<'_>) -> PyResult<Trajectory> {
     Ok(Trajectory { course, position: row.position, rotation: row.rotation })
 }
 
-/// Adds the function to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(trajectory_span, module)?)?;
-    module.add_function(wrap_pyfunction!(flown, module)?)
-}
-
 /// For each time what the functions of a basis are that are not zero: the number of the first, and their values.
 type Active = Vec<(usize, Vec<f64>)>;
 
 /// Positions, attitudes row by row, axes of coefficients row by row, right Jacobians row by row; functions of positions, of rotations.
-type FlownRow<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Active,
-    Active,
-);
+type FlownRow<'py> = (Matrix<'py>, Matrix<'py>, Matrix<'py>, Matrix<'py>, Active, Active);
 
 #[pyfunction]
-fn trajectory_span(trajectory: TrajectoryRow<'_>) -> PyResult<(f64, f64)> {
+pub fn trajectory_span(trajectory: TrajectoryRow<'_>) -> PyResult<(f64, f64)> {
     Ok(self::trajectory(trajectory)?.course.span())
 }
 
 #[pyfunction]
-fn flown<'py>(
+pub fn flown<'py>(
     py: Python<'py>,
     trajectory: TrajectoryRow<'py>,
-    position: Numbers<'py>,
-    rotation: Numbers<'py>,
+    position: Array<'py>,
+    rotation: Array<'py>,
     times: Vec<f64>,
 ) -> PyResult<FlownRow<'py>> {
     let course = self::trajectory(trajectory)?.course;

@@ -30,7 +30,7 @@ WAYS = {
     "axes_of": ("plot",),
     "columns_of": ("tables",),
     "document_of": ("document",),
-    "findings_of": ("findings",),
+    "findings_of": ("tables",),
     "page_of": ("page",),
     "report_of": ("report",),
 }

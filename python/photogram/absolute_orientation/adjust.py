@@ -17,7 +17,7 @@ from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.arrays import names as names_of
 from photogram.arguments.arrays import number, one_of, truth_value, whole_number
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message
 from photogram.results.iteration import Iteration
@@ -266,7 +266,7 @@ def _check_options(
 
 def _orientation(
     stations: Stations,
-    used: NDArray[np.bool_],
+    used: Bools,
     rejected: tuple[str, ...],
     method: str,
     unit_variance: str,
@@ -353,7 +353,7 @@ def _messages(
 
 def _named(
     stations: Stations,
-    used: NDArray[np.bool_],
+    used: Bools,
     rows: NDArray[np.intp],
     held: bool,
     kind: str,

@@ -132,17 +132,15 @@ def _units(result: Orientation) -> dict[str, str]:
 def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     """Read the parameters, with their covariance, out of a JSON document.
 
+    Raises InputError: the file cannot be read, is no such document, or holds an orientation that is not to be
+    used.
+
     Parameters
     ----------
     path
         The document.
     usable
         Whether to refuse an orientation that has not converged, or in which something grave was found.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, is no such document, or holds an orientation that is not to be used.
     """
     with json.holding("result of an absolute orientation", path):
         found = orjson.loads(read_bytes(path))

@@ -86,17 +86,9 @@ def find(
 ) -> list[Hint]:
     """Try what may be wrong, and return what explains the residuals.
 
-    Parameters
-    ----------
-    names, control, placed
-        n identifiers, (n, 3) control coordinates that take part, NaN elsewhere, and where the orientation as
-        it is places the model.
-    sum_of_squares, degrees_of_freedom
-        Of the orientation as it is.
-    rounding
-        A sum of squares that is no more than rounding.
-    orient
-        Orients anew.
+    `control` (n, 3) is NaN where it takes no part; `placed` is where the orientation as it is places the
+    model, with its sum of squares and degrees of freedom; a sum of squares up to `rounding` is no more than
+    that.
     """
     hints: list[Hint] = []
     now = sum_of_squares
@@ -208,16 +200,7 @@ def unit_of(scale: float, sd: float) -> str | None:
 def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> str | None:
     """Say so where a mirror image of the model fits as well: control in a plane cannot tell it.
 
-    Parameters
-    ----------
-    control
-        (n, 3) control coordinates that take part, NaN elsewhere.
-    fit
-        The orientation as it is.
-    rounding
-        A sum of squares that is no more than rounding.
-    orient
-        Orients anew.
+    `control` (n, 3) is NaN where it takes no part; a sum of squares up to `rounding` is no more than that.
     """
     mirrored = orient(control * [1.0, 1.0, -1.0])
     if mirrored is None or mirrored.sum_of_squares > AS_WELL * fit.sum_of_squares + rounding:

@@ -6,11 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.results.iteration import Iteration
@@ -123,7 +122,7 @@ class Orientation(Shown, Brief):
     """
 
     stations: Stations
-    used: NDArray[np.bool_]
+    used: Bools
     rejected: tuple[str, ...]
     similarity: Similarity
     initial: Similarity
@@ -257,15 +256,15 @@ class Orientation(Shown, Brief):
         return differences
 
     @property
-    def took_part(self) -> NDArray[np.bool_]:
+    def took_part(self) -> Bools:
         """(n,) whether a station took part with any coordinate."""
-        part: NDArray[np.bool_] = np.any(self.used, axis=1)
+        part: Bools = np.any(self.used, axis=1)
         return part
 
     @property
-    def points(self) -> NDArray[np.bool_]:
+    def points(self) -> Bools:
         """(n,) whether a station has no control coordinate at all: a point to be transformed."""
-        without: NDArray[np.bool_] = ~np.any(self.stations.given, axis=1)
+        without: Bools = ~np.any(self.stations.given, axis=1)
         return without
 
     def transform_points(self) -> tuple[list[str], Floats, Floats]:

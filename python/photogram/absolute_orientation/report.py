@@ -1,13 +1,14 @@
-"""The listing of an orientation as text: problems, then how good it is, then values with their deviations."""
+"""The listing of an orientation as text, and the eight prints of TB 19 under sense switches."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from photogram.absolute_orientation.cards import restart_record, transformation_records
-from photogram.absolute_orientation.orientation import Orientation
+from photogram.absolute_orientation.orientation import Orientation, Trace
 from photogram.absolute_orientation.tables import (
     cycles,
     facts,
@@ -23,7 +24,7 @@ from photogram.show.lines import Field, fact_lines, field, marks, table_lines
 from photogram.show.methods import report_of
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 
-__all__ = ["report", "summary"]
+__all__ = ["summary", "trace_text"]
 
 
 @report_of.register(Orientation)
@@ -111,3 +112,53 @@ def _points(result: Orientation) -> list[str]:
     return table_lines(
         [*field(names, 12, head="point"), *field(positions, 18, ".5f"), *field(sd, 11, ".5f", "sd {name}")]
     )
+
+
+def trace_text(result: Orientation) -> str:
+    """Return what the cycles computed, under the bulletin's names and statement numbers."""
+    rows = np.flatnonzero(result.took_part).tolist()
+    names = [result.stations.ids[row] for row in rows]
+    sections: list[Section] = []
+    kappa, scale = float(result.initial.angles[2]), result.initial.scale
+    for number, trace in enumerate(result.traces, 1):
+        sections.append((f"Iteration {number}", _cycle(trace, names, kappa, scale)))
+        kappa, scale = trace.parameters[2], trace.parameters[3]
+    return composed(headline("absolute orientation", "prints under sense switches"), sections)
+
+
+def _cycle(trace: Trace, names: list[str], kappa: float, scale: float) -> list[str]:
+    places, rows = trace.equations
+    normal, auxiliary = trace.normal, trace.auxiliary
+    omega, phi, kappa_after, *others = trace.parameters
+    return [
+        *_print(1, "after statement 2", "tan K", [[math.tan(kappa)]]),
+        *_print(2, "before 10", "sin K, S", [[math.sin(kappa), scale]]),
+        *_print(3, "after 8", "rotation matrix A", trace.rotation),
+        f"sense switch 4, after 27: the eight P-values of {len(places)} equations",
+        *(
+            f"  {names[station]:<12} {'123'[axis]}" + _numbers(row)
+            for (station, axis), row in zip(places, rows.tolist(), strict=True)
+        ),
+        *_print(
+            5,
+            "after 29",
+            "seven diagonal terms and last term of the normal equations",
+            [[*np.diag(normal[:, :7]).tolist(), float(normal[6, 7])]],
+        ),
+        *_print(6, "after 33", "bottom row of the auxiliary table", [auxiliary[6].tolist()]),
+        *_print(7, "after 35", "seven results of the back solution", [trace.results]),
+        *_print(
+            8,
+            "after 36",
+            "seven corrected parameters: omega, phi, K (rad), S, B",
+            [[omega, phi, kappa_after, *others]],
+        ),
+    ]
+
+
+def _print(switch: int, statement: str, what: str, rows: Iterable[Iterable[float]]) -> list[str]:
+    return [f"sense switch {switch}, {statement}: {what}", *(f"  {'':<14}{_numbers(row)}" for row in rows)]
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return "".join(f"{value:>18.9e}" for value in values)

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import frozen, names, numbers, text
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.summary import Brief
@@ -130,12 +130,12 @@ class Stations(Brief):
         )
 
     @property
-    def given(self) -> NDArray[np.bool_]:
+    def given(self) -> Bools:
         """(n, 3) which control coordinates are known."""
         return np.isfinite(self.control)
 
     @property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> Bools:
         """(n, 3) which control coordinates may take part: known, with a finite standard deviation."""
         return self.given & np.isfinite(self.control_sd)
 
@@ -160,7 +160,7 @@ class Stations(Brief):
                 " without them errors cannot be shared out"
             )
 
-    def _refuse(self, faulty: NDArray[np.bool_], text: str) -> None:
+    def _refuse(self, faulty: Bools, text: str) -> None:
         if faulty.any():
             raise InputError(f"station {self.ids[int(np.flatnonzero(faulty.any(axis=1))[0])]} {text}")
 

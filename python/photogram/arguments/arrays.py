@@ -1,4 +1,6 @@
-"""Arrays as arguments: numbers of a given shape, indices and names, refused by name when they are not.
+"""Arrays as arguments: numbers of a given shape, indices and names.
+
+What is none of these is an :class:`~photogram.errors.InputError` that names the argument and shows its value.
 
 What a caller gives is copied once into an array that cannot be written: later edits of the caller's array
 change nothing. An array that is such a copy already is shared.
@@ -7,6 +9,7 @@ change nothing. An array that is such a copy already is shared.
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
@@ -28,6 +31,7 @@ __all__ = [
     "is_masked",
     "length",
     "names",
+    "natural_order",
     "number",
     "numbers",
     "one_of",
@@ -40,9 +44,9 @@ __all__ = [
 ]
 
 _SYMMETRIC = 1e-9
+"""What a covariance matrix may be unsymmetric by, relative to its diagonal."""
 _ROUNDING = 1e-6
 """Of correlations that were written with all digits and read again, with room to spare."""
-"""What a covariance matrix may be unsymmetric by, relative to its diagonal."""
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -79,13 +83,7 @@ def shaped(
 
 
 def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
-    """Return an array of any shape, perhaps that of the caller; see :func:`shaped`.
-
-    Raises
-    ------
-    InputError
-        What is no number, or masked values where none may be missing.
-    """
+    """Return an array of any shape, perhaps that of the caller, as :func:`shaped` does."""
     array = _plain(name, value, "numbers")
     kind = array.dtype.kind
     if kind == "O":
@@ -152,13 +150,7 @@ def freeze_fields(owner: Any) -> None:
 
 
 def length(name: str, value: ArrayLike) -> int:
-    """Return the number of rows of an array.
-
-    Raises
-    ------
-    InputError
-        It has none: a single value, or no array at all.
-    """
+    """Return the number of rows of an array; a single value has none."""
     array = _plain(name, value, "values")
     if array.ndim == 0:
         raise InputError(f"{name} is not an array: {shown(value)}")
@@ -224,13 +216,7 @@ def _name(name: str, row: int, value: object) -> str:
 
 
 def text(name: str, value: object) -> str:
-    """Return a line of text.
-
-    Raises
-    ------
-    InputError
-        No string, or characters that do not print: line ends, control characters, halves of surrogate pairs.
-    """
+    """Return a line of text: all of its characters print; line ends and halves of surrogate pairs do not."""
     if not isinstance(value, str):
         raise InputError(f"{name} is not a string: {shown(value)}")
     if not value.isprintable():
@@ -239,13 +225,7 @@ def text(name: str, value: object) -> str:
 
 
 def number(name: str, value: object) -> float:
-    """Return a number, which may be infinite or NaN.
-
-    Raises
-    ------
-    InputError
-        No number, or one that is beyond double precision.
-    """
+    """Return a number, which may be infinite or NaN."""
     if type(value) is float:  # nearly all are: it takes a tenth of what asking for a kind of number does
         return value
     if _is_real(value) and value is not None:
@@ -257,39 +237,21 @@ def number(name: str, value: object) -> float:
 
 
 def whole_number(name: str, value: object) -> int:
-    """Return a whole number of 64 bits.
-
-    Raises
-    ------
-    InputError
-        No such number.
-    """
+    """Return a whole number of 64 bits."""
     if not isinstance(value, Integral) or isinstance(value, bool) or not -(2**63) <= int(value) < 2**63:
         raise InputError(f"{name} is not a whole number of 64 bits: {shown(value)}")
     return int(value)
 
 
 def truth_value(name: str, value: object) -> bool:
-    """Return True or False.
-
-    Raises
-    ------
-    InputError
-        Anything else.
-    """
+    """Return True or False."""
     if not isinstance(value, bool | np.bool_):
         raise InputError(f"{name} is True or False, not {shown(value)}")
     return bool(value)
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> None:
-    """Refuse what is not one of some words.
-
-    Raises
-    ------
-    InputError
-        Another word, or no string; the message tells the words.
-    """
+    """Refuse what is not one of some words."""
     if not (isinstance(value, str) and value in choices):
         raise InputError(f"{name} is one of {', '.join(choices)}, not {shown(value)}")
 
@@ -338,3 +300,12 @@ def standard_deviations(covariances: NDArray[np.float64]) -> NDArray[np.float64]
     """Return the standard deviations (n, k) of matrices of covariances (n, k, k)."""
     deviations: NDArray[np.float64] = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     return deviations
+
+
+_DIGITS = re.compile("([0-9]+)")
+
+
+def natural_order(name: str) -> list[tuple[int, str]]:
+    """Return the key by which people sort names: character by character, but runs of digits as numbers."""
+    parts = _DIGITS.split(name)
+    return [(int(part), "") if place % 2 else (-1, part) for place, part in enumerate(parts)]

@@ -59,13 +59,9 @@ def alike(a: object, b: object) -> bool:
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         return a.keys() == b.keys() and all(alike(a[key], b[key]) for key in a)
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
-        return len(a) == len(b) and (a == b if _plain(a) else all(map(alike, a, b)))
+        strings = all(type(each) is str for each in a)  # of which there may be many
+        return len(a) == len(b) and (a == b if strings else all(map(alike, a, b)))
     return bool(a == b) or (isinstance(a, float) and a != a and b != b)
-
-
-def _plain(values: Sequence[object]) -> bool:
-    """Whether these are strings, of which there may be many."""
-    return all(type(each) is str for each in values)
 
 
 def _equal_arrays(a: np.ndarray[Any, Any], b: np.ndarray[Any, Any]) -> bool:

@@ -1,29 +1,28 @@
-"""`photogram absolute-orientation`: orient a model, and transform its points."""
+"""`photogram absolute-orientation`: orient a model, transform its points; join models of pairs to a strip."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import output, print_sections
-from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import Quiet, Strict, example_out, out_option, picture_places
-from photogram.cli.projects import with_options
+from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_sections
+from photogram.cli.documents import TEXT, OfPrograms
+from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, Reads, Writes, with_job
+from photogram.cli.options import Quiet, Strict, example_out, out_option
+from photogram.cli.projects import Additions, Example, project_path, read_project
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Orientation, Similarity
     from photogram.absolute_orientation.cards import Deck
     from photogram.io.writing import OutputSet
 
-__all__ = ["absolute_orientation", "transform"]
+__all__ = ["absolute_orientation", "relative", "transform"]
 
 SHOWN = 40
 """Lines of a section that the summary shows at most."""
@@ -33,160 +32,102 @@ EXAMPLE = "absolute_orientation"
 """The packaged example, a directory of photogram.examples."""
 
 
-class Format(StrEnum):
-    """How a file of stations is written."""
-
-    AUTO = "auto"
-    CSV = "csv"
-    CARDS = "cards"
-
-
-class Method(StrEnum):
-    """How the iteration is carried out."""
-
-    RIGOROUS = "rigorous"
-    REPORT = "report"
-    FILL_IN = "fill-in"
-
-
-class Start(StrEnum):
-    """Where the iteration starts."""
-
-    AUTO = "auto"
-    REPORT = "report"
-    CLOSED_FORM = "closed-form"
-
-
-class UnitVariance(StrEnum):
-    """What covariances are scaled by."""
-
-    ESTIMATED = "estimated"
-    UNITY = "unity"
+ModelPointSd = Annotated[
+    float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
+]
 
 
 @with_job
-@with_options("documents", Documents, *OF_NETWORKS)
 def absolute_orientation(
     job: Job,
+    *,
     file: Annotated[
-        Path | None,
-        Reads.FILE,
+        InputFile,
         typer.Argument(
-            metavar="FILE",
-            help="Stations: CSV (id,X,Y,Z,x,y,z; empty where unknown) or the cards of part I.",
-            show_default=False,
+            metavar="FILE", help="Stations: CSV (id,X,Y,Z,x,y,z; empty where unknown) or the cards of part I."
         ),
     ] = None,
     example: Annotated[
         bool, typer.Option("--example", help="Orient the packaged example instead, with its points.")
     ] = False,
     points: Annotated[
-        Path | None,
-        Reads.FILE,
+        InputFile,
         typer.Option(
-            metavar="FILE",
-            help="Model points to transform as well: CSV (id,x,y,z) or lines x y z number.",
-            show_default=False,
+            metavar="FILE", help="Model points to transform as well: CSV (id,x,y,z) or lines x y z number."
         ),
     ] = None,
     points_out: Annotated[
-        Path | None,
-        Writes.FILE,
+        OutputFile,
         typer.Option(
             metavar="FILE",
             help="Where they go, as CSV. Default: POINTS-transformed.csv in --out, or beside them.",
-            show_default=False,
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
-        out_option("Directory for report.html and report.txt. Default: no report."),
+        OutputFolder, out_option("Directory for report.html and report.txt. Default: no report.")
     ] = None,
-    documents: Documents = NONE_ASKED,
+    documents: OfPrograms,
     trace: Annotated[
-        Path | None,
-        Writes.FILE,
+        OutputFile,
         typer.Option(
             metavar="FILE",
             help="Write the bulletin's eight prints under sense switches, cycle by cycle (--method report or"
             " fill-in).",
-            show_default=False,
         ),
     ] = None,
     reject: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="ID", help="Station whose control takes no part; may be repeated.", show_default=False
-        ),
+        typer.Option(metavar="ID", help="Station whose control takes no part; may be repeated."),
     ] = None,
     restart: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Option(
-            metavar="FILE",
-            help="Start from a former result: its --json, or its --restart-out.",
-            show_default=False,
-        ),
+        InputFile,
+        typer.Option(metavar="FILE", help="Start from a former result: its --json, or its --restart-out."),
     ] = None,
     part_two: Annotated[
-        Path | None,
-        Writes.FILE,
+        OutputFile,
         typer.Option(
             metavar="FILE",
             help="Write the two records that part II reads (TB 19, step 12): A, s, B, identification.",
-            show_default=False,
         ),
     ] = None,
     restart_out: Annotated[
-        Path | None,
-        Writes.FILE,
+        OutputFile,
         typer.Option(
             metavar="FILE",
             help="Write the record that a new solution starts from (step 12): sines, s, B, identification.",
-            show_default=False,
         ),
     ] = None,
     ident: Annotated[
         str | None,
-        typer.Option(
-            metavar="WORD",
-            help="Identification on these records. Default: that of the cards.",
-            show_default=False,
-        ),
+        typer.Option(metavar="WORD", help="Identification on these records. Default: that of the cards."),
     ] = None,
     start: Annotated[
-        Start | None,
-        typer.Option(
-            help="Initial values. Default: auto, or report with the report's methods.", show_default=False
-        ),
+        Literal["auto", "report", "closed-form"] | None,
+        typer.Option(help="Initial values. Default: auto, or report with the report's methods."),
     ] = None,
     scale: Annotated[
         float | None,
-        typer.Option(
-            help="Held: model units per ground unit, where it is known. Default: found.", show_default=False
-        ),
+        typer.Option(help="Held: model units per ground unit, where it is known. Default: found."),
     ] = None,
     method: Annotated[
-        Method, typer.Option(help="Least squares by the engine, or the cycles of the report.")
-    ] = Method.RIGOROUS,
+        Literal["rigorous", "report", "fill-in"],
+        typer.Option(help="Least squares by the engine, or the cycles of the report."),
+    ] = "rigorous",
     unit_variance: Annotated[
-        UnitVariance,
+        Literal["estimated", "unity"],
         typer.Option(
             metavar="NAME",
             help="`estimated`: covariances are scaled by sigma0 squared; `unity`: they are not (with standard"
             " deviations).",
         ),
-    ] = UnitVariance.ESTIMATED,
-    point_sd: Annotated[
-        float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
-    ] = 0.0,
+    ] = "estimated",
+    point_sd: ModelPointSd = 0.0,
     decimals: Annotated[
-        int | None, typer.Option(min=0, max=15, help="Decimals of transformed points.", show_default=False)
+        int | None, typer.Option(min=0, max=15, help="Decimals of transformed points.")
     ] = None,
     format: Annotated[  # noqa: A002  # the name of the option
-        Format, typer.Option(help="Format of FILE; auto looks for a header.")
-    ] = Format.AUTO,
+        Literal["auto", "csv", "cards"], typer.Option(help="Format of FILE; auto looks for a header.")
+    ] = "auto",
     zero_missing: Annotated[
         bool,
         typer.Option(
@@ -203,7 +144,7 @@ def absolute_orientation(
     Prints problems, figures, parameters and residuals; writes what is asked for, whole or not at all.
     Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
     """
-    if trace and method is Method.RIGOROUS:
+    if trace and method == "rigorous":
         raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
     with job:
         from photogram import orient
@@ -221,23 +162,17 @@ def absolute_orientation(
             job.reads(file, points)
         if points and not target:
             target = (out or points.parent) / f"{points.stem}-transformed.csv"
-        reports = [out / "report.txt"] if out else []
-        pictures = picture_places("residuals", documents.plots, documents.plot_format, out)
-        place = documents.place(out)
-        job.writes(
-            *reports,
-            *pictures,
-            *([place] if place else []),
-            *([target] if target and target is not points_out else []),
-        )
+        pictures = documents.announce(job, out, TEXT, picture="residuals")
+        if target and target is not points_out:
+            job.writes(target)
         deck = _read(file, format, zero_missing, ground_unit, model_unit)
         result = orient(
             deck.stations,
-            method=method.value,
-            start=start.value if start else None,
+            method=method,
+            start=start,
             former=_restart(restart, deck) if restart else deck.former,
             reject=reject or (),
-            unit_variance=unit_variance.value,
+            unit_variance=unit_variance,
             trace=trace is not None,
             scale=scale,
         )
@@ -245,7 +180,7 @@ def absolute_orientation(
         if points and not result.usable:
             result.messages.append(Message("no points were transformed: the orientation is not to be used"))
             points = None
-        made = _small_files(result, reports, pictures, trace, None if points else documents.json)
+        made = _small_files(result, out, pictures, trace, None if points else documents.json)
         name = deck.identification if ident is None else ident
         made |= _records(result, part_two, restart_out, name)
         title = file.name
@@ -269,6 +204,7 @@ def absolute_orientation(
 @with_job
 def transform(
     job: Job,
+    *,
     result: Annotated[
         Path,
         Reads.FILE,
@@ -280,17 +216,19 @@ def transform(
         typer.Argument(metavar="POINTS", help="Model points: CSV (id,x,y,z) or lines x y z number."),
     ],
     out: Annotated[Path, Writes.FILE, typer.Argument(metavar="OUT", help="CSV: id,X,Y,Z,sd_X,sd_Y,sd_Z.")],
-    point_sd: Annotated[
-        float, typer.Option(min=0.0, help="Standard deviation of the points' own coordinates, model units.")
-    ] = 0.0,
+    point_sd: ModelPointSd = 0.0,
     decimals: Annotated[int, typer.Option(min=0, max=15, help="Decimals of transformed points.")] = 6,
     quiet: Quiet = False,
 ) -> None:
     """Transform any number of model points by a former orientation (part II)."""
     with job:
         from photogram.absolute_orientation import transform_file
+        from photogram.absolute_orientation.cards import read_transformation
+        from photogram.absolute_orientation.document import read_similarity
 
-        similarity = _former(result)
+        similarity = (
+            read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
+        )
         with job.outputs() as outputs, _progress(job, points) as progress:
             count = transform_file(
                 similarity,
@@ -304,20 +242,73 @@ def transform(
         job.conclude([out], summary=lambda: output.print(f"{count} points"))
 
 
-def _former(path: Path) -> Similarity:
-    """Read a former result in either of its forms."""
-    from photogram.absolute_orientation.cards import read_transformation
-    from photogram.absolute_orientation.document import read_similarity
+@with_job
+def relative(
+    job: Job,
+    *,
+    path: Annotated[InputFile, typer.Argument(metavar="PATH", help="A project: a folder or file.")] = None,
+    out: Annotated[
+        OutputFile, typer.Argument(metavar="OUT", help="CSV id,X,Y,Z,x,y,z: stations to be oriented.")
+    ] = None,
+    example: Example = False,
+    photos: Annotated[
+        str | None, typer.Option(metavar="A,B,...", help="Photos in the order of the strip. Default: all.")
+    ] = None,
+    added: Additions,
+    quiet: Quiet = False,
+) -> None:
+    """Orient pairs of photos relatively, and join their models to a strip.
 
-    return read_similarity(path, usable=True) if _is_document(path) else read_transformation(path)
+    Each pair of neighbours is adjusted by its common points in a minimum datum; models are joined by
+    similarities over common points and the projection centre that both have. The control of the project
+    stands beside its points. Exit code 3: a model that has not converged, 4: one that
+    nothing checks.
+    """
+    assert out is not None
+    with job:
+        import numpy as np
+
+        from photogram.absolute_orientation.models import strip_of
+        from photogram.formats.reduced_coordinates import given_control
+        from photogram.io.csv_text import csv_text
+
+        project = read_project(job, project_path(job, path), added)
+        names = project.block.photo_ids if photos is None else [each.strip() for each in photos.split(",")]
+        strip = strip_of(project.block, names)
+        control = given_control(project)
+        unknown = np.full(3, np.nan), np.zeros(3, dtype=bool)
+        ground = [
+            np.where(held, at, np.nan) for at, held in (control.get(each, unknown) for each in strip.ids)
+        ]
+        columns = {"id": list(strip.ids)} | dict(zip("XYZ", np.array(ground).T, strict=True))
+        columns |= dict(zip("xyz", strip.positions.T, strict=True))
+        models = [
+            f"{' '.join(each.result.block.photo_ids)}: {len(each.ids) - 2} points, {each.result.status},"
+            f" weighted sum of squares {each.result.sums_of_squares.total:.4g},"
+            f" {each.result.degrees_of_freedom} degrees of freedom"
+            for each in strip.models
+        ]
+        joints = [f"after {names[k + 1]}: rms {rms:.3g}" for k, rms in enumerate(strip.rms)]
+        sections = [
+            ("Models", models),
+            ("Joints, in bases of the first model", joints or ["none: one model"]),
+        ]
+        if strip.unchecked:
+            text = f"nothing checks the models {', '.join(strip.unchecked)}: five points have no residuals"
+            sections.insert(0, ("Not to be used as it is", [text]))
+        job.finish(
+            {out: csv_text(columns)},
+            summary=lambda: print_sections(sections, "OUT"),
+            code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
+        )
 
 
-def _read(file: Path, format_: Format, zero_missing: bool, ground_unit: str, model_unit: str) -> Deck:
+def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_unit: str) -> Deck:
     from photogram.absolute_orientation import read_cards, read_csv
     from photogram.absolute_orientation.cards import Deck
     from photogram.absolute_orientation.csv_files import is_csv
 
-    if format_ is Format.CSV or (format_ is Format.AUTO and is_csv(file)):
+    if format_ == "csv" or (format_ == "auto" and is_csv(file)):
         return Deck(read_csv(file, ground_unit=ground_unit, model_unit=model_unit), None, "")
     return read_cards(file, zero_missing=zero_missing, ground_unit=ground_unit, model_unit=model_unit)
 
@@ -351,23 +342,19 @@ def _records(
 
 
 def _small_files(
-    result: Orientation,
-    reports: list[Path],
-    pictures: list[Path],
-    trace: Path | None,
-    json: Path | None,
+    result: Orientation, out: Path | None, pictures: list[Path], trace: Path | None, json: Path | None
 ) -> dict[Path, bytes]:
     """Make everything that is small, before anything is written."""
     made: dict[Path, bytes] = {}
-    if reports:
-        made |= dict.fromkeys(reports, result.report().encode())
+    if out:
+        made[out / TEXT] = result.report().encode()
     if pictures:
         from photogram.absolute_orientation.plot import figure
         from photogram.show.pictures import drawn
 
         made |= {path: drawn(figure(result), path) for path in pictures}
     if trace:
-        from photogram.absolute_orientation.trace import trace_text
+        from photogram.absolute_orientation.report import trace_text
 
         made[trace] = trace_text(result).encode()
     if json:

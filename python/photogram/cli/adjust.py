@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from photogram.cli.choices import AS_SAID, Choices
-from photogram.cli.console import ON_TOP, output, print_remark, print_sections
-from photogram.cli.division import WHOLE, Parts
-from photogram.cli.documents import NONE_ASKED, Documents
-from photogram.cli.job import Job, Writes, with_job
-from photogram.cli.maps import check_maps
-from photogram.cli.on_disk import adjusted_on_disk
+from photogram.cli.choices import Choices
+from photogram.cli.console import ON_TOP, print_remark, print_sections
+from photogram.cli.documents import Documents, Pictures, check_maps
+from photogram.cli.in_parts import Parts, adjusted_on_disk, print_plan
+from photogram.cli.job import Job, OutputFolder, with_job
 from photogram.cli.options import (
-    KEPT,
     Ordering,
     OrderingName,
     Quiet,
@@ -27,7 +24,7 @@ from photogram.cli.options import (
     default_out,
     out_option,
 )
-from photogram.cli.progress import shown
+from photogram.cli.progress import adjustment_status
 from photogram.cli.projects import (
     NOTHING,
     Additions,
@@ -36,8 +33,6 @@ from photogram.cli.projects import (
     described,
     project_path,
     read_project,
-    with_additions,
-    with_options,
 )
 from photogram.cli.statement_output import stated, statement_files
 from photogram.lazy_dataclasses import replace
@@ -45,48 +40,42 @@ from photogram.lazy_dataclasses import replace
 if TYPE_CHECKING:
     from photogram import Block, FirstValues, InnerConstraints, MinimumConstraints, Result
     from photogram.adjustment.robust import Loss
-    from photogram.cli.pictures import Pictures
     from photogram.distributed import Division
     from photogram.formats import Project
     from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
-    from photogram.show.page import Section
+    from photogram.show.page import Section as Chapter
+    from photogram.show.sections import Section
 
-__all__ = ["adjust", "adjusted_block", "started_block"]
+__all__ = ["adjust", "adjusted_block", "result_at", "started_block"]
 
 
 @with_job
-@with_options("divided", Parts)
-@with_options("snooping", Snooping)
-@with_options("choices", Choices)
-@with_additions()
-@with_options("documents", Documents)
 def adjust(
     job: Job,
+    *,
     path: ProjectPath = None,
     example: Example = False,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option("Directory for reports, tables, and the adjusted project. Default: PATH-adjusted."),
     ] = None,
-    documents: Documents = NONE_ASKED,
-    added: Additions = NOTHING,
-    choices: Choices = AS_SAID,
-    snooping: Snooping = KEPT,
+    documents: Documents,
+    added: Additions,
+    choices: Choices,
+    snooping: Snooping,
     keep_all: Annotated[
         bool,
         typer.Option(
-            "--keep-all",
-            help="Begin with all images, those too that first values would set aside.",
+            "--keep-all", help="Begin with all images, those too that first values would set aside."
         ),
     ] = False,
     statement: Annotated[
         bool,
         typer.Option("--statement", help="Also write an accuracy statement, as the project asks for one."),
     ] = False,
-    divided: Parts = WHOLE,
-    ordering: Ordering = OrderingName.AUTO,
+    divided: Parts,
+    ordering: Ordering = "auto",
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -144,14 +133,14 @@ def _planned(project: Project, block: Block, choices: Choices, division: Divisio
     """Print how a block would be adjusted in parts."""
     from photogram.distributed import Division, plan_in_parts
 
-    plan = plan_in_parts(
-        block,
-        division or Division(),
-        datum=_datum(choices.datum_of(project)),
-        unit_variance=project.options.unit_variance,
+    print_plan(
+        plan_in_parts(
+            block,
+            division or Division(),
+            datum=_datum(choices.datum_of(project)),
+            unit_variance=project.options.unit_variance,
+        )
     )
-    output.print("\n".join(plan.lines()))
-    plan.check()
 
 
 def _finish(
@@ -162,13 +151,14 @@ def _finish(
     target: Path,
     documents: Documents,
     pictures: Pictures,
-    sections: list[tuple[str, list[str]]],
+    sections: list[Section],
     stated: Statement | None,
     *,
     strict: bool,
 ) -> None:
     """Write all that was found and asked for, say it in short, and end by the verdict."""
     from photogram.formats.adjusted import excel_file
+    from photogram.results.report import summary
     from photogram.show.methods import page_of
 
     told = removed or result
@@ -177,9 +167,11 @@ def _finish(
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     taken = [] if removed is None else removed.sections()[ON_TOP:]
+    told_first = summary(result)
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
     page = documents.page(job, "adjust", target, lambda: page_of(told).with_sections(*more))
     beside = {} if stated is None else statement_files(job, stated, target / "statement")
+    sizes = project.sizes if project.block.image_unit == "px" else ()
     code = result.verdict.exit_code(strict=strict)
     job.finish(
         {target / name: content for name, content in files.items()}
@@ -189,8 +181,8 @@ def _finish(
         | beside,
         documents.as_json(told),
         documents.data(result),
-        documents.charts(result, _sizes(project), quiet=job.quiet),
-        summary=lambda: print_sections(_summary(result, taken), "report.txt"),
+        documents.charts(result, sizes, quiet=job.quiet),
+        summary=lambda: print_sections([*told_first[:ON_TOP], *taken, *told_first[ON_TOP:]], "report.txt"),
         code=code or (0 if stated is None else stated.exit),
     )
 
@@ -215,12 +207,11 @@ def _statement(
         )
 
 
-def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[Section]]:
+def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[Chapter]]:
     """Return the tables of a result in another system, and a section of the page, where one is asked for."""
     if crs is None:
         return {}, []
-    from photogram.formats.crs_page import placed_section
-    from photogram.formats.crs_results import placed, placed_files
+    from photogram.formats.crs_results import placed, placed_files, placed_section
 
     found = placed(result, crs)
     return {f"in_crs/{name}": each for name, each in placed_files(found).items()}, [placed_section(found)]
@@ -271,13 +262,13 @@ def _snooped(
     if started is not None and (started.set_aside.any() or started.missing):
         first = run(started)
         block, aside = first.block, first.set_aside
-    with job.status("adjusting and testing") as status, errors_explained(block):
+    with adjustment_status(job, "adjusting and testing") as progress, errors_explained(block):
         found = snoop(
             block,
             unit_variance=project.options.unit_variance,
             threads=threads,
             **snooping.options,
-            progress=shown(status, "weighted sum of squares", 1.0) if status is not None else None,
+            progress=progress,
         )
         result = diagnosed(cast("Result", found.result))
     assert isinstance(result, Result)
@@ -289,8 +280,8 @@ def adjusted_block(
     project: Project,
     block: Block | FirstValues,
     *,
-    choices: Choices = AS_SAID,
-    ordering: OrderingName = OrderingName.AUTO,
+    choices: Choices = Choices(),  # noqa: B008  # frozen
+    ordering: OrderingName = "auto",
     threads: int | None = None,
     division: Division | None = None,
 ) -> Result:
@@ -302,11 +293,11 @@ def adjusted_block(
     from photogram.results.fitting import with_features
 
     chosen = choices.datum_of(project)
-    with job.status("adjusting") as status:
+    with adjustment_status(job) as progress:
         how: dict[str, Any] = {
             "unit_variance": project.options.unit_variance,
             "threads": threads,
-            "progress": shown(status, "weighted sum of squares", 1.0) if status is not None else None,
+            "progress": progress,
         }
         with errors_explained(block):
             call = adjusting(project, _call(chosen, choices.loss_of(project), ordering, division))
@@ -325,6 +316,35 @@ def adjusted_block(
     return with_features(told, project.features)
 
 
+def result_at(
+    job: Job, path: Path, added: Additions, threads: int | None, *, fitted: bool = True
+) -> tuple[Result, Project | None]:
+    """Return the result that lies at a path, or that of the project there, which is adjusted.
+
+    Parameters
+    ----------
+    fitted
+        Whether features that a project declares are fitted.
+
+    Returns
+    -------
+    The result, and its project; None where it was read as data.
+    """
+    from photogram import Result, read_result
+    from photogram.formats.results import is_result
+
+    if is_result(path):
+        job.reads(path)
+        result = read_result(path)
+        if not isinstance(result, Result):
+            raise typer.BadParameter("is the result of a collection, not of a block", param_hint="PATH")
+        return result, None
+    project = read_project(job, path, added)
+    block, started = started_block(project, keep_all=False)
+    whole = project if fitted else project.replace(features={})
+    return adjusted_block(job, whole, started or block, threads=threads), project
+
+
 def _call(
     name: str | None, loss: Loss | None, ordering: OrderingName, division: Division | None
 ) -> Callable[..., Result]:
@@ -333,8 +353,8 @@ def _call(
     if division is None:
         from photogram import adjust
 
-        return partial(adjust, datum=datum, loss=loss, ordering=ordering.value, covariance="verdict")
-    if ordering is not OrderingName.AUTO:
+        return partial(adjust, datum=datum, loss=loss, ordering=ordering, covariance="verdict")
+    if ordering != "auto":
         raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--ordering")
     from photogram import adjust_in_parts
 
@@ -350,9 +370,7 @@ def _datum(name: str | None) -> InnerConstraints | MinimumConstraints | None:
     return MinimumConstraints() if name == "minimum" else None
 
 
-def _files(
-    project: Project, result: Result, report: str, sections: list[tuple[str, list[str]]]
-) -> dict[str, bytes]:
+def _files(project: Project, result: Result, report: str, sections: list[Section]) -> dict[str, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.formats import FORMATS, to_files
     from photogram.formats.adjusted import adjusted, table_files
@@ -373,11 +391,6 @@ def _files(
     return files
 
 
-def _sizes(project: Project) -> Sequence[tuple[float, float] | None]:
-    """Return the sizes of pictures where images are in pixels, as they are."""
-    return project.sizes if project.block.image_unit == "px" else ()
-
-
 def _in_format(project: Project, name: str) -> dict[str, bytes]:
     """Return the adjusted project in a format, if that can hold it."""
     from photogram import InputError
@@ -390,10 +403,3 @@ def _in_format(project: Project, name: str) -> dict[str, bytes]:
     except InputError as error:
         print_remark(f"not written as {FORMATS[name].title}: {error}")
         return {}
-
-
-def _summary(result: Result, taken: list[tuple[str, list[str]]]) -> list[tuple[str, list[str]]]:
-    from photogram.results.report import summary
-
-    sections = summary(result)
-    return [*sections[:ON_TOP], *taken, *sections[ON_TOP:]]

@@ -9,23 +9,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.calibration_input import AS_FOUND, PriorName, Seen
-from photogram.cli.calibration_plan import UNPLANNED, Planned
+from photogram.cli.calibration_input import PriorName, Seen
 from photogram.cli.choices import LossName
 from photogram.cli.components import COMPONENTS
 from photogram.cli.console import print_remark, print_sections
-from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
-from photogram.cli.progress import shown
-from photogram.cli.projects import with_options
-from photogram.cli.uncertainty import AS_USUAL, Uncertainty
-from photogram.lazy_dataclasses import replace
+from photogram.cli.documents import Documents, OfPrograms
+from photogram.cli.job import InputFile, Job, OutputFolder, with_job
+from photogram.cli.options import Quiet, Snooping, Strict, Threads, default_out, out_option
+from photogram.cli.progress import adjustment_status, estimation_status
+from photogram.cli.uncertainty import NOT_GOOD_ENOUGH, Uncertainty, distances_of
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
     from photogram.show.page import Page
-    from photogram.targets import Calibrated, Calibration
+    from photogram.targets import Board, Calibrated, Calibration, ViewPlan
 
 __all__ = ["calibrate"]
 
@@ -45,20 +43,116 @@ class CornerBasisName(StrEnum):
     RAYS = "rays"
 
 
+CORNER_SD = 0.3
+"""Pixels, where --sd says none."""
+TAKEN = (
+    "--plan --field --focal --away --board --spacing --unit --shape --size --model --knots --sd --distance"
+    " --need --out --json --html --no-html --plots --plot-format --quiet"
+)
+"""Options that go with `--plan`."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """Whether and for which camera views are planned, with the options that say it."""
+
+    plan_views: Annotated[
+        int | None,
+        typer.Option(
+            "--plan",
+            min=4,
+            metavar="K",
+            help="Plan up to K views of --board for a nominal camera of --size and --field, without PATH;"
+            " fewer where --need is reached.",
+        ),
+    ] = None
+    view_field: Annotated[
+        float | None, typer.Option("--field", metavar="DEG", help="With --plan: horizontal field of view.")
+    ] = None
+    focal: Annotated[
+        float | None, typer.Option(metavar="PX", help="With --plan, for --field: focal length.")
+    ] = None
+    away: Annotated[
+        str | None,
+        typer.Option(
+            metavar="D,D,..",
+            help="With --plan: distances of the board. Default: where it fills 0.9, 0.6 and 0.4 of the"
+            " picture.",
+        ),
+    ] = None
+
+    @property
+    def asked(self) -> bool:
+        """Whether views are to be planned."""
+        if self.plan_views is None and self != Planned():
+            raise typer.BadParameter("go with --plan", param_hint="--field, --focal, --away")
+        return self.plan_views is not None
+
+    def made(self, job: Job, seen: Seen, uncertainty: Uncertainty) -> ViewPlan:
+        """Return the plan of views of a board for a nominal camera."""
+        from photogram.targets import nominal_camera, plan_views
+
+        for name in job.given:
+            if name not in TAKEN.split():
+                raise typer.BadParameter("goes without --plan", param_hint=name)
+        size = seen.size_of_pictures
+        if size is None or (self.view_field is None) == (self.focal is None):
+            raise typer.BadParameter("needs --size, and --field or --focal", param_hint="--plan")
+        more = {} if (knots := seen.knots_of_lens) is None else {"knots": knots}
+        camera = nominal_camera(size, seen.model, field=self.view_field, focal=self.focal, **more)
+        with job.status("planning views") as status:
+            return plan_views(
+                camera,
+                _board(seen),
+                size,
+                uncertainty.distances,
+                sd0=seen.sd0() or CORNER_SD,
+                views=self.plan_views or 0,
+                need=uncertainty.need or 0.0,
+                away=distances_of(self.away, "--away"),
+                progress=None if status is None else status.update,
+            )
+
+    def run(
+        self, job: Job, seen: Seen, uncertainty: Uncertainty, documents: Documents, out: Path | None
+    ) -> None:
+        """Plan views, and write and tell the plan."""
+        target = out or Path("planned-views")
+        pictures = documents.pictures(job, target)
+        plan = self.made(job, seen, uncertainty)
+        from photogram.show.methods import page_of
+        from photogram.targets.view_plan_report import plan_drawings, plan_files, plan_sections
+
+        files = {target / name: content for name, content in plan_files(plan).items()}
+        page = documents.page(job, "calibrate", target, lambda: page_of(plan))
+        job.finish(
+            files | pictures.of_drawings(lambda: plan_drawings(plan)) | page,
+            documents.as_json(plan),
+            summary=lambda: print_sections(plan_sections(plan), "report.txt"),
+            code=0 if plan.enough else NOT_GOOD_ENOUGH,
+        )
+
+
+def _board(seen: Seen) -> Board:
+    """Return the board of `--board`, as a file or in numbers."""
+    from photogram.targets.board_files import read_board
+
+    given = seen.given_board()
+    if given is None:
+        raise typer.BadParameter("needs --board", param_hint="--plan")
+    board = read_board(given) if isinstance(given, Path) else given
+    changes = {"unit": seen.unit, "shape": seen.shape}
+    return board.replace(**{name: value for name, value in changes.items() if value})
+
+
 @with_job
-@with_options("snooping", Snooping)
-@with_options("planned", Planned)
-@with_options("uncertainty", Uncertainty)
-@with_options("seen", Seen)
-@with_options("documents", Documents, *OF_NETWORKS)
 def calibrate(
     job: Job,
+    *,
     path: Annotated[
-        Path | None,
-        Reads.FILE,
+        InputFile,
         typer.Argument(
             metavar="PATH",
-            show_default=False,
             help="Corners of a board: a file of mrcal, OpenCV or Kalibr, a table, or a folder with one and a"
             " board.toml; or a folder with photographs of it (docs/targets.md).",
         ),
@@ -67,17 +161,15 @@ def calibrate(
         bool, typer.Option("--example", help="Calibrate the packaged example instead: twenty pictures.")
     ] = False,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option("Directory for reports, tables, and the adjusted project. Default: PATH-calibrated."),
     ] = None,
-    documents: Documents = NONE_ASKED,
-    seen: Seen = AS_FOUND,
-    loss: Annotated[LossName, typer.Option(help="Robust loss of image coordinates.")] = LossName.NONE,
-    snooping: Snooping = KEPT,
+    documents: OfPrograms,
+    seen: Seen,
+    loss: Annotated[LossName, typer.Option(help="Robust loss of image coordinates.")] = "none",
+    snooping: Snooping,
     outliers: Annotated[
-        PriorName | None,
-        typer.Option(help="Take corners out as mrcal does, to reproduce its results.", show_default=False),
+        PriorName | None, typer.Option(help="Take corners out as mrcal does, to reproduce its results.")
     ] = None,
     to: Annotated[
         list[str] | None,
@@ -85,19 +177,17 @@ def calibrate(
             metavar="FORMAT",
             help="Write the cameras as opencv_yaml, ros_camera_info, kalibr_camchain or mrcal, too; again for"
             " each.",
-            show_default=False,
         ),
     ] = None,
     components: Annotated[
         list[CornerBasisName] | None,
         typer.Option(
             help="Estimate variance components of corners: by which factors their standard deviations are"
-            " wrong. Given more than once: of all combinations; level goes with camera alone.",
-            show_default=False,
+            " wrong. Given more than once: of all combinations; level goes with camera alone."
         ),
     ] = None,
-    uncertainty: Uncertainty = AS_USUAL,
-    planned: Planned = UNPLANNED,
+    uncertainty: Uncertainty,
+    planned: Planned,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -111,21 +201,19 @@ def calibrate(
         if planned.asked:
             planned.run(job, seen, uncertainty, documents, out)
             return
+        from photogram.targets.page import drawings
+
         if path is None:
             path = job.packaged(*EXAMPLE)
         target = out or (Path("example-calibrated") if example else default_out(path, "-calibrated"))
         documents.place(target)
         pictures = documents.pictures(job, target)
-        if path.is_dir():
-            job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
+        job.reads_inside(path)
         with job.status("reading corners, finding first values") as status:
             calibration = seen.read(path, None if status is None else status.update)
         for message in calibration.messages if not quiet else ():
             print_remark(str(message))
-        how: dict[str, Any] = {
-            "loss": None if loss is LossName.NONE else loss.value,
-            "outliers": outliers and outliers.value,
-        }
+        how: dict[str, Any] = {"loss": None if loss == "none" else loss, "outliers": outliers}
         uncertainty.asked()
         found = uncertainty.told(
             job,
@@ -136,7 +224,9 @@ def calibrate(
         files = _files(found) | _cameras(found, to or [], uncertainty.need)
         files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
         page = documents.page(job, "calibrate", target, partial(_page, found, weights))
-        drawn = pictures.of(found.result) | pictures.of_worth(found.worth)
+        drawn = pictures.of(found.result)
+        if found.worth is not None:
+            drawn |= pictures.of_drawings(partial(drawings, found.worth))
         job.finish(
             {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
@@ -151,8 +241,7 @@ def _adjusted(
     """Adjust a calibration, without gross errors where they are looked for."""
     if snooping.snoop and (how["loss"] or how["outliers"]):
         raise typer.BadParameter("goes without --loss and --outliers", param_hint="--snoop")
-    with job.status("adjusting") as status:
-        progress = None if status is None else shown(status, "weighted sum of squares", 1.0)
+    with adjustment_status(job) as progress:
         if snooping.snoop:
             return calibration.snoop(**snooping.options, threads=threads, progress=progress)
         return calibration.adjust(**how, threads=threads, progress=progress)
@@ -165,7 +254,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     from photogram.formats.targets.calibrations import adjusted_project
     from photogram.io.csv_text import csv_text
     from photogram.show.quantity import frame
-    from photogram.targets.appraisal_files import worth_files
+    from photogram.targets.document import worth_files
     from photogram.targets.tables import views
 
     files = {"report.txt": found.report().encode(), **table_files(found.result)}
@@ -182,7 +271,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
 def _cameras(found: Calibrated, formats: list[str], need: float | None) -> dict[str, bytes]:
     """Make the files of the cameras in the formats of other programs, and their joint covariance."""
     from photogram.targets import camera_files
-    from photogram.targets.output.covariances import FILE, cameras_covariance
+    from photogram.targets.output.formats import FILE, cameras_covariance
 
     made = {
         f"{name}/{file}": content
@@ -200,14 +289,9 @@ def _weights(
         return None
     from photogram.targets import corner_components
 
-    by: list[Any] = [each.value for each in bases]
-    with job.status("variance components") as status:
-
-        def tell(number: int, _: object) -> None:
-            if status is not None:
-                status.update(f"variance components, adjustment {number + 1}")
-
-        return corner_components(found, by, threads=threads, progress=tell)
+    with estimation_status(job) as progress:
+        by: list[Any] = [each.value for each in bases]
+        return corner_components(found, by, threads=threads, progress=progress)
 
 
 def _page(found: Calibrated, weights: VarianceComponents | None) -> Page:

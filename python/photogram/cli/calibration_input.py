@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -17,36 +16,23 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibration
 
-__all__ = ["AS_FOUND", "PriorName", "Seen"]
+__all__ = ["PriorName", "Seen"]
 
 
-class ShapeName(StrEnum):
-    """What of a board is unknown."""
-
-    HELD = "held"
-    BEND = "bend"
-    POINTS = "points"
+ShapeName = Literal["held", "bend", "points"]
+"""What of a board is unknown."""
 
 
-class ViewName(StrEnum):
-    """What tells which images are of one view."""
-
-    NAME = "name"
-    TIME = "time"
+ViewName = Literal["name", "time"]
+"""What tells which images are of one view."""
 
 
-class SyncName(StrEnum):
-    """Whether images of one view were taken at one time."""
-
-    KNOWN = "known"
-    NONE = "none"
-    OFFSET = "offset"
+SyncName = Literal["known", "none", "offset"]
+"""Whether images of one view were taken at one time."""
 
 
-class PriorName(StrEnum):
-    """Whose priors cameras have."""
-
-    MRCAL = "mrcal"
+PriorName = Literal["mrcal"]
+"""Whose priors cameras have."""
 
 
 PLAIN_GOES = "--shape, --sd, --regularise, --sync offset, --offset alone"
@@ -63,22 +49,15 @@ class Seen:
             metavar="CxR|FILE",
             help="Corners along x and y of a chessboard, or its description: board.toml, Kalibr's target."
             " Default: what lies in PATH.",
-            show_default=False,
         ),
     ] = None
     spacing: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="With --board CxR: from corner to corner.", show_default=False),
+        float | None, typer.Option(metavar="S", help="With --board CxR: from corner to corner.")
     ] = None
-    unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="Unit of the board. Default: m.", show_default=False)
-    ] = None
+    unit: Annotated[str | None, typer.Option(metavar="UNIT", help="Unit of the board. Default: m.")] = None
     shape: Annotated[
         ShapeName | None,
-        typer.Option(
-            help="What of the board is unknown. Default: points with 8 views or more, else held.",
-            show_default=False,
-        ),
+        typer.Option(help="What of the board is unknown. Default: points with 8 views or more, else held."),
     ] = None
     cameras: Annotated[
         list[str] | None,
@@ -86,16 +65,13 @@ class Seen:
             metavar="PATTERN",
             help="Names of the images of a camera, 'left*.jpg'; again for each camera. What is left of a name"
             " is its view.",
-            show_default=False,
         ),
     ] = None
     size: Annotated[
         str | None,
-        typer.Option(
-            metavar="WxH", help="Width and height of the pictures, where no file says it.", show_default=False
-        ),
+        typer.Option(metavar="WxH", help="Width and height of the pictures, where no file says it."),
     ] = None
-    views: Annotated[ViewName, typer.Option(help="What tells the images of one view.")] = ViewName.NAME
+    views: Annotated[ViewName, typer.Option(help="What tells the images of one view.")] = "name"
     within: Annotated[
         float, typer.Option(min=0.0, metavar="S", help="With --views time: seconds between them at most.")
     ] = 0.005
@@ -105,18 +81,17 @@ class Seen:
             help="Whether images of one view were taken at one time; offset: by clocks of their cameras,"
             " whose offsets are unknown."
         ),
-    ] = SyncName.KNOWN
+    ] = "known"
     offsets: Annotated[
         list[str] | None,
         typer.Option(
             "--offset",
             metavar="CAMERA=S[,SD]",
             help="What is known of the offset of a camera's clock, s; SD 0: held. Again for each.",
-            show_default=False,
         ),
     ] = None
     pixel_origin: Annotated[OriginName, typer.Option(help="Corner or center of the first pixel is 0, 0.")] = (
-        OriginName.CENTER
+        "center"
     )
     model: Annotated[
         str | None,
@@ -124,7 +99,6 @@ class Seen:
             metavar="NAME",
             help="The lens: opencv4, opencv5, opencv8, opencv12, or a model of docs/cameras.md. Default:"
             " opencv5 below 90 degrees of field, opencv8 above.",
-            show_default=False,
         ),
     ] = None
     knots: Annotated[
@@ -132,7 +106,6 @@ class Seen:
         typer.Option(
             metavar="CxR",
             help="With --model splined_stereographic: knots along columns and rows. Default: 30x20.",
-            show_default=False,
         ),
     ] = None
     knot_sd: Annotated[
@@ -141,15 +114,11 @@ class Seen:
             metavar="R,T",
             help="Standard deviations with which knots are 0, radial and tangential, in units of the"
             " stereographic image. Default: 1,0.1.",
-            show_default=False,
         ),
     ] = None
     sd: Deviations = None
     regularise: Annotated[
-        PriorName | None,
-        typer.Option(
-            help="Weak priors of the lens and of its centre, as mrcal has them.", show_default=False
-        ),
+        PriorName | None, typer.Option(help="Weak priors of the lens and of its centre, as mrcal has them.")
     ] = None
 
     @property
@@ -169,11 +138,11 @@ class Seen:
         if (path / "project.toml").exists():
             return self._of_project(path)
         given: dict[str, Any] = {
-            "views": self.views.value,
-            "sync": self.sync.value,
-            "pixel_origin": self.pixel_origin.value,
-            "shape": self.shape and self.shape.value,
-            "regularise": self.regularise and self.regularise.value,
+            "views": self.views,
+            "sync": self.sync,
+            "pixel_origin": self.pixel_origin,
+            "shape": self.shape,
+            "regularise": self.regularise,
         }
         return read(
             path,
@@ -200,15 +169,15 @@ class Seen:
         said = Seen(
             shape=self.shape, sd=self.sd, regularise=self.regularise, offsets=self.offsets, sync=self.sync
         )
-        if self != said or self.sync is SyncName.NONE:
+        if self != said or self.sync == "none":
             raise typer.BadParameter("a project has board, views and lens", param_hint=PLAIN_GOES)
         changes: dict[str, Any] = {}
-        if self.sync is SyncName.OFFSET:
-            changes["sync"] = self.sync.value
+        if self.sync == "offset":
+            changes["sync"] = self.sync
         if self.regularise is not None:
-            changes["regularise"] = self.regularise.value
+            changes["regularise"] = self.regularise
         if self.shape is not None:
-            changes["board"] = found.board.replace(shape=self.shape.value)
+            changes["board"] = found.board.replace(shape=self.shape)
         if self.sd is not None:
             changes["sd0"] = self.sd0()
         found = found.replace(**changes)
@@ -235,10 +204,6 @@ class Seen:
         if found.keys() - {"images"} or len(found.get("images", (1.0,))) > 1:
             raise typer.BadParameter("is images=S here: of a corner in x and y", param_hint="--sd")
         return found["images"][0] if found else None
-
-
-AS_FOUND = Seen()
-"""As the files say."""
 
 
 def _deviations(text: str) -> tuple[float, float]:

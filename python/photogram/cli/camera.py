@@ -1,38 +1,68 @@
-"""`photogram camera`: calibrations of cameras over years."""
+"""`photogram certificate`, `photogram camera`: a calibration of a camera, and calibrations over years."""
 
 from __future__ import annotations
 
 import math
 from datetime import date
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import output, print_sections
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Quiet, default_out, out_option
+from photogram.cli.documents import PageAndJson
+from photogram.cli.job import InputFile, Job, OutputFolder, Reads, with_job
+from photogram.cli.options import Quiet, default_out, out_option
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
     from photogram.film.years import DatedCamera
 
-__all__ = ["compare"]
+__all__ = ["certificate", "compare"]
+
+EXAMPLE = ("certificate", "rc10.toml")
+"""The packaged example, in photogram.examples."""
+
+
+@with_job
+def certificate(
+    job: Job,
+    *,
+    path: Annotated[
+        InputFile,
+        typer.Argument(metavar="FILE", help="Certificate as TOML, or a table of fiducials (*.csv)."),
+    ] = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Check the packaged example instead: a camera of eight marks.")
+    ] = False,
+    camera: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which camera of a table of several.")
+    ] = None,
+    out: Annotated[OutputFolder, out_option("Directory for the report for the browser.")] = None,
+    documents: PageAndJson,
+    quiet: Quiet = False,
+) -> None:
+    """Check a camera's certificate: typing errors, marks from distances, lens from its table.
+
+    Distances are compared with coordinates; of distances alone the marks are adjusted; a table of distortion
+    becomes a lens: all with covariance. A distance that differs from its coordinates by more than 0.010 mm,
+    with what single change of a figure would explain it, ends with exit code 4.
+    """
+    with job:
+        from photogram.film import Certificate
+
+        found = Certificate.read(job.packaged(*EXAMPLE) if path is None else path, camera)
+        documents.conclude(job, "certificate", found, out, text=False)
 
 
 @with_job
 def compare(
     job: Job,
+    *,
     calibrations: Annotated[
         list[Path] | None,
         Reads.FILE,
         typer.Argument(
-            metavar="FILE...",
-            help="Certificates (TOML), or camera.json of `photogram stellar-camera`.",
-            show_default=False,
+            metavar="FILE...", help="Certificates (TOML), or camera.json of `photogram stellar-camera`."
         ),
     ] = None,
     example: Annotated[
@@ -44,7 +74,6 @@ def compare(
         typer.Option(
             metavar="DATE",
             help="1983-05-11: of a file that says none; again for each of these, in their order.",
-            show_default=False,
         ),
     ] = None,
     name: Annotated[
@@ -57,17 +86,12 @@ def compare(
             max=89.0,
             metavar="DEG",
             help="Compare images up to this angle from the axis. Default: as far as all certificates reach.",
-            show_default=False,
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
-        out_option("Directory for the report. Default: FILE-compared beside the first FILE."),
+        OutputFolder, out_option("Directory for the report. Default: FILE-compared beside the first FILE.")
     ] = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
+    documents: PageAndJson,
     quiet: Quiet = False,
 ) -> None:
     """Compare calibrations of cameras over years: drift, steps, control charts.
@@ -77,7 +101,6 @@ def compare(
     """
     with job:
         from photogram.film.years import compare_cameras
-        from photogram.show.methods import page_of
         from photogram.show.sections import verdict_sections
 
         if example:
@@ -90,15 +113,8 @@ def compare(
             read = _read(paths, day or [], name)
             folder = out or default_out(paths[0], "-compared")
         found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
-        place = html_place(html, no_html, folder)
-        written = html_files(job, "camera compare", place, html is not None, partial(page_of, found))
-
-        def summarize() -> None:
-            print_sections(verdict_sections(found.verdict), "the report")
-            output.print(escape(found.report()), end="")
-
-        documents = {} if json is None else {json: found.to_json()}
-        job.finish(written, documents, summary=summarize, code=found.verdict.exit)
+        above = verdict_sections(found.verdict)
+        documents.conclude(job, "camera compare", found, folder, text=False, above=above)
 
 
 def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:

@@ -1,4 +1,4 @@
-"""`photogram giant check`: look for errors in a GIANT project."""
+"""`photogram check`, and `photogram giant check`: look for mistakes and gross errors."""
 
 from __future__ import annotations
 
@@ -8,50 +8,65 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
-from photogram.cli.console import output
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Quiet, Threads, default_out, out_option
+from photogram.cli.console import print_sections
+from photogram.cli.documents import TEXT, PageAndJson
+from photogram.cli.job import Job, OutputFolder, Reads, with_job
+from photogram.cli.options import Quiet, Threads, default_out, out_option
+from photogram.cli.projects import Additions, Example, ProjectPath, described, project_path, read_project
 
 if TYPE_CHECKING:
     from photogram.diagnosis.findings import Diagnosis
 
-__all__ = ["EXAMPLE", "CheckedOut", "check", "text_files"]
+__all__ = ["EXAMPLE", "check", "check_project"]
 
 EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""
-TEXT = "report.txt"
-"""The report as text, in a directory of results."""
 
 CheckedOut = Annotated[
-    Path | None,
-    Writes.DIRECTORY,
+    OutputFolder,
     out_option("Directory for report.html and report.txt. Default: the input with -checked, beside it."),
 ]
 
 
-def text_files(out: Path, report: str) -> dict[Path, bytes]:
-    """Return the report as text as a file of a directory of results."""
-    return {out / TEXT: report.encode()}
+@with_job
+def check_project(
+    job: Job,
+    *,
+    path: ProjectPath = None,
+    example: Example = False,
+    out: CheckedOut = None,
+    documents: PageAndJson,
+    added: Additions,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.
 
+    The project is not changed. The exit code is 3 when something grave is found.
+    """
+    with job:
+        from photogram import diagnose
 
-def _shorten(found: Diagnosis, inside: str, shown: str) -> None:
-    """Write in the findings where a packaged project lies as people are told."""
-    for section in found.sections:
-        section.findings = [replace(each, text=each.text.replace(inside, shown)) for each in section.findings]
+        path = project_path(job, path)
+        out = out or (Path("example-checked") if example else default_out(path, "-checked"))
+        documents.place(out)  # refused before anything is read
+        project = read_project(job, path, added)
+        if not quiet:
+            print_sections(described(project), "`photogram info`")
+        with job.status("checking"):
+            found = diagnose(project.block, threads=threads)
+        documents.conclude(job, "check", found, out)
 
 
 @with_job
 def check(
     job: Job,
+    *,
     directory: Annotated[
         Path | None,
         Reads.PROJECT,
-        typer.Argument(
-            metavar="DIR", help="Directory of the five files, as for adjusting.", show_default=False
-        ),
+        typer.Argument(metavar="DIR", help="Directory of the five files, as for adjusting."),
     ] = None,
     example: Annotated[
         bool,
@@ -60,12 +75,9 @@ def check(
         ),
     ] = False,
     out: CheckedOut = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
+    documents: PageAndJson,
     limits: Annotated[
-        str | None,
-        typer.Option(metavar="N1=..,N6=..", help="Limits of the 1987 program.", show_default=False),
+        str | None, typer.Option(metavar="N1=..,N6=..", help="Limits of the 1987 program.")
     ] = None,
     threads: Threads = None,
     quiet: Quiet = False,
@@ -76,25 +88,23 @@ def check(
     """
     with job:
         from photogram.giant import Limits, read_project
-        from photogram.giant.checking import check as check_project
-        from photogram.show.methods import page_of
+        from photogram.giant.checking import check as checked
 
         if directory is None:
             directory = job.packaged(EXAMPLE)
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-checked")
         out = out or default_out(directory, "-checked")
-        place = html_place(html, no_html, out)
-        job.writes(out / TEXT, *([place] if place else []))
+        documents.announce(job, out, TEXT)
         project = read_project(directory)
         allowed = Limits.parse(limits) if limits else None
         with job.status("checking"):
-            found = check_project(project, limits=allowed, threads=threads)
+            found = checked(project, limits=allowed, threads=threads)
         _shorten(found, f"{directory}{os.sep}", f"{job.shown(directory)}{os.sep}")
-        job.finish(
-            text_files(out, found.report()),
-            {} if json is None else {json: found.to_json()},
-            html_files(job, "giant check", place, html is not None, lambda: page_of(found)),
-            summary=lambda: output.print(escape(found.report()), end=""),
-            code=found.verdict.exit,
-        )
+        documents.conclude(job, "giant check", found, out)
+
+
+def _shorten(found: Diagnosis, inside: str, shown: str) -> None:
+    """Write in the findings where a packaged project lies as people are told."""
+    for section in found.sections:
+        section.findings = [replace(each, text=each.text.replace(inside, shown)) for each in section.findings]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.components import COMPONENTS, Components, Found, cleaned
+from photogram.cli.components import COMPONENTS, Components, Found, snooped
 from photogram.cli.console import print_sections
-from photogram.cli.documents import NONE_ASKED, Documents
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.documents import TEXT, Documents
+from photogram.cli.job import InputFile, Job, OutputFolder, Without, with_job
 from photogram.cli.options import (
-    KEPT,
     Ordering,
     OrderingName,
     Quiet,
@@ -24,8 +21,7 @@ from photogram.cli.options import (
     example_out,
     out_option,
 )
-from photogram.cli.progress import shown
-from photogram.cli.projects import with_options
+from photogram.cli.progress import adjustment_status
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -39,29 +35,18 @@ EXAMPLE = ("collection", "ring.txt")
 PACKED = (".bz2", ".gz")
 
 
-class Loss(StrEnum):
-    """What is minimised."""
-
-    SQUARES = "squares"
-    HUBER = "huber"
-    CAUCHY = "cauchy"
-
-
-_LOSSES: dict[Loss, robust.LossName] = {Loss.HUBER: "huber", Loss.CAUCHY: "cauchy"}
-
-
 @dataclass(frozen=True)
 class Fit:
     """What is minimised, and when that ends, with the options that say it."""
 
-    loss: Annotated[Loss, typer.Option(help="What is minimised: squares, or a robust loss of them.")] = (
-        Loss.SQUARES
-    )
+    loss: Annotated[
+        Literal["squares", "huber", "cauchy"],
+        typer.Option(help="What is minimised: squares, or a robust loss of them."),
+    ] = "squares"
     scale: Annotated[
         float | None,
         typer.Option(
-            help="Where the loss sets in, in standard deviations. Default: 1.50 (huber), 2.55 (cauchy).",
-            show_default=False,
+            help="Where the loss sets in, in standard deviations. Default: 1.50 (huber), 2.55 (cauchy)."
         ),
     ] = None
     sd: Annotated[float, typer.Option(help="Standard deviation of image coordinates, pixels.")] = 1.0
@@ -69,8 +54,7 @@ class Fit:
         float | None,
         typer.Option(
             help="Stop when a step lowers the cost by less than this fraction."
-            " Default: 1e-8, with a loss 1e-6.",
-            show_default=False,
+            " Default: 1e-8, with a loss 1e-6."
         ),
     ] = None
     max_iterations: Annotated[int, typer.Option(min=1, help="Iterations at the most.")] = 200
@@ -81,31 +65,22 @@ class Fit:
     @property
     def robust(self) -> robust.Loss | None:
         """The loss with its scale; None for squares."""
-        if self.loss is not Loss.SQUARES:
-            name = _LOSSES[self.loss]
-            return name if self.scale is None else (name, self.scale)
+        if self.loss != "squares":
+            return self.loss if self.scale is None else (self.loss, self.scale)
         if self.scale is not None:
             raise typer.BadParameter("is that of a loss: give --loss too", param_hint="--scale")
         return None
 
 
-SQUARES = Fit()
-"""Squares, with covariances."""
-
-
 @with_job
-@with_options("documents", Documents, "xlsx", "crs", "map")
-@with_options("fit", Fit)
-@with_options("snooping", Snooping, "unit_weight")
 def collection(
     job: Job,
+    *,
     problem: Annotated[
-        Path | None,
-        Reads.FILE,
+        InputFile,
         typer.Argument(
             metavar="FILE",
             help='Problem of "Bundle Adjustment in the Large" or Bundle file (0.3), plain, .bz2 or .gz.',
-            show_default=False,
         ),
     ] = None,
     example: Annotated[
@@ -113,8 +88,7 @@ def collection(
         typer.Option("--example", help="Adjust the packaged example instead: 8 photos around 60 points."),
     ] = False,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option(
             "Directory for report.html, report.txt and the adjusted collection: adjusted.txt, or"
             " adjusted.out for a Bundle"
@@ -122,16 +96,15 @@ def collection(
             " Default: no files."
         ),
     ] = None,
-    documents: Documents = NONE_ASKED,
-    fit: Fit = SQUARES,
+    documents: Annotated[Documents, Without("xlsx", "crs", "map")],
+    fit: Fit,
     components: Components = None,
-    ordering: Ordering = OrderingName.AUTO,
+    ordering: Ordering = "auto",
     threads: Threads = None,
-    snooping: Snooping = KEPT,
+    snooping: Annotated[Snooping, Without("unit_weight")],
     unit_weight: Annotated[
-        UnitWeight,
-        typer.Option(help="With --snoop: whether --sd is right, or but for a common factor."),
-    ] = UnitWeight.UNKNOWN,
+        UnitWeight, typer.Option(help="With --snoop: whether --sd is right, or but for a common factor.")
+    ] = "unknown",
     strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
@@ -149,11 +122,8 @@ def collection(
             job.reads(problem)
         packing = problem.suffix if problem.suffix in PACKED else ""
         photos, found = recognised(problem)
-        names = [] if out is None else [out / "report.txt", out / f"adjusted{found.suffix}{packing}"]
-        if components and out is not None:
-            names.append(out / COMPONENTS)
-        place = documents.place(out)
-        job.writes(*names, *([place] if place else []))
+        adjusted = f"adjusted{found.suffix}{packing}"
+        documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
         pictures = documents.pictures(job, out)
         photos = photos.replace(image_sd=fit.sd)
         if snooping.snoop and fit.robust is not None:
@@ -164,8 +134,8 @@ def collection(
         result = result.estimated(job, photos, components, threads)
         written = pictures.of(result.result)
         if out is not None:
-            written[names[0]] = result.told.report().encode()
-            written[names[1]] = to_bytes(result.result.adjusted(), packing, found.name)
+            written[out / TEXT] = result.told.report().encode()
+            written[out / adjusted] = to_bytes(result.result.adjusted(), packing, found.name)
             written |= result.files(out)
         title = problem.name
         written |= documents.page(job, "collection", out, lambda: replace(result.page(), title=title))
@@ -193,23 +163,20 @@ def _adjusted(
     threads: int | None,
 ) -> Found[AdjustedCollection]:
     """Adjust a collection, or take gross errors out of it, with the progress on standard error."""
-    from photogram.adjustment.snooping import snoop
     from photogram.collection import AdjustedCollection, adjust
 
-    with job.status("adjusting") as status:
+    with adjustment_status(job, name="cost", factor=0.5) as progress:
         options: dict[str, Any] = {
             "tolerance": fit.tolerance,
             "max_iterations": fit.max_iterations,
-            "ordering": ordering.value,
-            "progress": shown(status, "cost", 0.5) if status is not None else None,
+            "ordering": ordering,
+            "progress": progress,
         }
         if not snooping.snoop:
             return Found(
                 adjust(photos, loss=fit.robust, covariance=fit.covariance, threads=threads, **options)
             )
-        options |= snooping.options
-        made = cleaned(photos, components, threads, options) if components else None
-        log = made.snooped if made else snoop(photos, threads=threads, **options)
+        log, made = snooped(photos, components, threads, options | snooping.options)
         if not isinstance(log.result, AdjustedCollection):
             raise TypeError("a collection gives the result of a collection")
         return Found(log.result, log, made)

@@ -37,16 +37,13 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
     ),
     "check": (
         "Look for mistakes and gross errors: wrong units and axes, blunders, control that does not fit.",
-        "check_project.check_project",
+        "check.check_project",
     ),
     "info": (
         "Say what lies at a path without adjusting it: sizes, cameras, rays, units, frame, what lacks.",
         "info.info",
     ),
-    "convert": (
-        "Write a project in another format, and say what that has no place for.",
-        "convert.convert",
-    ),
+    "convert": ("Write a project in another format, and say what that has no place for.", "convert.convert"),
     "convert-lens": (
         "Fit a lens of another model to what a camera shows, and say what it misses.",
         "convert_lens.convert_lens",
@@ -63,10 +60,7 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
         "State how accurate a block is, by whose standard, found how, assuming what: a page to hand over.",
         "statement.statement",
     ),
-    "new": (
-        "Write a small real project as tables, with comments that say what may stand there.",
-        "new.new",
-    ),
+    "new": ("Write a small real project as tables, with comments that say what may stand there.", "new.new"),
     "collection": (
         "Adjust photos of unknown cameras by Levenberg-Marquardt steps, however far the start.",
         "collection.collection",
@@ -85,22 +79,19 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
     ),
     "certificate": (
         "Check a camera's certificate: typing errors, marks from distances, lens from its table.",
-        "certificate.certificate",
+        "camera.certificate",
     ),
     "film": (
         "Adjust a block on film in one step and in two; take marks from MicMac.",
-        {"compare": "film.film", "marks": "film_marks.marks"},
+        {"compare": "film.film", "marks": "film.marks"},
     ),
-    "giant": (
-        "Adjust or check a GIANT project.",
-        {"adjust": "giant.giant", "check": "check.check"},
-    ),
+    "giant": ("Adjust or check a GIANT project.", {"adjust": "giant.giant", "check": "check.check"}),
     "absolute-orientation": (
         "Orient a model absolutely, or transform its points.",
         {
             "orient": "absolute_orientation.absolute_orientation",
             "transform": "absolute_orientation.transform",
-            "relative": "relative_orientation.relative",
+            "relative": "absolute_orientation.relative",
         },
     ),
     "comparator": (
@@ -111,10 +102,7 @@ COMMANDS: dict[str, tuple[str, str | dict[str, str]]] = {
             "compare": "comparator.compare",
         },
     ),
-    "camera": (
-        "Compare calibrations of cameras over years.",
-        {"compare": "camera.compare"},
-    ),
+    "camera": ("Compare calibrations of cameras over years.", {"compare": "camera.compare"}),
     "stellar-camera": (
         "Calibrate a camera by a plate with stars, or by exposures of the sky.",
         {

@@ -6,19 +6,18 @@ import os
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
-from enum import StrEnum
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.markup import escape
 
 from photogram.cli.console import output, print_remark, print_sections, print_withheld
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import JsonFile, Quiet, default_out, out_option
+from photogram.cli.documents import Documents, PageAndJson
+from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
+from photogram.cli.options import Quiet, default_out, out_option
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
@@ -29,24 +28,20 @@ EXAMPLE = ("comparator", "comparator-3.txt")
 """The packaged example, a deck in photogram.examples."""
 
 
-class Hand(StrEnum):
-    """Handedness of the comparator against the plate."""
-
-    FILE = "file"
-    LEFT = "left"
-    RIGHT = "right"
+Hand = Literal["file", "left", "right"]
+"""Handedness of the comparator against the plate."""
 
 
 @with_job
 def comparator(
     job: Job,
+    *,
     paths: Annotated[
         list[Path] | None,
         Reads.FILE,
         typer.Argument(
             metavar="FILE...",
             help="Tables (*.csv) of one calibration; or files of decks of cards, one calibration a deck.",
-            show_default=False,
         ),
     ] = None,
     example: Annotated[
@@ -60,31 +55,25 @@ def comparator(
             metavar="GRID",
             help="Grid plate: 773, 1320, 778 or a file (point, x_um, y_um); again for more plates."
             " Default: as the files say.",
-            show_default=False,
         ),
     ] = None,
     hand: Annotated[
         Hand, typer.Option(help="Handedness of the comparator against the plate; the data must agree.")
-    ] = Hand.FILE,
+    ] = "file",
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option(
             "Directory for listing, report, correction and grids. Default: FILE-calibrated beside the first"
             " FILE."
         ),
     ] = None,
     json: Annotated[
-        Path | None,
-        Writes.FILE,
+        OutputFile,
         typer.Option(
-            metavar="FILE",
-            help="Write everything as one JSON document (a list of them for several decks).",
-            show_default=False,
+            metavar="FILE", help="Write everything as one JSON document (a list of them for several decks)."
         ),
     ] = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
+    documents: Annotated[PageAndJson, Without("json")],
     pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf instead of report.html.")] = False,
     plots: Annotated[
         bool,
@@ -106,15 +95,13 @@ def comparator(
         typer.Option("--estimate-grid", help="Estimate the accuracy of the grid in the joint adjustment."),
     ] = False,
     each_case: Annotated[
-        bool,
-        typer.Option("--each-case", help="Tables and pictures of the polynomials of every case, too."),
+        bool, typer.Option("--each-case", help="Tables and pictures of the polynomials of every case, too.")
     ] = False,
     date: Annotated[
         str | None,
         typer.Option(
             metavar="TEXT",
             help="Date of the run for title page and report. Default: that of SOURCE_DATE_EPOCH, or today.",
-            show_default=False,
         ),
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Remarks on the measurements are errors.")] = False,
@@ -134,7 +121,7 @@ def comparator(
             paths = [job.packaged(*EXAMPLE)]
             job.reads(*paths)
             out = out or Path("comparator-calibrated")
-        left_handed = None if hand is Hand.FILE else hand is Hand.LEFT
+        left_handed = None if hand == "file" else hand == "left"
         sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
         options = Options.as_published() if as_published else Options()
         options = replace(options, polynomial=polynomial, estimate_grid=estimate_grid)
@@ -148,26 +135,27 @@ def comparator(
                 )
         folder = out or default_out((paths or [])[0], "-calibrated")
         job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))
-        written = _results(calibrations, folder, _run_date(date), pdf=pdf and plots, quiet=quiet)
-        if html is not None or (plots and not pdf):
-            written |= _pages(job, calibrations, folder, html, no_html)
-        documents = {json: _documents(calibrations)} if json is not None else {}
-        job.write(written, documents)
-        _withheld(calibrations, folder)
+        several = len(calibrations) > 1
+        placed = {folder / str(k) if several else folder: one for k, one in enumerate(calibrations, 1)}
+        written = _results(placed, _run_date(date), pdf=pdf and plots, quiet=quiet)
+        if documents.html is not None or (plots and not pdf):
+            written |= _pages(job, placed, documents)
+        asked = {json: _document(calibrations)} if json is not None else {}
+        job.write(written, asked)
+        _print_withheld(placed)
         code = worst(calibration.verdict for calibration in calibrations)
-        job.conclude([*written, *documents], summary=lambda: _summarize(calibrations), code=code)
+        job.conclude([*written, *asked], summary=lambda: _summarize(calibrations), code=code)
 
 
-def _withheld(calibrations: list[Calibration], folder: Path) -> None:
+def _print_withheld(placed: dict[Path, Calibration]) -> None:
     """Say which corrections must not be used, and which files of earlier runs are not of this one."""
-    for number, calibration in enumerate(calibrations, 1):
-        if calibration.usable:
-            continue
-        print_withheld(
-            f"comparator {calibration.session.comparator}: the correction is withheld:"
-            f" {calibration.verdict.headline}",
-            _corrections(calibration, _place(folder, number, len(calibrations))),
-        )
+    for place, calibration in placed.items():
+        if not calibration.usable:
+            print_withheld(
+                f"comparator {calibration.session.comparator}: the correction is withheld:"
+                f" {calibration.verdict.headline}",
+                _corrections(calibration, place),
+            )
 
 
 def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
@@ -182,10 +170,6 @@ def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
         if calibration.joint:
             made[place / f"grid-{plate}-joint.csv"] = adjusted_grid(calibration, plate).to_csv()
     return made
-
-
-def _place(folder: Path, number: int, count: int) -> Path:
-    return folder if count == 1 else folder / str(number)
 
 
 def _run_date(date: str | None) -> str:
@@ -204,14 +188,7 @@ def _run_date(date: str | None) -> str:
         raise InputError(f"SOURCE_DATE_EPOCH is {quoted(epoch)}: no seconds since 1970") from None
 
 
-def _results(
-    calibrations: list[Calibration],
-    folder: Path,
-    run_date: str,
-    *,
-    pdf: bool,
-    quiet: bool,
-) -> dict[Path, bytes]:
+def _results(placed: dict[Path, Calibration], run_date: str, *, pdf: bool, quiet: bool) -> dict[Path, bytes]:
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.comparator import listing
 
@@ -220,8 +197,7 @@ def _results(
         if not quiet:
             print_remark("no pictures: pip install 'photogram[plots]'")
     written: dict[Path, bytes] = {}
-    for number, calibration in enumerate(calibrations, 1):
-        place = _place(folder, number, len(calibrations))
+    for place, calibration in placed.items():
         written[place / "listing.txt"] = listing(calibration, run_date).encode()
         if calibration.usable:
             written |= _corrections(calibration, place)
@@ -232,22 +208,19 @@ def _results(
     return written
 
 
-def _pages(
-    job: Job, calibrations: list[Calibration], folder: Path, html: Path | None, no_html: bool
-) -> dict[Path, bytes]:
+def _pages(job: Job, placed: dict[Path, Calibration], documents: Documents) -> dict[Path, bytes]:
     """Make the reports for the browser, one for each calibration."""
     from photogram.show.methods import page_of
 
     written: dict[Path, bytes] = {}
-    for number, calibration in enumerate(calibrations, 1):
-        place = html_place(html, no_html, _place(folder, number, len(calibrations)))
-        mark = f"-{number}" if html is not None and len(calibrations) > 1 else ""
+    for number, (place, calibration) in enumerate(placed.items(), 1):
+        mark = f"-{number}" if documents.html is not None and len(placed) > 1 else ""
         make = partial(page_of, replace(calibration, messages=job.told(calibration.messages)))
-        written |= html_files(job, "comparator", place, html is not None, make, mark)
+        written |= documents.page(job, "comparator", place, make, mark)
     return written
 
 
-def _documents(calibrations: list[Calibration]) -> bytes:
+def _document(calibrations: list[Calibration]) -> bytes:
     from photogram.comparator import to_json
 
     documents = [to_json(calibration) for calibration in calibrations]
@@ -261,18 +234,14 @@ def _summarize(calibrations: list[Calibration]) -> None:
 
 
 def _summarize_one(calibration: Calibration) -> None:
-    from photogram.comparator.listing.summary import summary_page
+    from photogram.comparator.listing.parameters import summary_page
     from photogram.show.sections import problems_or_none
 
     session = calibration.session
     output.print(f"[bold]Comparator {session.comparator}, {len(calibration.cases)} cases[/]")
     verdict = calibration.verdict
     told = problems_or_none([message.text for message in calibration.messages], verdict)
-    sections = [
-        ("Verdict", [verdict.headline]),
-        ("What to do next", list(verdict.next)),
-        ("Problems", told),
-    ]
+    sections = [("Verdict", [verdict.headline]), ("What to do next", list(verdict.next)), ("Problems", told)]
     print_sections(sections, "listing.txt", len(told))
     for line in summary_page(calibration)[4:]:
         output.print(escape(line))
@@ -287,6 +256,7 @@ def _summarize_one(calibration: Calibration) -> None:
 @with_job
 def correct(
     job: Job,
+    *,
     correction: Annotated[
         Path,
         Reads.FILE,
@@ -298,9 +268,7 @@ def correct(
         typer.Argument(metavar="FILE", help="Table with columns x_um, y_um (or x_mm, y_mm)."),
     ],
     corrected: Annotated[
-        Path | None,
-        Writes.FILE,
-        typer.Argument(metavar="OUT", help="Table to write. Default: standard output.", show_default=False),
+        OutputFile, typer.Argument(metavar="OUT", help="Table to write. Default: standard output.")
     ] = None,
     invert: Annotated[
         bool, typer.Option("--invert", help="Turn corrected coordinates back into readings.")
@@ -334,25 +302,20 @@ def correct(
 @with_job
 def compare(
     job: Job,
+    *,
     calibrations: Annotated[
         list[Path] | None,
         Reads.FILE,
-        typer.Argument(
-            metavar="JSON...", help="Documents of calibrations: what `--json` writes.", show_default=False
-        ),
+        typer.Argument(metavar="JSON...", help="Documents of calibrations: what `--json` writes."),
     ] = None,
     example: Annotated[
-        bool,
-        typer.Option("--example", help="Compare six simulated calibrations instead: a scale steps."),
+        bool, typer.Option("--example", help="Compare six simulated calibrations instead: a scale steps.")
     ] = False,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option("Directory for report and grids. Default: FILE-compared beside the first FILE."),
     ] = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
+    documents: PageAndJson,
     quiet: Quiet = False,
 ) -> None:
     """Compare calibrations over years: drift, steps, control charts; adjust their grids together.
@@ -362,11 +325,10 @@ def compare(
     """
     with job:
         from photogram.comparator import compare as compared
-        from photogram.show.methods import page_of
         from photogram.show.sections import verdict_sections
 
         if example:
-            from photogram.comparator.years.example import simulated_years
+            from photogram.comparator.simulation import simulated_years
 
             found = compared(simulated_years())
             folder = out or Path("comparator-compared")
@@ -374,17 +336,13 @@ def compare(
             paths = calibrations or []
             found = compared(paths)
             folder = out or default_out(paths[0], "-compared")
-        written = (
-            {folder / f"grid-{plate}.csv": grid.to_csv() for plate, grid in found.grids.items()}
-            if found.usable_grids
-            else {}
+        grids = found.grids if found.usable_grids else {}
+        documents.conclude(
+            job,
+            "comparator compare",
+            found,
+            folder,
+            text=False,
+            more={folder / f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()},
+            above=verdict_sections(found.verdict),
         )
-        place = html_place(html, no_html, folder)
-        written |= html_files(job, "comparator compare", place, html is not None, partial(page_of, found))
-        documents = {json: found.to_json()} if json is not None else {}
-
-        def summarize() -> None:
-            print_sections(verdict_sections(found.verdict), "the report")
-            output.print(escape(found.report()), end="")
-
-        job.finish(written, documents, summary=summarize, code=found.verdict.exit)

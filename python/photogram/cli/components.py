@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
 import typer
 
 from photogram.cli.console import ON_TOP
 from photogram.cli.job import Job
+from photogram.cli.progress import estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -22,25 +23,15 @@ if TYPE_CHECKING:
     from photogram.show.sections import Section
     from photogram.statistics.verdict import Verdict
 
-__all__ = [
-    "COMPONENTS",
-    "Components",
-    "Found",
-    "UnitVarianceName",
-    "cleaned",
-]
+__all__ = ["COMPONENTS", "Components", "Found", "UnitVarianceName", "snooped"]
 
 Network = TypeVar("Network", bound="AdjustedNetwork")
 COMPONENTS = "components.txt"
 """What goes to the output directory where variance components are asked for."""
 
 
-class UnitVarianceName(StrEnum):
-    """What the variance of unit weight is based on."""
-
-    CONSTRAINED = "constrained"
-    UNITY = "unity"
-    REDUNDANCY = "redundancy"
+UnitVarianceName = Literal["constrained", "unity", "redundancy"]
+"""What the variance of unit weight is based on."""
 
 
 class Basis(StrEnum):
@@ -62,34 +53,26 @@ Components = Annotated[
         help="Estimate variance components of groups of observations: by which factors their standard"
         " deviations are wrong. Given more than once: of all combinations. The results stay those of the"
         " given weights; with --snoop those of the weights that what is left bears out.",
-        show_default=False,
     ),
 ]
 
 
-def estimated(
-    job: Job, network: object, bases: list[Basis] | None, threads: int | None
-) -> VarianceComponents | None:
-    """Estimate the components that are asked for, if any."""
-    if not bases:
-        return None
-    from photogram.adjustment.components import variance_components
-
-    groups = [basis.value.replace("-", " ") for basis in bases]
-    with job.status("variance components") as status:
-
-        def tell(number: int, _: object) -> None:
-            if status is not None:
-                status.update(f"variance components, adjustment {number + 1}")
-
-        return variance_components(network, groups, threads=threads, progress=tell)
+def _groups(bases: list[Basis]) -> list[str]:
+    return [basis.replace("-", " ") for basis in bases]
 
 
-def cleaned(network: object, bases: list[Basis], threads: int | None, options: Mapping[str, Any]) -> Cleaned:
-    """Take gross errors out and estimate weights in turn, with options of snooping."""
-    from photogram.adjustment.cleaning import clean
+def snooped(
+    network: object, bases: list[Basis] | None, threads: int | None, options: Mapping[str, Any]
+) -> tuple[Snooped, Cleaned | None]:
+    """Take gross errors out, with options of snooping; where weights are asked for, estimate them in turn."""
+    if bases:
+        from photogram.adjustment.cleaning import clean
 
-    return clean(network, [basis.value.replace("-", " ") for basis in bases], threads=threads, **options)
+        made = clean(network, _groups(bases), threads=threads, **options)
+        return made.snooped, made
+    from photogram.adjustment.snooping import snoop
+
+    return snoop(network, threads=threads, **options), None
 
 
 @dataclass(frozen=True)
@@ -118,9 +101,13 @@ class Found(Generic[Network]):
         self, job: Job, network: object, bases: list[Basis] | None, threads: int | None
     ) -> Found[Network]:
         """Return it with the components that are asked for, where they are not found already."""
-        if self.made is not None:
+        if self.made is not None or not bases:
             return self
-        return replace(self, components=estimated(job, network, bases, threads))
+        from photogram.adjustment.components import variance_components
+
+        with estimation_status(job) as progress:
+            found = variance_components(network, _groups(bases), threads=threads, progress=progress)
+        return replace(self, components=found)
 
     def files(self, out: Path) -> dict[Path, bytes]:
         """Return what goes to the output directory of variance components."""

@@ -8,30 +8,18 @@ from typing import Annotated
 import typer
 
 from photogram.cli.console import print_sections
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.job import InputFile, Job, Writes, with_job
 from photogram.cli.options import Quiet
-from photogram.cli.projects import (
-    NOTHING,
-    Additions,
-    Example,
-    described,
-    project_path,
-    read_project,
-    with_additions,
-)
+from photogram.cli.projects import Additions, Example, described, project_path, read_project
 
 __all__ = ["convert"]
 
 
 @with_job
-@with_additions()
 def convert(
     job: Job,
-    path: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Argument(metavar="IN", help="A project: a folder or file.", show_default=False),
-    ] = None,
+    *,
+    path: Annotated[InputFile, typer.Argument(metavar="IN", help="A project: a folder or file.")] = None,
     out: Annotated[
         Path | None,
         Writes.EITHER,
@@ -39,7 +27,6 @@ def convert(
             metavar="OUT",
             help="Folder for the files, which is made if need be, or the name of the file. Its name says the"
             " format: block.xml, bundle.out, sparse/0, model-colmap ...",
-            show_default=False,
         ),
     ] = None,
     example: Example = False,
@@ -49,10 +36,9 @@ def convert(
             metavar="NAME",
             help="The format to write, by its name: docs/formats.md lists them. Default: what OUT is called,"
             " else `plain`.",
-            show_default=False,
         ),
     ] = None,
-    added: Additions = NOTHING,
+    added: Additions,
     quiet: Quiet = False,
 ) -> None:
     """Write a project in another format, and say what that has no place for."""

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from photogram.cli.console import output
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.job import Job, OutputFolder, Reads, with_job
 from photogram.cli.options import JsonFile, Plots, Quiet, out_option, pair
-from photogram.cli.projects import with_options
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
@@ -74,13 +73,10 @@ class Fit:
         )
 
 
-AS_USUAL = Fit()
-
-
 @with_job
-@with_options("fit", Fit)
 def convert_lens(
     job: Job,
+    *,
     path: Annotated[
         Path,
         Reads.FILE,
@@ -98,23 +94,18 @@ def convert_lens(
         ),
     ],
     camera: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Which camera, where there are several.", show_default=False),
+        str | None, typer.Option(metavar="NAME", help="Which camera, where there are several.")
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option(
-            metavar="WxH", help="Width and height of the pictures, where no file says it.", show_default=False
-        ),
+        typer.Option(metavar="WxH", help="Width and height of the pictures, where no file says it."),
     ] = None,
-    fit: Fit = AS_USUAL,
+    fit: Fit,
     tolerance: Annotated[
-        float | None,
-        typer.Option(metavar="PX", help="Exit code 4 where a difference is larger.", show_default=False),
+        float | None, typer.Option(metavar="PX", help="Exit code 4 where a difference is larger.")
     ] = None,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option("Directory for the report, differences, and the camera in the formats that can hold it."),
     ] = None,
     json: JsonFile = None,
@@ -152,8 +143,7 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
 
     if path.suffix == ".cameramodel":
         return read_lens(path)
-    if path.is_dir():
-        job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
+    job.reads_inside(path)
     project = read(path)
     names = project.block.camera_names
     if name is None and len(names) != 1:

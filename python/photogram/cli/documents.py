@@ -1,40 +1,41 @@
-"""What commands write of a result for whoever asks: options, and their files."""
+"""In which forms commands write a result for whoever asks: options, and the files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Job, Writes
-from photogram.cli.maps import CloudFile, CloudOrigin, Crs, MapFile, drawn_maps, point_clouds
-from photogram.cli.options import JsonFile, ParquetFolder, PictureFormat, PlotFormat, Plots, as_data
-from photogram.cli.pictures import Pictures
+from photogram.cli.console import output, print_remark, print_sections
+from photogram.cli.job import Job, OutputFile, OutputFolder, Without
+from photogram.cli.options import JsonFile, PictureFormat, Plots
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.results.network import AdjustedNetwork
-    from photogram.show.page import Page
+    from photogram.show.page import Drawing, Page
+    from photogram.show.sections import Section
 
-__all__ = ["NONE_ASKED", "OF_NETWORKS", "Documents"]
+__all__ = ["TEXT", "Crs", "Documents", "OfPrograms", "PageAndJson", "Pictures", "check_maps"]
 
-Workbook = Annotated[
-    Path | None,
-    Writes.FILE,
+TEXT, HTML = "report.txt", "report.html"
+"""The reports, in a directory of results."""
+NEEDED = ("jinja2", "matplotlib")
+"""What makes that for the browser: the extra `report`."""
+
+Crs = Annotated[
+    str | None,
     typer.Option(
-        metavar="FILE",
-        help="Write the tables of the result as an Excel workbook, a sheet each; needs openpyxl.",
-        show_default=False,
+        metavar="CRS",
+        help="Coordinate reference system of results in `in_crs/` and of maps (EPSG:25832 ...).",
     ),
 ]
-
-
-OF_NETWORKS = ("xlsx", "parquet", "crs", "map", "ply", "ply_origin")
-"""Options that programs without a network do without."""
 
 
 @dataclass(frozen=True)
@@ -42,29 +43,81 @@ class Documents:
     """In which forms a user wants a result, with the options that say it."""
 
     json: JsonFile = None
-    xlsx: Workbook = None
-    html: HtmlFile = None
-    no_html: NoHtml = False
+    xlsx: Annotated[
+        OutputFile,
+        typer.Option(
+            metavar="FILE",
+            help="Write the tables of the result as an Excel workbook, a sheet each; needs openpyxl.",
+        ),
+    ] = None
+    html: Annotated[
+        OutputFile,
+        typer.Option(
+            metavar="FILE",
+            help="Where the report for the browser goes. Default: report.html in --out, if there is one.",
+        ),
+    ] = None
+    no_html: Annotated[bool, typer.Option("--no-html", help="Write no report for the browser.")] = False
     plots: Plots = False
-    plot_format: PlotFormat = PictureFormat.PNG
-    parquet: ParquetFolder = None
+    plot_format: Annotated[PictureFormat, typer.Option(help="Format of the pictures.")] = "png"
+    parquet: Annotated[
+        OutputFolder,
+        typer.Option(
+            metavar="DIR", help="Write the whole result as Parquet, which photogram.read_result reads."
+        ),
+    ] = None
     crs: Crs = None
-    map: MapFile = None
-    ply: CloudFile = None
-    ply_origin: CloudOrigin = None
+    map: Annotated[
+        OutputFile,
+        typer.Option(
+            metavar="FILE",
+            help="Write a map, .gpkg or .geojson: photos, footprints, error ellipses, suspicious"
+            " observations.",
+        ),
+    ] = None
+    ply: Annotated[
+        OutputFile,
+        typer.Option(
+            metavar="FILE", help="Write the points as a point cloud with standard deviations (PLY)."
+        ),
+    ] = None
+    ply_origin: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y Z", help="Taken away from the coordinates of --ply: viewers want small ones."
+        ),
+    ] = None
 
     def place(self, out: Path | None) -> Path | None:
-        """Return where the report for the browser goes, of results in a directory."""
-        return html_place(self.html, self.no_html, out)
+        """Return where the report for the browser goes, of results in a directory; None where to none."""
+        if self.no_html:
+            if self.html is not None:
+                raise typer.BadParameter("goes without --html", param_hint="--no-html")
+            return None
+        return self.html or (out / HTML if out is not None else None)
+
+    def announce(self, job: Job, out: Path | None, *names: str, picture: str = "") -> list[Path]:
+        """Name the files that are going to be written: in a directory of results, the page, one picture.
+
+        Returns where that picture goes: to the results, or nowhere.
+        """
+        drawn = []
+        if picture and self.plots:
+            if out is None:
+                raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
+            drawn = [out / f"{picture}.{self.plot_format}"]
+        place = self.place(out)
+        job.writes(*drawn, *(out / name for name in names if out is not None), *([place] if place else []))
+        return drawn
 
     def page(
         self, job: Job, command: str, out: Path | None, make: Callable[[], Page], mark: str = ""
     ) -> dict[Path, bytes]:
-        """Return the report for the browser; see :func:`photogram.cli.html.html_files`."""
+        """Return the report for the browser; see :func:`html_files`."""
         return html_files(job, command, self.place(out), self.html is not None, make, mark)
 
     def pictures(self, job: Job, out: Path | None) -> Pictures:
-        """Return the pictures that are to be drawn; see :class:`photogram.cli.pictures.Pictures`."""
+        """Return the pictures that are to be drawn."""
         return Pictures(job, self.plots, self.plot_format, out)
 
     def as_json(self, told: Any) -> dict[Path, bytes]:
@@ -81,15 +134,172 @@ class Documents:
         """Return the files of `--map FILE` and `--ply FILE`; none without them."""
         from photogram import Result
 
-        maps = (
-            drawn_maps(result, self.map, self.crs, sizes, quiet=quiet) if isinstance(result, Result) else {}
-        )
-        return maps | point_clouds(result, self.ply, self.ply_origin, self.crs)
+        files: dict[Path, bytes] = {}
+        if self.map is not None and isinstance(result, Result):
+            from photogram.formats.maps import map_files
+
+            files, remarks = map_files(result, self.map, self.crs, sizes=sizes)
+            for each in () if quiet else remarks:
+                print_remark(each)
+        if self.ply is not None:
+            from photogram.formats.crs_results import placed
+            from photogram.formats.maps import point_cloud
+
+            found = placed(result, self.crs) if self.crs is not None and isinstance(result, Result) else None
+            origin = self.ply_origin or (0.0, 0.0, 0.0)
+            files |= {self.ply: point_cloud(result, found, origin=origin)}
+        return files
 
     def data(self, result: AdjustedNetwork) -> dict[Path, Content]:
         """Return the files of `--parquet DIR`; none without it."""
-        return as_data(result, self.parquet)
+        if self.parquet is None:
+            return {}
+        from photogram.show.methods import files_of
+
+        return {self.parquet / name: content for name, content in files_of(result).items()}
+
+    def conclude(
+        self,
+        job: Job,
+        command: str,
+        found: Any,
+        out: Path | None,
+        *,
+        text: bool = True,
+        more: dict[Path, bytes] | None = None,
+        above: Iterable[Section] = (),
+        code: int | None = None,
+    ) -> None:
+        """Write and print a result that has a report, a page and a document, and end by its verdict.
+
+        Parameters
+        ----------
+        job, command, found, out
+            The run, its name after `photogram`, the result, and the directory for its files.
+        text
+            Whether the report goes there as text, too.
+        more
+            Further files.
+        above
+            What is printed above the report.
+        code
+            The exit code, where it is not that of the verdict.
+        """
+        from photogram.show.methods import page_of
+
+        def summarize() -> None:
+            print_sections(above, "the report")
+            output.print(escape(found.report()), end="")
+
+        document, page = self.as_json(found), self.page(job, command, out, partial(page_of, found))
+        texts = {out / TEXT: found.report().encode()} if text and out is not None else {}
+        files = [texts, document, page] if texts else [{**(more or {}), **page}, document]
+        job.finish(*files, summary=summarize, code=found.verdict.exit if code is None else code)
 
 
-NONE_ASKED = Documents()
-"""The report for the browser, where there is a place for it; nothing else."""
+OF_NETWORKS = ("xlsx", "parquet", "crs", "map", "ply", "ply_origin")
+OfPrograms = Annotated[Documents, Without(*OF_NETWORKS)]
+"""Of programs without a network."""
+PageAndJson = Annotated[Documents, Without("plots", "plot_format", *OF_NETWORKS)]
+"""Of results without pictures of their own."""
+
+
+def html_files(
+    job: Job, command: str, place: Path | None, asked: bool, make: Callable[[], Page], mark: str = ""
+) -> dict[Path, bytes]:
+    """Return the report of a run; nothing, with a remark, where what makes it is absent and nobody asked.
+
+    Parameters
+    ----------
+    job, command
+        The run, and its name after `photogram`.
+    place
+        Where it goes; None: nowhere.
+    asked
+        Whether the user named the place: then what is absent is an error.
+    make
+        Makes what it says, without its last section.
+    mark
+        Stands in the name of the file, before its ending.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        jinja2 or matplotlib is absent, and the report was asked for.
+    """
+    if place is None:
+        return {}
+    if not asked and not all(map(find_spec, NEEDED)):
+        if not job.quiet:
+            print_remark(f"no {HTML}: pip install 'photogram[report]'")
+        return {}
+    from photogram.show.html import page_html
+    from photogram.show.run import reproducibility
+
+    with job.status("drawing the report"):
+        page = make()
+        content = page_html(page.with_sections(reproducibility(job.run(command), page.phases)))
+    return {place.with_stem(place.stem + mark): content}
+
+
+def check_maps(chart: Path | None) -> None:
+    """Refuse, before anything is adjusted, a map that cannot be written."""
+    if chart is None:
+        return
+    from photogram.formats.maps.files import check_map
+
+    check_map(chart)
+    for package in ("geopandas", "pyogrio"):
+        if find_spec(package) is None:
+            raise ModuleNotFoundError(f"No module named {package!r}", name=package)
+
+
+class Pictures:
+    """All pictures of a network that a command has to draw, beside the report, or none.
+
+    Parameters
+    ----------
+    job
+        Learns which files there may be.
+    plots, ending
+        Whether, and in which format.
+    out
+        The directory of the results.
+
+    Raises
+    ------
+    BadParameter
+        Pictures, but no directory.
+    ModuleNotFoundError
+        matplotlib is absent: said before anything is computed.
+    """
+
+    def __init__(self, job: Job, plots: bool, ending: PictureFormat, out: Path | None) -> None:
+        self._out = out if plots else None
+        self._ending = ending
+        if not plots:
+            return
+        if out is None:
+            raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
+        from photogram.plots import PICTURES
+        from photogram.show.style import need_matplotlib
+
+        need_matplotlib()
+        job.writes(*(out / f"{name}.{ending}" for name in PICTURES))
+
+    def of(self, result: AdjustedNetwork) -> dict[Path, bytes]:
+        """Return the pictures of a result as files."""
+        if self._out is None:
+            return {}
+        from photogram.plots import picture_files
+
+        return picture_files(result, self._out, self._ending)
+
+    def of_drawings(self, make: Callable[[], Sequence[Drawing]]) -> dict[Path, bytes]:
+        """Return pictures that a page has, too, as files."""
+        if self._out is None:
+            return {}
+        from photogram.show.pictures import drawn
+
+        made = {self._out / f"{each.name}.{self._ending}": each.draw() for each in make()}
+        return {path: drawn(figure, path) for path, figure in made.items() if figure is not None}

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from photogram.cli.adjust import result_at
 from photogram.cli.console import print_sections
-from photogram.cli.job import Job, Writes, with_job
+from photogram.cli.job import Job, OutputFolder, with_job
 from photogram.cli.options import JsonFile, Quiet, Strict, Threads, out_option
-from photogram.cli.projects import (
-    NOTHING,
-    Additions,
-    Example,
-    ProjectPath,
-    with_additions,
-    with_options,
-)
-from photogram.cli.results import result_at
+from photogram.cli.projects import Additions, Example, ProjectPath
 from photogram.lazy_dataclasses import dataclass, fields
 
 if TYPE_CHECKING:
@@ -30,7 +22,7 @@ Given = list[str] | None
 
 
 def _option(kind: str, what: str) -> Any:
-    return typer.Option(f"--{kind}", metavar="NAME=POINT,..", help=what, show_default=False)
+    return typer.Option(f"--{kind}", metavar="NAME=POINT,..", help=what)
 
 
 @dataclass(frozen=True)
@@ -61,13 +53,12 @@ class Wanted:
 
 
 @with_job
-@with_options("wanted", Wanted)
-@with_additions()
 def features(
     job: Job,
+    *,
     path: ProjectPath = None,
     example: Example = False,
-    wanted: Wanted = Wanted(),  # noqa: B008  # frozen
+    wanted: Wanted,
     k: Annotated[float, typer.Option("-k", metavar="K", min=0.01, help="Coverage factor: U = k sd.")] = 2.0,
     coverage: Annotated[
         float | None,
@@ -76,14 +67,11 @@ def features(
             min=0.01,
             max=0.999999,
             help="A probability in place of -k: 0.95. k is Student's where the unit weight is estimated.",
-            show_default=False,
         ),
     ] = None,
-    out: Annotated[
-        Path | None, Writes.DIRECTORY, out_option("Directory for tables of values and of deviations.")
-    ] = None,
+    out: Annotated[OutputFolder, out_option("Directory for tables of values and of deviations.")] = None,
     json: JsonFile = None,
-    added: Additions = NOTHING,
+    added: Additions,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from photogram.cli.check import EXAMPLE
-from photogram.cli.components import COMPONENTS, Found
-from photogram.cli.console import print_sections
-from photogram.cli.documents import NONE_ASKED, Documents
-from photogram.cli.giant_project import AS_TOLD, How, adjusted_project, project_and_block
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.maps import check_maps
-from photogram.cli.options import KEPT, Quiet, Snooping, Strict, Threads, default_out, out_option
-from photogram.cli.projects import with_options
+from photogram.cli.components import COMPONENTS, Components, Found, UnitVarianceName, snooped
+from photogram.cli.console import SHOWN, errors, print_sections
+from photogram.cli.documents import Documents, check_maps
+from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
+from photogram.cli.options import (
+    AirModel,
+    Ordering,
+    Quiet,
+    Snooping,
+    Strict,
+    Threads,
+    WaterModel,
+    default_out,
+    out_option,
+)
+from photogram.cli.progress import adjustment_status
+from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
-    from photogram import Block, Result
-    from photogram.giant import Project
+    from photogram import Block, Progress, Result
+    from photogram.adjustment.adjustment import UnitVariance
+    from photogram.giant import Limits, Project
+    from photogram.giant.common import Common
 
 __all__ = ["giant"]
 
@@ -27,19 +40,62 @@ RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 """What goes to the output directory."""
 
 
+@dataclass(frozen=True)
+class How:
+    """How a project is adjusted where COMMON does not say it, with the options that do."""
+
+    as_published: Annotated[
+        bool,
+        typer.Option(
+            "--as-published",
+            help="Stop by the percent criterion and the limit of iterations of COMMON; list as in 1987.",
+        ),
+    ] = False
+    unit_variance: Annotated[
+        UnitVarianceName | None,
+        typer.Option(
+            metavar="NAME",
+            help="What the variance of unit weight is based on: all weighted values (`constrained`),"
+            " redundancy numbers, or 1. Default: as COMMON says, with redundancy numbers for cameras that are"
+            " free; with --as-published the rule of 1987 for these.",
+        ),
+    ] = None
+    components: Components = None
+    ordering: Ordering = "auto"
+    air_refraction: Annotated[
+        AirModel | None,
+        typer.Option(
+            help="Refraction in air by the guide (to 9,000 m), by a standard atmosphere, or none, whatever"
+            " COMMON asks for. Default where it does: giant."
+        ),
+    ] = None
+    water_refraction: Annotated[
+        WaterModel | None,
+        typer.Option(
+            help="Refraction in water by the guide or by Snell's law, below the level in COMMON, or none,"
+            " whatever COMMON asks for. Default where it does: giant."
+        ),
+    ] = None
+    water_index: Annotated[
+        float | None, typer.Option(min=1, help="Refractive index of the water. Default: 1.340.")
+    ] = None
+
+    def basis(self, common: Common) -> UnitVariance:
+        """Return what the variance of unit weight is based on."""
+        said = common.unit_variance if self.as_published else common.unbiased_variance
+        return self.unit_variance or said
+
+
 @with_job
-@with_options("documents", Documents, "xlsx", "crs")
-@with_options("how", How)
-@with_options("snooping", Snooping)
 def giant(
     job: Job,
+    *,
     directory: Annotated[
         Path | None,
         Reads.PROJECT,
         typer.Argument(
             metavar="DIR",
             help="Directory of COMMON, CAMERAS, IMAGES, FRAMES, GROUND (any letter case, any extension).",
-            show_default=False,
         ),
     ] = None,
     example: Annotated[
@@ -49,32 +105,28 @@ def giant(
         ),
     ] = False,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option(
             "Directory for adjusted stations and points and report. Default: DIR-adjusted beside DIR."
         ),
     ] = None,
-    documents: Documents = NONE_ASKED,
+    documents: Annotated[Documents, Without("xlsx", "crs")],
     listing: Annotated[
-        Path | None,
-        Writes.FILE,
+        OutputFile,
         typer.Option(
             metavar="FILE",
             help="Write the printout of the 1987 program, page by page, as COMMON asks for it.",
-            show_default=False,
         ),
     ] = None,
-    how: How = AS_TOLD,
+    how: How,
     threads: Threads = None,
-    snooping: Snooping = KEPT,
+    snooping: Snooping,
     limits: Annotated[
         str | None,
         typer.Option(
             metavar="N1=..,N6=..",
             help="Limits of the 1987 program: N1 stations, N2 points, N3 control, N4 photographs of a point,"
             " N5 cameras, N6 bandwidth. Default: none.",
-            show_default=False,
         ),
     ] = None,
     strict: Strict = False,
@@ -98,15 +150,13 @@ def giant(
             job.reads(directory)
             out = out or Path(f"{EXAMPLE}-adjusted")
         out = _output_directory(directory, out, overwrite)
-        place = documents.place(out)
-        others = [*([out / COMPONENTS] if how.components else []), *([place] if place else [])]
-        job.writes(*(out / name for name in RESULTS), *others)
+        documents.announce(job, out, *RESULTS, *([COMPONENTS] if how.components else []))
         pictures = documents.pictures(job, out)
-        project, block, allowed = project_and_block(job, directory, limits, how)
+        project, block, allowed = _project_and_block(job, directory, limits, how)
         if snooping.snoop and (how.as_published or project.common.intersection_only):
             refused = "not with --as-published or an intersection"
             raise typer.BadParameter(refused, param_hint="--snoop")
-        found = adjusted_project(job, project, block, how, threads, snooping)
+        found = _adjusted_project(job, project, block, how, threads, snooping)
         written = _result_files(project, block, found, out, how.as_published)
         found = found.estimated(job, block, how.components, threads)
         written |= found.files(out) | pictures.of(found.result)
@@ -170,3 +220,95 @@ def _result_files(
         )
     made = {out / name: to_bytes(lines) for name, lines in records.items()}
     return {**made, out / "report.txt": found.told.report().encode()}
+
+
+def _project_and_block(
+    job: Job, directory: Path, limits: str | None, how: How
+) -> tuple[Project, Block, Limits | None]:
+    """Read a project, with what is remarked on it, its block as it is adjusted, and the limits of 1987."""
+    from photogram.formats.planes import plane_remarks
+    from photogram.giant import Limits, read_project
+
+    project = read_project(directory)
+    allowed = Limits.parse(limits) if limits else None
+    block = _refracted(project.to_block(allowed), project.common, how)
+    remarks = job.told([*project.messages, *plane_remarks(block, directory)])
+    return replace(project, messages=remarks), block, allowed
+
+
+def _refracted(block: Block, common: Common, how: How) -> Block:
+    """Give the block of a project the refraction of COMMON and the options."""
+    from photogram.giant.assembly import job_refraction
+
+    air, water, index = how.air_refraction, how.water_refraction, how.water_index
+    refraction = job_refraction(common, air=air, water=water, index=index)
+    if index is not None and (refraction is None or refraction.water is None):
+        raise typer.BadParameter("there is no refraction in water", param_hint="--water-index")
+    return block.replace(refraction=refraction)
+
+
+def _adjusted_project(
+    job: Job, project: Project, block: Block, how: How, threads: int | None, snooping: Snooping
+) -> Found[Result]:
+    """Adjust the block as COMMON asks, or snoop it, and find the components that are asked for."""
+    from photogram.diagnosis.after_adjustment import errors_explained
+    from photogram.errors import AdjustmentError
+
+    try:
+        with adjustment_status(job) as progress, errors_explained(block):
+            found = (
+                _snooped(project, block, how, threads, snooping, progress)
+                if snooping.snoop
+                else _adjusted(project, block, how, threads, progress)
+            )
+    except AdjustmentError:
+        # What was remarked on while reading is often the reason.
+        for message in project.messages[:SHOWN]:
+            errors.print(escape(str(message)))
+        raise
+    result = replace(found.result, messages=[*project.messages, *found.result.messages])
+    log = None if found.log is None else replace(found.log, result=result)
+    return replace(found, result=result, log=log)
+
+
+def _snooped(
+    project: Project,
+    block: Block,
+    how: How,
+    threads: int | None,
+    snooping: Snooping,
+    progress: Callable[[Progress], None] | None,
+) -> Found[Result]:
+    """Take gross errors out of the block, with its weights where components are asked for."""
+    from photogram import Result
+    from photogram.diagnosis.after_adjustment import diagnosed
+
+    options = snooping.options | {"unit_variance": how.basis(project.common), "progress": progress}
+    log, made = snooped(block, how.components, threads, options)
+    if not isinstance(log.result, Result):
+        raise TypeError("a block gives the result of a block")
+    return Found(diagnosed(log.result), log, made)
+
+
+def _adjusted(
+    project: Project, block: Block, how: How, threads: int | None, progress: Callable[[Progress], None] | None
+) -> Found[Result]:
+    """Adjust the block by the rules of today, or those of 1987."""
+    from photogram import AsPublished, adjust
+    from photogram.diagnosis.after_adjustment import diagnosed
+
+    common = project.common
+    rules: dict[str, Any] = {}
+    if how.as_published:
+        rules["tolerance"] = AsPublished(common.convergence_percent)
+        rules["max_iterations"] = common.max_iterations
+    result = adjust(
+        block.with_fixed_photos() if common.intersection_only else block,
+        unit_variance=how.basis(common),
+        ordering=how.ordering,
+        progress=progress,
+        threads=threads,
+        covariance="verdict",
+        **rules,
+    )
+    return Found(diagnosed(result))

@@ -7,16 +7,7 @@ from typing import TYPE_CHECKING
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import JsonFile, Quiet
-from photogram.cli.projects import (
-    NOTHING,
-    Additions,
-    Example,
-    ProjectPath,
-    described,
-    project_path,
-    read_project,
-    with_additions,
-)
+from photogram.cli.projects import Additions, Example, ProjectPath, described, project_path, read_project
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:
@@ -30,13 +21,13 @@ CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 
 
 @with_job
-@with_additions()
 def info(
     job: Job,
+    *,
     path: ProjectPath = None,
     example: Example = False,
     json: JsonFile = None,
-    added: Additions = NOTHING,
+    added: Additions,
     quiet: Quiet = False,
 ) -> None:
     """Say what lies at a path without adjusting it: sizes, cameras, rays, units, frame, what lacks.

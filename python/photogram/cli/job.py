@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from datetime import UTC, datetime
 from enum import Enum
 from functools import wraps
@@ -15,7 +15,7 @@ from importlib.resources import as_file, files
 from inspect import Parameter, signature
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 from typer.models import ArgumentInfo, OptionInfo
@@ -31,7 +31,17 @@ if TYPE_CHECKING:
     from photogram.io.writing import Content, OutputSet
     from photogram.show.run import Run
 
-__all__ = ["Job", "Reads", "Writes", "roles", "with_job"]
+__all__ = [
+    "InputFile",
+    "Job",
+    "OutputFile",
+    "OutputFolder",
+    "Reads",
+    "Without",
+    "Writes",
+    "roles",
+    "with_job",
+]
 
 STANDS = {"example": "--example", "plan_views": "--plan"}
 """Options that stand for the first argument of a command, by their parameters."""
@@ -52,6 +62,11 @@ class Writes(Enum):
     FILE = "file"
     DIRECTORY = "directory of results"
     EITHER = "file or directory, which the command finds out"
+
+
+InputFile = Annotated[Path | None, Reads.FILE]
+OutputFile = Annotated[Path | None, Writes.FILE]
+OutputFolder = Annotated[Path | None, Writes.DIRECTORY]
 
 
 class Job:
@@ -143,6 +158,11 @@ class Job:
         for path in paths:
             (self._projects if path.is_dir() else self._files).append(path)
         self._check()
+
+    def reads_inside(self, folder: Path) -> None:
+        """Name the files of a folder, where it is one; see :meth:`reads`."""
+        if folder.is_dir():
+            self.reads(*(each for each in sorted(folder.iterdir()) if each.is_file()))
 
     def spares(self, *paths: Path) -> None:
         """Name further files of which little is read: no result goes over them, and reports do not list them.
@@ -262,7 +282,7 @@ class Job:
 
     def _remark(self) -> None:
         """Remark on inputs that belong to a set which an interrupted run may have left incomplete."""
-        from photogram.io.writing.markers import doubtful
+        from photogram.io.writing.staging import doubtful
 
         for path, mark in doubtful(self._inputs()).items():
             told = f"{path}: an interrupted run may have left it out of step with other files: {mark}"
@@ -290,6 +310,13 @@ def _check_name(path: Path) -> None:
             raise OSError(error.errno, error.strerror, str(path)) from None
 
 
+class Without:
+    """Stands beside a class of options in an annotation: a command does without those of these names."""
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+
+
 def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
     """Return what the options and arguments of a command name that is read or written.
 
@@ -299,7 +326,7 @@ def roles(command: Callable[..., Any]) -> dict[str, Reads | Writes]:
         One of them is a path, and does not say which.
     """
     found: dict[str, Reads | Writes] = {}
-    for parameter in signature(command, eval_str=True).parameters.values():
+    for parameter in _options(command)[0]:
         kind, *metadata = get_args(parameter.annotation) or (parameter.annotation,)
         marks = [each for each in metadata if isinstance(each, Reads | Writes)]
         if len(marks) == 1:
@@ -313,10 +340,28 @@ def _holds_path(kind: object) -> bool:
     return kind is Path or any(_holds_path(part) for part in get_args(kind))
 
 
+def _options(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, tuple[type, list[str]]]]:
+    """Return options and arguments of a command, and those that it takes as one value of a class."""
+    found: list[Parameter] = []
+    grouped: dict[str, tuple[type, list[str]]] = {}
+    for parameter in signature(command, eval_str=True).parameters.values():
+        kind, *marks = get_args(parameter.annotation) or (parameter.annotation,)
+        own = [parameter]
+        if isinstance(kind, type) and is_dataclass(kind):
+            without = [name for mark in marks if isinstance(mark, Without) for name in mark.names]
+            fields = signature(kind, eval_str=True).parameters.values()
+            own = [each for each in fields if each.name not in without]
+            grouped[parameter.name] = kind, [each.name for each in own]
+        found += [each.replace(kind=Parameter.KEYWORD_ONLY) for each in own if each.name != "job"]
+    return found, grouped
+
+
 def with_job(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command its :class:`Job` as the parameter `job`, made of its options that are marked.
 
-    Where it has an option `--example`, that stands for its first argument, as `--plan` of views does.
+    A parameter that is a dataclass stands for options, its fields (but those :class:`Without` which the
+    command does). Where there is an option `--example`, that stands for the first argument, as `--plan` of
+    views does.
 
     Raises
     ------
@@ -324,11 +369,7 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
         A path among the parameters is marked neither as read nor as written.
     """
     marked = roles(command)
-    own = [
-        parameter.replace(kind=Parameter.KEYWORD_ONLY)
-        for parameter in signature(command, eval_str=True).parameters.values()
-        if parameter.name != "job"
-    ]
+    own, grouped = _options(command)
 
     @wraps(command)
     def with_one(**values: Any) -> None:
@@ -349,6 +390,8 @@ def with_job(command: Callable[..., None]) -> Callable[..., None]:
             quiet=values.get("quiet", False),
             options=_given(own, values),
         )
+        for name, (kind, names) in grouped.items():
+            values[name] = kind(**{each: values.pop(each) for each in names if each in values})
         command(job=job, **values)
 
     with_one.__dict__["__signature__"] = signature(command).replace(parameters=own)

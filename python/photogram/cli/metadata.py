@@ -8,10 +8,9 @@ from typing import Annotated
 import typer
 
 from photogram.cli.console import print_sections
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.job import Job, OutputFile, Reads, with_job
 from photogram.cli.options import Quiet
-from photogram.cli.photographs import MrkAntenna, PhotosCrs
-from photogram.cli.projects import Deviations
+from photogram.cli.projects import Deviations, MrkAntenna, PhotosCrs
 
 __all__ = ["metadata"]
 
@@ -21,14 +20,12 @@ def metadata(
     job: Job,
     path: Annotated[Path, Reads.FILE, typer.Argument(metavar="DIR", help="Folder of the photographs.")],
     out: Annotated[
-        Path | None,
-        Writes.FILE,
+        OutputFile,
         typer.Option(
             "--out",
             metavar="FILE",
             help="Table gnss of a plain project; gnss_groups.csv goes beside it, where a receiver had"
             " corrections in real time.",
-            show_default=False,
         ),
     ] = None,
     photos_crs: PhotosCrs = None,

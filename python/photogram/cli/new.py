@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -15,26 +14,18 @@ from photogram.cli.projects import EXAMPLE
 __all__ = ["new"]
 
 
-class Kind(StrEnum):
-    """What a project begins with."""
-
-    BLOCK = "block"
-    METROLOGY = "metrology"
-    SURVEY = "survey"
-    ROLLING = "rolling"
-    ARCHIVE = "archive"
-    NIGHT = "night"
-    BOARD = "board"
+Kind = Literal["block", "metrology", "survey", "rolling", "archive", "night", "board"]
+"""What a project begins with."""
 
 
 SOURCES = {
-    Kind.BLOCK: EXAMPLE,
-    Kind.METROLOGY: ("flange",),
-    Kind.SURVEY: ("survey",),
-    Kind.ROLLING: ("rolling",),
-    Kind.ARCHIVE: ("archive",),
-    Kind.NIGHT: ("exposures",),
-    Kind.BOARD: ("board",),
+    "block": EXAMPLE,
+    "metrology": ("flange",),
+    "survey": ("survey",),
+    "rolling": ("rolling",),
+    "archive": ("archive",),
+    "night": ("exposures",),
+    "board": ("board",),
 }
 """Packaged examples, directories of photogram.examples."""
 
@@ -55,7 +46,7 @@ def new(
             " shutter. archive: scanned film with fiducial marks. night: exposures of stars. board: corners"
             " of a chessboard in pictures."
         ),
-    ] = Kind.BLOCK,
+    ] = "block",
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a project that is there already.")
     ] = False,

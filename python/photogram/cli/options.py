@@ -3,105 +3,54 @@
 from __future__ import annotations
 
 import os
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 
-from photogram.cli.job import Writes
+from photogram.cli.job import OutputFile
 from photogram.lazy_dataclasses import dataclass
 
-if TYPE_CHECKING:
-    from photogram.io.writing import Content
-    from photogram.results.network import AdjustedNetwork
-
 __all__ = [
-    "KEPT",
+    "AirModel",
     "JsonFile",
     "Ordering",
     "OrderingName",
-    "ParquetFolder",
     "PictureFormat",
-    "PlotFormat",
     "Plots",
     "Quiet",
-    "Snoop",
-    "SnoopLevel",
-    "SnoopRate",
     "Snooping",
     "Strict",
     "Threads",
     "UnitWeight",
-    "UnitWeightOption",
-    "as_data",
+    "WaterModel",
     "default_out",
     "example_out",
     "out_option",
     "pair",
-    "picture_places",
 ]
 
+PictureFormat = Literal["png", "pdf", "svg"]
+UnitWeight = Literal["known", "unknown"]
+OrderingName = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]
+AirModel = Literal["giant", "standard", "none"]
+WaterModel = Literal["giant", "snell", "none"]
 
 JsonFile = Annotated[
-    Path | None,
-    Writes.FILE,
-    typer.Option(metavar="FILE", help="Write the whole result as one JSON document.", show_default=False),
-]
-ParquetFolder = Annotated[
-    Path | None,
-    Writes.DIRECTORY,
-    typer.Option(
-        "--parquet",
-        metavar="DIR",
-        help="Write the whole result as Parquet, which photogram.read_result reads.",
-        show_default=False,
-    ),
+    OutputFile, typer.Option(metavar="FILE", help="Write the whole result as one JSON document.")
 ]
 Plots = Annotated[bool, typer.Option("--plots", help="Draw the pictures too, into --out (needs matplotlib).")]
-
-
-Snoop = Annotated[
-    bool,
-    typer.Option(
-        "--snoop", help="Take gross errors out one after the other, and write what was taken out and why."
-    ),
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="End with exit code 4 also where the verdict is a warning.")
 ]
-SnoopLevel = Annotated[
-    float,
-    typer.Option(
-        min=1e-9,
-        max=0.5,
-        metavar="P",
-        help="With --snoop: chance that any good observation is taken out (Bonferroni).",
-    ),
+Ordering = Annotated[
+    OrderingName,
+    typer.Option(metavar="NAME", help=f"Order of the photographs: {', '.join(get_args(OrderingName))}."),
 ]
-SnoopRate = Annotated[
-    float | None,
-    typer.Option(
-        "--fdr",
-        metavar="P",
-        min=1e-9,
-        max=0.5,
-        help="With --snoop: a false discovery rate in place of --level.",
-        show_default=False,
-    ),
-]
-
-
-class UnitWeight(StrEnum):
-    """What tests of observations rest on."""
-
-    KNOWN = "known"
-    UNKNOWN = "unknown"
-
-
-UnitWeightOption = Annotated[
-    UnitWeight,
-    typer.Option(
-        metavar="known|unknown",
-        help="With --snoop: whether standard deviations are right, or but for a common factor.",
-    ),
+Threads = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Threads; the results do not depend on it. Default: all."),
 ]
 
 
@@ -109,81 +58,44 @@ UnitWeightOption = Annotated[
 class Snooping:
     """Whether and how gross errors are taken out, with the options that say it."""
 
-    snoop: Snoop = False
-    level: SnoopLevel = 0.05
-    fdr: SnoopRate = None
-    unit_weight: UnitWeightOption = UnitWeight.KNOWN
+    snoop: Annotated[
+        bool,
+        typer.Option(
+            "--snoop", help="Take gross errors out one after the other, and write what was taken out and why."
+        ),
+    ] = False
+    level: Annotated[
+        float,
+        typer.Option(
+            min=1e-9,
+            max=0.5,
+            metavar="P",
+            help="With --snoop: chance that any good observation is taken out (Bonferroni).",
+        ),
+    ] = 0.05
+    fdr: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-9, max=0.5, metavar="P", help="With --snoop: a false discovery rate in place of --level."
+        ),
+    ] = None
+    unit_weight: Annotated[
+        UnitWeight,
+        typer.Option(
+            metavar="known|unknown",
+            help="With --snoop: whether standard deviations are right, or but for a common factor.",
+        ),
+    ] = "known"
 
     @property
     def options(self) -> dict[str, Any]:
         """As :func:`photogram.snoop` takes them."""
-        return {"level": self.level, "fdr": self.fdr, "unit_weight": self.unit_weight.value}
-
-
-KEPT = Snooping()
-"""Nothing is taken out."""
-
-
-class PictureFormat(StrEnum):
-    """How pictures are written."""
-
-    PNG = "png"
-    PDF = "pdf"
-    SVG = "svg"
-
-
-PlotFormat = Annotated[PictureFormat, typer.Option(help="Format of the pictures.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-
-Strict = Annotated[
-    bool, typer.Option("--strict", help="End with exit code 4 also where the verdict is a warning.")
-]
-
-
-class OrderingName(StrEnum):
-    """How the photographs are ordered in the normal equations."""
-
-    AUTO = "auto"
-    INPUT = "input"
-    RCM = "rcm"
-    AMD = "amd"
-    DISSECTION = "dissection"
-    GRAPH_DISSECTION = "graph-dissection"
-
-
-Ordering = Annotated[
-    OrderingName,
-    typer.Option(
-        metavar="NAME", help=f"Order of the photographs: {', '.join(each.value for each in OrderingName)}."
-    ),
-]
-Threads = Annotated[
-    int | None,
-    typer.Option(
-        min=1, metavar="N", help="Threads; the results do not depend on it. Default: all.", show_default=False
-    ),
-]
+        return {"level": self.level, "fdr": self.fdr, "unit_weight": self.unit_weight}
 
 
 def out_option(help: str) -> Any:  # noqa: A002  # as typer calls it
     """Return the option `--out DIR`; `help` says what goes there, and what the default is."""
-    return typer.Option("--out", metavar="DIR", help=help, show_default=False)
-
-
-def as_data(result: AdjustedNetwork, folder: Path | None) -> dict[Path, Content]:
-    """Return the files of `--parquet DIR`; none without it."""
-    if folder is None:
-        return {}
-    from photogram.show.methods import files_of
-
-    return {folder / name: content for name, content in files_of(result).items()}
-
-
-def picture_places(name: str, plots: bool, ending: PictureFormat, out: Path | None) -> list[Path]:
-    """Return where a picture goes: to the results, or nowhere."""
-    if plots and out is None:
-        raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
-    return [out / f"{name}.{ending.value}"] if plots and out else []
+    return typer.Option("--out", metavar="DIR", help=help)
 
 
 def example_out(out: Path | None, plots: bool, name: str) -> Path | None:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.markup import escape
 
 from photogram.cli.console import output, print_remark
-from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import Quiet, Strict, example_out, out_option, picture_places
-from photogram.cli.projects import with_options
+from photogram.cli.documents import OfPrograms
+from photogram.cli.job import InputFile, Job, OutputFolder, with_job
+from photogram.cli.options import Quiet, Strict, example_out, out_option
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -24,34 +22,21 @@ EXAMPLE = ("perspective_center", "grid.deck")
 """The packaged example, in photogram.examples."""
 
 
-class Weights(StrEnum):
-    """How the points are weighted."""
-
-    EQUAL = "equal"
-    READINGS = "readings"
-    DEVIATIONS = "deviations"
-
-
 @with_job
-@with_options("documents", Documents, *OF_NETWORKS)
 def perspective_center(
     job: Job,
-    deck: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Argument(metavar="DECK", help="Deck of cards: a text file.", show_default=False),
-    ] = None,
+    *,
+    deck: Annotated[InputFile, typer.Argument(metavar="DECK", help="Deck of cards: a text file.")] = None,
     example: Annotated[
         bool, typer.Option("--example", help="Run the packaged example instead: a grid at two heights.")
     ] = False,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
+        OutputFolder,
         out_option(
             "Directory for report.html, and listing.txt, what the 1969 program printed. Default: no files."
         ),
     ] = None,
-    documents: Documents = NONE_ASKED,
+    documents: OfPrograms,
     as_published: Annotated[
         bool,
         typer.Option(
@@ -61,9 +46,9 @@ def perspective_center(
         ),
     ] = False,
     weights: Annotated[
-        Weights,
+        Literal["equal", "readings", "deviations"],
         typer.Option(help="Of the points: equal, number of readings, or standard deviations of readings."),
-    ] = Weights.EQUAL,
+    ] = "equal",
     together: Annotated[
         bool,
         typer.Option("--together", help="All sets of a job in one solution: one projector, several heights."),
@@ -73,7 +58,6 @@ def perspective_center(
         typer.Option(
             metavar="c,xp,yp",
             help="Principal distance and principal point, or some of them, are unknowns; all sets together.",
-            show_default=False,
         ),
     ] = None,
     strict: Strict = False,
@@ -92,21 +76,18 @@ def perspective_center(
             deck = job.packaged(*EXAMPLE)
             out = example_out(out, documents.plots, "example-resected")
             job.reads(deck)
-        listings = [out / "listing.txt"] if out else []
-        pictures = picture_places("residuals", documents.plots, documents.plot_format, out)
-        place = documents.place(out)
-        job.writes(*listings, *pictures, *([place] if place else []))
+        pictures = documents.announce(job, out, "listing.txt", picture="residuals")
         unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
         run = run_deck(
             deck,
             as_published=as_published,
-            weights=weights.value,
+            weights=weights,
             together=together or bool(unknown),
             unknown=unknown,
         )
         stopped = run.stop is not None
         job.finish(
-            _files(run, documents.json, listings, pictures),
+            _files(run, documents.json, out, pictures),
             documents.page(job, "perspective-center", out, lambda: page_of(run)),
             summary=lambda: _summarize(run),
             code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
@@ -115,17 +96,17 @@ def perspective_center(
             raise run.stop.error
 
 
-def _files(run: Run, json: Path | None, listings: list[Path], pictures: list[Path]) -> dict[Path, bytes]:
+def _files(run: Run, json: Path | None, out: Path | None, pictures: list[Path]) -> dict[Path, bytes]:
     """Make everything that is asked for, before anything is written."""
     made = {}
     if json is not None:
-        from photogram.perspective_center.document import to_json
+        from photogram.perspective_center.report import to_json
 
         made[json] = to_json(run)
-    if listings:
+    if out is not None:
         from photogram.perspective_center.listing import listing
 
-        made |= dict.fromkeys(listings, listing(run).encode())
+        made[out / "listing.txt"] = listing(run).encode()
     if pictures and run.results:
         from photogram.perspective_center.plot import draw
 
@@ -134,7 +115,7 @@ def _files(run: Run, json: Path | None, listings: list[Path], pictures: list[Pat
 
 
 def _summarize(run: Run) -> None:
-    from photogram.perspective_center.summary import summary
+    from photogram.perspective_center.report import summary
 
     for result in run.results:
         for line in summary(result):

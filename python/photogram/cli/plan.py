@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,19 +11,11 @@ import typer
 
 from photogram.cli.check import EXAMPLE as GALVESTON
 from photogram.cli.console import output, print_remark
-from photogram.cli.html import HtmlFile, NoHtml, html_files, html_place
-from photogram.cli.job import Job, Reads, Writes, with_job
-from photogram.cli.options import (
-    JsonFile,
-    PictureFormat,
-    PlotFormat,
-    Plots,
-    Quiet,
-    example_out,
-    out_option,
-    picture_places,
-)
-from photogram.cli.simulation_options import Control, NetworkOptions, takes_network
+from photogram.cli.documents import TEXT, OfPrograms
+from photogram.cli.job import Job, OutputFolder, Reads, with_job
+from photogram.cli.options import Quiet, example_out, out_option
+from photogram.cli.simulation_options import Control, MotionOptions, NetworkOptions
+from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from photogram import Block
@@ -34,10 +25,11 @@ __all__ = ["plan"]
 
 
 @with_job
-@takes_network
 def plan(
     job: Job,
+    *,
     network: NetworkOptions,
+    moves: MotionOptions,
     projects: Annotated[
         list[Path] | None,
         Reads.PROJECT,
@@ -45,7 +37,6 @@ def plan(
             metavar="DIR",
             help="GIANT projects, with fictitious or measured images, to be put side by side instead of"
             " simulated networks.",
-            show_default=False,
         ),
     ] = None,
     packaged: Annotated[
@@ -53,27 +44,17 @@ def plan(
     ] = False,
     against: Annotated[
         Control, typer.Option(help="Where the control points of the second pattern are.")
-    ] = Control.CORNERS,
+    ] = "corners",
     against_spacing: Annotated[
-        int | None,
-        typer.Option(
-            help="As --control-spacing, for the second pattern. Default: the same.", show_default=False
-        ),
+        int | None, typer.Option(help="As --control-spacing, for the second pattern. Default: the same.")
     ] = None,
     against_position_sd: Annotated[
-        float | None,
-        typer.Option(help="As --position-sd, for the second pattern. Default: the same.", show_default=False),
+        float | None, typer.Option(help="As --position-sd, for the second pattern. Default: the same.")
     ] = None,
     out: Annotated[
-        Path | None,
-        Writes.DIRECTORY,
-        out_option("Directory for report.html and report.txt. Default: no files."),
+        OutputFolder, out_option("Directory for report.html and report.txt. Default: no files.")
     ] = None,
-    json: JsonFile = None,
-    html: HtmlFile = None,
-    no_html: NoHtml = False,
-    plots: Plots = False,
-    plot_format: PlotFormat = PictureFormat.PNG,
+    documents: OfPrograms,
     quiet: Quiet = False,
 ) -> None:
     """Predict the accuracy of a network before it is flown: two patterns of control side by side.
@@ -89,14 +70,10 @@ def plan(
             if projects:
                 raise typer.BadParameter("goes without DIR", param_hint="--example")
             projects = [job.packaged(GALVESTON)]
-            out = example_out(out, plots, "example-planned")
-        report = out and out / "report.txt"
-        pictures = picture_places("plan", plots, plot_format, out)
-        place = html_place(html, no_html, out)
-        job.writes(*pictures, *([report] if report else []), *([place] if place else []))
-
+            out = example_out(out, documents.plots, "example-planned")
+        pictures = documents.announce(job, out, TEXT, picture="plan")
         if projects:
-            _check_alone(network, against, against_spacing, against_position_sd)
+            _check_alone(network, moves, against, against_spacing, against_position_sd)
             patterns = _adjusted(projects)
         else:
             second = replace(
@@ -105,21 +82,23 @@ def plan(
                 control_spacing=network.control_spacing if against_spacing is None else against_spacing,
                 position_sd=network.position_sd if against_position_sd is None else against_position_sd,
             )
-            patterns = _simulated(network, second)
+            patterns = _simulated(moves, network, second)
         made = predict(patterns)
-        written = {report: made.report().encode()} if report else {}
-        written |= html_files(job, "plan", place, html is not None, lambda: page_of(made))
+        texts = {} if out is None else {out / TEXT: made.report().encode()}
+        page = documents.page(job, "plan", out, lambda: page_of(made))
         job.finish(
-            {**written, **_documents(made, json, pictures)},
+            {**texts, **page, **documents.as_json(made), **_drawn(made, pictures)},
             summary=lambda: output.print(made.report(), markup=False, end=""),
         )
 
 
-def _simulated(*networks: NetworkOptions) -> dict[str, Block]:
+def _simulated(moves: MotionOptions, *networks: NetworkOptions) -> dict[str, Block]:
     """Simulate networks: their true positions, nothing measured."""
     from photogram.network.simulation import simulate
 
-    patterns = {_name(network): simulate(check_points=0, **network.arguments()).truth for network in networks}
+    patterns = {
+        _name(network): simulate(check_points=0, **network.arguments(moves)).truth for network in networks
+    }
     if len(patterns) < len(networks):
         raise typer.BadParameter(
             f"both patterns are: {next(iter(patterns))}; choose another one", param_hint="--against"
@@ -131,17 +110,20 @@ def _name(network: NetworkOptions) -> str:
     """Name a pattern by what two of them may differ in."""
     spacing = network.control_spacing
     names = {
-        Control.PERIMETER: f"perimeter, {spacing} base{'s' * (spacing != 1)}",
-        Control.CORNERS: "corners",
-        Control.NONE: "no control",
+        "perimeter": f"perimeter, {spacing} base{'s' * (spacing != 1)}",
+        "corners": "corners",
+        "none": "no control",
     }
     weighted = math.isfinite(network.position_sd)
     return names[network.control] + (f", positions {network.position_sd:g} m" if weighted else "")
 
 
-def _check_alone(network: NetworkOptions, against: Control, *others: float | None) -> None:
+def _check_alone(
+    network: NetworkOptions, moves: MotionOptions, against: Control, *others: float | None
+) -> None:
     """Refuse options of simulated networks beside projects, where they would be without effect."""
-    if network != NetworkOptions() or against != Control.CORNERS or any(each is not None for each in others):
+    simulated = network != NetworkOptions() or moves != MotionOptions()
+    if simulated or against != "corners" or any(each is not None for each in others):
         raise typer.BadParameter("a project takes no options of simulated networks", param_hint="DIR")
 
 
@@ -172,10 +154,7 @@ def _names(projects: list[Path]) -> dict[str, Path]:
     return {place.name if short else str(place): given for place, given in zip(places, projects, strict=True)}
 
 
-def _documents(made: Plan, json: Path | None, pictures: list[Path]) -> dict[Path, bytes]:
-    documents = {json: made.to_json()} if json else {}
-    if pictures:
-        from photogram.show.pictures import drawn
+def _drawn(made: Plan, places: list[Path]) -> dict[Path, bytes]:
+    from photogram.show.pictures import drawn
 
-        documents |= {path: drawn(made.plot(), path) for path in pictures}
-    return documents
+    return {path: drawn(made.plot(), path) for path in places}

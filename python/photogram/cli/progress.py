@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
+
+from photogram.cli.job import Job
 
 if TYPE_CHECKING:
     from rich.status import Status
 
     from photogram import Progress
 
-__all__ = ["shown"]
+__all__ = ["adjustment_status", "estimation_status", "shown"]
 
 
-_PHASES = {
-    "form": "normal equations",
-    "solve": "solution",
-    "invert": "standard deviations",
-}
+_PHASES = {"form": "normal equations", "solve": "solution", "invert": "standard deviations"}
 """What the phases of the core are for."""
+
+
+@contextmanager
+def adjustment_status(
+    job: Job, text: str = "adjusting", name: str = "weighted sum of squares", factor: float = 1.0
+) -> Iterator[Callable[[Progress], None] | None]:
+    """Show how an adjustment goes on by the function that is given; see :func:`shown`."""
+    with job.status(text) as status:
+        yield None if status is None else shown(status, name, factor)
+
+
+@contextmanager
+def estimation_status(job: Job) -> Iterator[Callable[[int, object], None]]:
+    """Show how many adjustments the estimation of variance components has taken."""
+    with job.status("variance components") as status:
+
+        def show(number: int, _: object) -> None:
+            if status is not None:
+                status.update(f"variance components, adjustment {number + 1}")
+
+        yield show
 
 
 def shown(status: Status, name: str, factor: float) -> Callable[[Progress], None]:

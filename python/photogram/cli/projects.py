@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from enum import StrEnum
-from functools import wraps
-from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from photogram.cli.job import Job, Reads
-from photogram.cli.photographs import MrkAntenna, PhotosCrs, PhotosFolder
-from photogram.cli.planetary import CubesFile, JigsawSettings
+from photogram.cli.job import InputFile, Job
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted, listed
 
@@ -28,104 +22,28 @@ __all__ = [
     "Additions",
     "Deviations",
     "Example",
+    "MrkAntenna",
+    "OriginName",
+    "PhotosCrs",
     "ProjectPath",
     "described",
     "project_path",
     "read_project",
-    "with_additions",
-    "with_options",
 ]
 
 EXAMPLE = ("project",)
 """The packaged example, a directory of photogram.examples."""
 
-
-class OriginName(StrEnum):
-    """Which place of the first pixel is 0, 0."""
-
-    CORNER = "corner"
-    CENTER = "center"
-
-
-class AngleName(StrEnum):
-    """Units of angles."""
-
-    DEG = "deg"
-    GON = "gon"
-    RAD = "rad"
-
-
+OriginName = Literal["corner", "center"]
+"""Which place of the first pixel is 0, 0."""
 ProjectPath = Annotated[
-    Path | None,
-    Reads.FILE,
+    InputFile,
     typer.Argument(
-        metavar="PATH",
-        help="A project: a folder or file of any format that docs/formats.md lists.",
-        show_default=False,
+        metavar="PATH", help="A project: a folder or file of any format that docs/formats.md lists."
     ),
 ]
 Example = Annotated[
-    bool,
-    typer.Option("--example", help="Take the packaged example instead, that of `photogram new`."),
-]
-FormatName = Annotated[
-    str | None,
-    typer.Option("--format", metavar="NAME", help="Format of PATH. Default: found out.", show_default=False),
-]
-ControlFile = Annotated[
-    Path | None,
-    Reads.FILE,
-    typer.Option("--control", metavar="FILE", help="Table of control and check points.", show_default=False),
-]
-ControlCrs = Annotated[
-    str | None,
-    typer.Option(
-        "--control-crs",
-        metavar="CRS",
-        help="CRS of --control (EPSG:25832 ...), where it is not that of PATH.",
-        show_default=False,
-    ),
-]
-ControlColumns = Annotated[
-    str | None,
-    typer.Option(
-        "--columns",
-        metavar="COLUMN=HEADING,..",
-        help="What the columns of control are: point=Name,x=East,y=-South; -=Heading is not read;"
-        " point,y,x,z or PNEZD without a header.",
-        show_default=False,
-    ),
-]
-ControlRoles = Annotated[
-    str | None,
-    typer.Option(
-        "--roles",
-        metavar="WORD=ROLE,..",
-        help="What words of control mean: KP=check, PP=control, X=off.",
-        show_default=False,
-    ),
-]
-ImagesFile = Annotated[
-    Path | None,
-    Reads.FILE,
-    typer.Option(
-        "--images",
-        metavar="FILE",
-        help="Further measurements: photo, point, column, row.",
-        show_default=False,
-    ),
-]
-NamesFile = Annotated[
-    Path | None,
-    Reads.FILE,
-    typer.Option("--names", metavar="FILE", help="Other names of points: point, name.", show_default=False),
-]
-CamerasFile = Annotated[
-    Path | None,
-    Reads.FILE,
-    typer.Option(
-        "--camera", metavar="FILE", help="Table of cameras, for formats that have none.", show_default=False
-    ),
+    bool, typer.Option("--example", help="Take the packaged example instead, that of `photogram new`.")
 ]
 Deviations = Annotated[
     list[str] | None,
@@ -133,103 +51,101 @@ Deviations = Annotated[
         "--sd",
         metavar="TABLE=S[,S,S]",
         help="Standard deviations where PATH has none: images=0.5, control=0.02,0.02,0.03, gnss=...",
-        show_default=False,
     ),
 ]
-ProjectSettings = Annotated[
-    list[str] | None,
+PhotosCrs = Annotated[
+    str | None,
     typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="What project.toml is to say: film.model=affine, adjust.loss=huber.",
-        show_default=False,
+        "--photos-crs",
+        metavar="CRS",
+        help="System of these, also of heights, where it is not said: EPSG:4326+geoid=46.5.",
     ),
 ]
-PixelOrigin = Annotated[
-    OriginName | None,
-    typer.Option(
-        help="Corner or center of the first pixel is 0, 0, in tables of pixels.", show_default=False
-    ),
-]
-Model = Annotated[
-    int | None,
-    typer.Option(
-        min=0,
-        metavar="N",
-        help="Which of several models of a file, from 0. Default: the largest.",
-        show_default=False,
-    ),
-]
-Angles = Annotated[
-    AngleName | None, typer.Option(help="Unit of angles in files that do not say it.", show_default=False)
-]
-
-
-KeepRepeated = Annotated[
-    bool,
-    typer.Option(
-        "--keep-repeated",
-        help="Second images of a point on a photo count too: their mean with the first.",
-    ),
-]
+MrkAntenna = Annotated[bool, typer.Option("--mrk-antenna", help=".MRK positions are of antennas.")]
 
 
 @dataclass(frozen=True)
 class Additions:
-    """What a user adds to a project, with the options that say it; see :func:`with_additions`."""
+    """What a user adds to a project, with the options that say it."""
 
-    file_format: FormatName = None
-    control: ControlFile = None
-    control_crs: ControlCrs = None
-    columns: ControlColumns = None
-    roles: ControlRoles = None
-    images: ImagesFile = None
-    names: NamesFile = None
-    camera: CamerasFile = None
+    file_format: Annotated[
+        str | None, typer.Option("--format", metavar="NAME", help="Format of PATH. Default: found out.")
+    ] = None
+    control: Annotated[InputFile, typer.Option(metavar="FILE", help="Table of control and check points.")] = (
+        None
+    )
+    control_crs: Annotated[
+        str | None,
+        typer.Option(metavar="CRS", help="CRS of --control (EPSG:25832 ...), where it is not that of PATH."),
+    ] = None
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COLUMN=HEADING,..",
+            help="What the columns of control are: point=Name,x=East,y=-South; -=Heading is not read;"
+            " point,y,x,z or PNEZD without a header.",
+        ),
+    ] = None
+    roles: Annotated[
+        str | None,
+        typer.Option(metavar="WORD=ROLE,..", help="What words of control mean: KP=check, PP=control, X=off."),
+    ] = None
+    images: Annotated[
+        InputFile, typer.Option(metavar="FILE", help="Further measurements: photo, point, column, row.")
+    ] = None
+    names: Annotated[InputFile, typer.Option(metavar="FILE", help="Other names of points: point, name.")] = (
+        None
+    )
+    camera: Annotated[
+        InputFile, typer.Option(metavar="FILE", help="Table of cameras, for formats that have none.")
+    ] = None
     sd: Deviations = None
-    settings: ProjectSettings = None
-    photos_dir: PhotosFolder = None
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="What project.toml is to say: film.model=affine, adjust.loss=huber.",
+        ),
+    ] = None
+    photos_dir: Annotated[
+        InputFile,
+        typer.Option(
+            metavar="DIR",
+            help="Photographs: positions in their files (EXIF, XMP, .MRK, geo.txt) are observations.",
+        ),
+    ] = None
     photos_crs: PhotosCrs = None
     mrk_antenna: MrkAntenna = False
-    pixel_origin: PixelOrigin = None
-    model: Model = None
-    angles: Angles = None
-    keep_repeated: KeepRepeated = False
-    cubes: CubesFile = None
-    jigsaw: JigsawSettings = None
+    pixel_origin: Annotated[
+        OriginName | None,
+        typer.Option(help="Corner or center of the first pixel is 0, 0, in tables of pixels."),
+    ] = None
+    model: Annotated[
+        int | None,
+        typer.Option(
+            min=0, metavar="N", help="Which of several models of a file, from 0. Default: the largest."
+        ),
+    ] = None
+    angles: Annotated[
+        Literal["deg", "gon", "rad"] | None, typer.Option(help="Unit of angles in files that do not say it.")
+    ] = None
+    keep_repeated: Annotated[
+        bool,
+        typer.Option(
+            "--keep-repeated",
+            help="Second images of a point on a photo count too: their mean with the first.",
+        ),
+    ] = False
+    cubes: Annotated[InputFile, typer.Option(metavar="LIST", help="Cubes or ISDs of a control network.")] = (
+        None
+    )
+    jigsaw: Annotated[
+        str | None, typer.Option(metavar="NAME=VALUE ...", help="Settings of jigsaw, in quotes, or a file.")
+    ] = None
 
 
 NOTHING = Additions()
-
-
-def with_additions(*omitted: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the options of :class:`Additions`, but for some, in place of its parameter `added`."""
-    return with_options("added", Additions, *omitted)
-
-
-def with_options(
-    name: str, kind: Callable[..., Any], *omitted: str
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the options of a class, but for some, in place of its parameter of a name."""
-    options = [
-        each for each in signature(kind, eval_str=True).parameters.values() if each.name not in omitted
-    ]
-
-    def decorated(command: Callable[..., None]) -> Callable[..., None]:
-        own = signature(command, eval_str=True)
-        parameters = [
-            each for one in own.parameters.values() for each in (options if one.name == name else [one])
-        ]
-
-        @wraps(command)
-        def with_them(**values: Any) -> None:
-            given = {each.name: values.pop(each.name) for each in options if each.name in values}
-            command(**{name: kind(**given)}, **values)
-
-        with_them.__dict__["__signature__"] = own.replace(parameters=parameters)
-        return with_them
-
-    return decorated
 
 
 def project_path(job: Job, path: Path | None) -> Path:
@@ -248,16 +164,15 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         raise typer.BadParameter("says something of --photos-dir", param_hint="--photos-crs, --mrk-antenna")
     if added.cubes is None and added.jigsaw is not None:
         raise typer.BadParameter("says how the images of --cubes are adjusted", param_hint="--jigsaw")
-    if path.is_dir():
-        job.reads(*(each for each in sorted(path.iterdir()) if each.is_file()))
+    job.reads_inside(path)
     sd = deviations(added.sd or [])
     columns = columns_given(added.columns, added.roles)
-    origin = None if added.pixel_origin is None else added.pixel_origin.value
+    origin = None if added.pixel_origin is None else added.pixel_origin
     wishes = Wishes(
         cameras=added.camera,
         pixel_origin=origin,
         model=added.model,
-        angles=None if added.angles is None else added.angles.value,
+        angles=None if added.angles is None else added.angles,
         sd=sd,
         columns=columns,
         photos=None
@@ -285,7 +200,7 @@ def described(project: Project) -> list[Section]:
     """Return what was read, as titled sections."""
     import numpy as np
 
-    from photogram.formats.motion_summary import motions
+    from photogram.formats.block_contents import motions
     from photogram.formats.plain.writing import known_cameras
     from photogram.formats.self_check import agreement, doubts
     from photogram.network.film_reduction import camera_unit

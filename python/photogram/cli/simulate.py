@@ -12,7 +12,7 @@ from rich.markup import escape
 from photogram.cli.console import output, print_remark
 from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.options import Quiet
-from photogram.cli.simulation_options import NetworkOptions, takes_network
+from photogram.cli.simulation_options import MotionOptions, NetworkOptions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,15 +26,16 @@ __all__ = ["simulate"]
 
 
 @with_job
-@takes_network
 def simulate(
     job: Job,
+    *,
     out: Annotated[
         Path,
         Writes.DIRECTORY,
         typer.Argument(metavar="DIR", help="Directory for the project; it is made if need be."),
     ],
     network: NetworkOptions,
+    moves: MotionOptions,
     check_points: Annotated[int, typer.Option(help="Points with known positions that are not held.")] = 20,
     blunders: Annotated[int, typer.Option(help="Image points with a gross error.")] = 0,
     blunder_size: Annotated[float, typer.Option(help="Size of the gross errors, mm.")] = 0.2,
@@ -63,7 +64,7 @@ def simulate(
             check_points=check_points,
             blunders=blunders,
             blunder_size=blunder_size,
-            **network.arguments(),
+            **network.arguments(moves),
         )
         block = simulation.block
         remarks: Sequence[Message] = ()

@@ -1,41 +1,26 @@
-"""The options that describe a simulated network, for every command that simulates one."""
+"""The options that describe a simulated network, and how its cameras move, for commands that simulate one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from enum import StrEnum
-from functools import wraps
-from inspect import Parameter, signature
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photogram.cli.refraction import AirModel, WaterModel
-from photogram.cli.simulated_motion import MotionOptions
+from photogram.cli.options import AirModel, WaterModel
 from photogram.lazy_dataclasses import dataclass, fields
 
-__all__ = ["Control", "Ellipsoid", "NetworkOptions", "takes_network"]
+if TYPE_CHECKING:
+    from photogram.network.simulated_motion import LineScanner, RollingShutter
 
+__all__ = ["Control", "MotionOptions", "NetworkOptions"]
 
-class Control(StrEnum):
-    """Where the control of a simulated block is."""
-
-    PERIMETER = "perimeter"
-    CORNERS = "corners"
-    NONE = "none"
-
-
-class Ellipsoid(StrEnum):
-    """The spheroid of a simulated block."""
-
-    NONE = "none"
-    CLARKE_1866 = "clarke1866"
-    WGS84 = "wgs84"
+Control = Literal["perimeter", "corners", "none"]
+"""Where the control of a simulated block is."""
 
 
 @dataclass(frozen=True)
-class NetworkOptions(MotionOptions):
+class NetworkOptions:
     """The network of a simulated block: names and defaults are those of :func:`photogram.simulate`."""
 
     strips: Annotated[int, typer.Option(help="Number of strips.")] = 4
@@ -57,7 +42,7 @@ class NetworkOptions(MotionOptions):
     )
     crab: Annotated[float, typer.Option(help="Largest deviation of kappa from the heading, rad.")] = 0.03
     tilt: Annotated[float, typer.Option(help="Largest omega and phi, rad.")] = 0.01
-    control: Annotated[Control, typer.Option(help="Where the control points are.")] = Control.PERIMETER
+    control: Annotated[Control, typer.Option(help="Where the control points are.")] = "perimeter"
     control_spacing: Annotated[int, typer.Option(help="Distance of perimeter control, in bases.")] = 4
     control_sd: Annotated[float, typer.Option(help="Standard deviation of control, m.")] = 0.05
     image_sd: Annotated[float, typer.Option(help="Standard deviation of image coordinates, mm.")] = 0.010
@@ -68,8 +53,7 @@ class NetworkOptions(MotionOptions):
         ),
     ] = math.inf
     attitude_sd: Annotated[
-        float,
-        typer.Option(help="Of observed attitudes, standard deviation, rad; inf: none are observed."),
+        float, typer.Option(help="Of observed attitudes, standard deviation, rad; inf: none are observed.")
     ] = math.inf
     position_error: Annotated[
         float,
@@ -80,8 +64,9 @@ class NetworkOptions(MotionOptions):
     ] = 30.0
     attitude_error: Annotated[float, typer.Option(help="The same of the initial attitudes, rad.")] = 0.01
     spheroid: Annotated[
-        Ellipsoid, typer.Option(help="Geographic space on this spheroid; none: rectangular.")
-    ] = Ellipsoid.NONE
+        Literal["none", "clarke1866", "wgs84"],
+        typer.Option(help="Geographic space on this spheroid; none: rectangular."),
+    ] = "none"
     origin: Annotated[
         tuple[float, float, float],
         typer.Option(
@@ -89,70 +74,129 @@ class NetworkOptions(MotionOptions):
         ),
     ] = (0.0, 0.0, 0.0)
     photo_to_ground: Annotated[
-        bool,
-        typer.Option("--photo-to-ground", help="Photo-to-ground angles instead of ground-to-photo."),
+        bool, typer.Option("--photo-to-ground", help="Photo-to-ground angles instead of ground-to-photo.")
     ] = False
     air_refraction: Annotated[
-        AirModel | None,
-        typer.Option(help="What bends the rays in air. Default: nothing.", show_default=False),
+        AirModel | None, typer.Option(help="What bends the rays in air. Default: nothing.")
     ] = None
     water_refraction: Annotated[
-        WaterModel | None,
-        typer.Option(help="What bends the rays in water. Default: nothing.", show_default=False),
+        WaterModel | None, typer.Option(help="What bends the rays in water. Default: nothing.")
     ] = None
     water_level: Annotated[float, typer.Option(help="Height of the water, m.")] = 0.0
     water_index: Annotated[float, typer.Option(min=1, help="Refractive index of the water.")] = 1.340
     seed: Annotated[int, typer.Option(min=0, help="Equal seeds give equal blocks.")] = 0
 
-    def arguments(self) -> dict[str, Any]:
-        """Return the arguments of :func:`photogram.simulate`."""
+    def arguments(self, moves: MotionOptions) -> dict[str, Any]:
+        """Return the arguments of :func:`photogram.simulate`, of a network that moves so."""
         from photogram.network.geometry import Spheroid
         from photogram.network.refraction import Refraction
 
         arguments: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
-        arguments["control"] = self.control.value
-        spheroids = {Ellipsoid.CLARKE_1866: Spheroid.clarke_1866, Ellipsoid.WGS84: Spheroid.wgs84}
+        spheroids = {"clarke1866": Spheroid.clarke_1866, "wgs84": Spheroid.wgs84}
         arguments["spheroid"] = spheroids[self.spheroid]() if self.spheroid in spheroids else None
         if arguments["spheroid"]:
             longitude, latitude, height = self.origin
             arguments["origin"] = (math.radians(longitude), math.radians(latitude), height)
         asked = arguments.pop("air_refraction"), arguments.pop("water_refraction")
-        air, water = (None if model in (None, "none") else model.value for model in asked)
+        air, water = (None if model == "none" else model for model in asked)
         level, index = arguments.pop("water_level"), arguments.pop("water_index")
-        for each in fields(MotionOptions):
-            del arguments[each.name]
-        if moving := self.motion():
+        if moving := moves.motion():
             arguments["motion"] = moving
         if air or water:
             arguments["refraction"] = Refraction(air, water, level, index)
         return arguments
 
 
-def takes_network(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of a network in the place of its parameter `network`.
+@dataclass(frozen=True)
+class MotionOptions:
+    """What moves: names and defaults are those of :class:`RollingShutter` and :class:`LineScanner`."""
 
-    typer reads the signature of a command: each field of :class:`NetworkOptions` becomes a parameter, and the
-    command gets them as one value.
-    """
-    hints = get_type_hints(NetworkOptions, include_extras=True)
-    # What moves stands below the rest.
-    moving = {field.name for field in fields(MotionOptions)}
-    options = [
-        Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name])
-        for field in sorted(fields(NetworkOptions), key=lambda field: field.name in moving)
-    ]
-    own = [
-        parameter.replace(kind=Parameter.KEYWORD_ONLY)
-        for parameter in signature(command, eval_str=True).parameters.values()
-    ]
-    place = [parameter.name for parameter in own].index("network")
+    readout: Annotated[
+        float | None,
+        typer.Option(
+            help="A rolling shutter: seconds from its first row to its last. Default: all stand still."
+        ),
+    ] = None
+    readout_sd: Annotated[
+        float | None,
+        typer.Option(help="How well the readout time is known, s; 0: it is known. Default: not at all."),
+    ] = None
+    readout_direction: Annotated[
+        Literal["down", "up", "right", "left"] | None,
+        typer.Option(
+            help="Where to: right and left along the strips, down and up across them. Default: down."
+        ),
+    ] = None
+    speed: Annotated[
+        float | None, typer.Option(help="Of the flight, m/s. Default: 9 with --readout, 70 with --scanner.")
+    ] = None
+    speed_sd: Annotated[
+        float | None,
+        typer.Option(
+            help="Of observed velocities of photographs, m/s; inf: none are observed. Default: 0.05."
+        ),
+    ] = None
+    rate: Annotated[
+        float | None, typer.Option(help="Of turns of photographs, standard deviation, rad/s. Default: 0.1.")
+    ] = None
+    rate_sd: Annotated[
+        float | None,
+        typer.Option(help="Of observed rates of photographs, rad/s; inf: none are observed. Default: 0.02."),
+    ] = None
+    scanner: Annotated[
+        int | None,
+        typer.Option(
+            help="A line scanner in the place of frames, with 1, 2 or 3 lines of sensors.", min=1, max=3
+        ),
+    ] = None
+    view_angle: Annotated[
+        float | None, typer.Option(help="How far its lines look ahead and back, rad. Default: 0.35.")
+    ] = None
+    pitch: Annotated[float | None, typer.Option(help="From sample to sample, mm. Default: 0.01.")] = None
+    every: Annotated[
+        float | None,
+        typer.Option(
+            help="From record to record of trajectories, and of GNSS and inertial unit with --position-sd and"
+            " --attitude-sd, s. Default: 1."
+        ),
+    ] = None
+    knots: Annotated[
+        float | None, typer.Option(help="From knot to knot of the errors of trajectories, s. Default: 4.")
+    ] = None
+    scenes: Annotated[
+        bool, typer.Option("--scenes", help="Scenes as long as frames instead of whole strips.")
+    ] = False
 
-    @wraps(command)
-    def with_options(**values: Any) -> None:
-        network = NetworkOptions(**{option.name: values.pop(option.name) for option in options})
-        command(network=network, **values)
+    def motion(self) -> RollingShutter | LineScanner | None:
+        """Return what these options say of motion; None: nothing."""
+        given = {each.name: getattr(self, each.name) for each in fields(self)}
+        given = {name: value for name, value in given.items() if value is not None and value is not False}
+        if not given:
+            return None
+        if ("readout" in given) == ("scanner" in given):
+            raise typer.BadParameter(
+                "motion is that of a shutter, --readout, or of a scanner, --scanner", param_hint=_hint(given)
+            )
+        from photogram.network.simulated_motion import LineScanner, RollingShutter
+        from photogram.network.trajectories import Spline
 
-    parameters = [*own[:place], *options, *own[place + 1 :]]
-    with_options.__dict__["__signature__"] = signature(command).replace(parameters=parameters)
-    with_options.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return with_options
+        rolling = "readout" in given
+        strange = given.keys() & (_OF_SCANNERS if rolling else _OF_SHUTTERS)
+        if strange:
+            raise typer.BadParameter(
+                f"says nothing of a {'shutter' if rolling else 'scanner'}", param_hint=_hint(strange)
+            )
+        if rolling:
+            direction = given.pop("readout_direction", "down")
+            return RollingShutter(direction=direction, **given)
+        if "knots" in given:
+            given["position"] = given["rotation"] = Spline(every=given.pop("knots"))
+        return LineScanner(lines=given.pop("scanner"), **given)
+
+
+_OF_SHUTTERS = {"readout_sd", "readout_direction", "speed_sd", "rate", "rate_sd"}
+_OF_SCANNERS = {"view_angle", "pitch", "every", "knots", "scenes"}
+
+
+def _hint(names: set[str] | dict[str, Any]) -> str:
+    return ", ".join(f"--{name.replace('_', '-')}" for name in sorted(names))

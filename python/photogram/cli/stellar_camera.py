@@ -6,15 +6,14 @@ from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from photogram.cli.console import output, print_sections, print_withheld
-from photogram.cli.documents import NONE_ASKED, OF_NETWORKS, Documents
-from photogram.cli.job import Job, Reads, Writes, with_job
+from photogram.cli.documents import OfPrograms
+from photogram.cli.job import InputFile, Job, OutputFolder, Writes, with_job
 from photogram.cli.options import Quiet, Strict, Threads, out_option
-from photogram.cli.projects import with_options
 
 if TYPE_CHECKING:
     from photogram.stellar.night_calibration import CalibratedNight
@@ -24,21 +23,13 @@ if TYPE_CHECKING:
 __all__ = ["exposures", "places", "stellar_camera"]
 
 Out = Annotated[
-    Path | None,
-    Writes.DIRECTORY,
+    OutputFolder,
     out_option("Directory for report.html, listing, camera and pictures. Default: INPUT-calibrated, here."),
 ]
 
 
-class Lens(StrEnum):
-    """Lenses of digital cameras; `photogram.stellar.lenses` has them."""
-
-    AUTO = "auto"
-    BROWN = "brown"
-    EQUIDISTANT = "equidistant"
-    EQUISOLID = "equisolid"
-    STEREOGRAPHIC = "stereographic"
-    KANNALA_BRANDT = "kannala_brandt"
+Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "kannala_brandt"]
+"""Lenses of digital cameras; `photogram.stellar.lenses` has them."""
 
 
 class Effect(StrEnum):
@@ -51,24 +42,19 @@ class Effect(StrEnum):
 
 
 @with_job
-@with_options("documents", Documents, *OF_NETWORKS)
 def stellar_camera(
     job: Job,
+    *,
     deck: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Argument(
-            metavar="DECK",
-            help="Card deck, or a calibration in plain form (a .toml file).",
-            show_default=False,
-        ),
+        InputFile,
+        typer.Argument(metavar="DECK", help="Card deck, or a calibration in plain form (a .toml file)."),
     ] = None,
     example: Annotated[
         bool,
         typer.Option("--example", help="Calibrate the packaged example instead: 75 stars in three groups."),
     ] = False,
     out: Out = None,
-    documents: Documents = NONE_ASKED,
+    documents: OfPrograms,
     as_published: Annotated[
         bool, typer.Option("--as-published", help="Iterate with the report's partials and stop rules.")
     ] = False,
@@ -92,7 +78,7 @@ def stellar_camera(
             deck = job.packaged("stellar") / "plate.toml"
         problems, inputs = _read(deck)
         job.reads(*inputs)
-        pictures = documents.plot_format.value if documents.plots else ""
+        pictures = documents.plot_format if documents.plots else ""
         target = out or Path(f"{deck.stem}-calibrated")
         documents.place(target)  # refused before anything is computed
         written: dict[Path, bytes] = {}
@@ -119,16 +105,14 @@ def stellar_camera(
 
 
 @with_job
-@with_options("documents", Documents, *OF_NETWORKS)
 def exposures(
     job: Job,
+    *,
     night: Annotated[
-        Path | None,
-        Reads.FILE,
+        InputFile,
         typer.Argument(
             metavar="FILE",
             help="TOML file that names station, camera, times, rough attitudes and the table of star images.",
-            show_default=False,
         ),
     ] = None,
     example: Annotated[
@@ -144,15 +128,11 @@ def exposures(
         typer.Option(
             "--common-scale/--two-scales",
             help="One principal distance (fx = fy), or two. Default: what the file says.",
-            show_default=False,
         ),
     ] = None,
     without: Annotated[
         list[Effect] | None,
-        typer.Option(
-            help="Leave an effect out of the places of the stars; may be said more than once.",
-            show_default=False,
-        ),
+        typer.Option(help="Leave an effect out of the places of the stars; may be said more than once."),
     ] = None,
     any_roll: Annotated[
         bool, typer.Option("--any-roll", help="The rolls that are given are not to be relied on.")
@@ -163,11 +143,10 @@ def exposures(
             metavar="LEAST MOST",
             help="Neither attitudes nor field of view are known: the smallest and largest horizontal field of"
             " view, degrees (needs tetra3rs).",
-            show_default=False,
         ),
     ] = None,
     out: Out = None,
-    documents: Documents = NONE_ASKED,
+    documents: OfPrograms,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -177,14 +156,13 @@ def exposures(
         from photogram.errors import InputError
         from photogram.show.methods import page_of
         from photogram.stellar.night_calibration import calibrate_night
-        from photogram.stellar.night_document import to_json
         from photogram.stellar.night_file import inputs, read_night
-        from photogram.stellar.night_report import summary
+        from photogram.stellar.night_report import summary, to_json
 
         if night is None:
             night = job.packaged("exposures") / "night.toml"
         job.reads(*inputs(night))
-        pictures = documents.plot_format.value if documents.plots else ""
+        pictures = documents.plot_format if documents.plots else ""
         said = _said(lens, common_scale, without or [], any_roll, blind)
         try:
             result = calibrate_night(read_night(night, said), threads)
@@ -215,12 +193,10 @@ def places(
         typer.Option(metavar="TIME", help="UTC, such as 1966-03-01T21:03:05; before 1960 universal time."),
     ],
     catalogue: Annotated[
-        Path | None,
-        Reads.FILE,
+        InputFile,
         typer.Option(
             metavar="FILE",
             help="Stars as exposures take them (id, ra_deg, dec_deg, pm_ra_mas ...). Default: Hipparcos.",
-            show_default=False,
         ),
     ] = None,
     epoch: Annotated[
@@ -260,9 +236,9 @@ def _said(
 ) -> dict[str, dict[str, Any]]:
     """Return what options say, by the tables and keys of the file."""
     said: dict[str, dict[str, Any]] = {
-        "camera": {"lens": lens and lens.value, "common_scale": common_scale},
+        "camera": {"lens": lens, "common_scale": common_scale},
         "matching": {"roll_known": False if any_roll else None, "blind_field_deg": blind},
-        "places": {effect.name.lower(): False for effect in without},
+        "places": {effect.replace("-", "_"): False for effect in without},
     }
     return {
         table: {key: value for key, value in values.items() if value is not None}

@@ -4,33 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
-from photogram.cli.job import Job, Reads
+from photogram.cli.job import InputFile, Job
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
-    from photogram.targets.appraisal_report import WorthOptions
+    from photogram.targets.calibration_result import WorthOptions
     from photogram.targets.cross_validation import Into
 
-__all__ = ["AS_USUAL", "NOT_GOOD_ENOUGH", "Uncertainty", "distances_of"]
+__all__ = ["NOT_GOOD_ENOUGH", "Uncertainty", "distances_of"]
 
 NOT_GOOD_ENOUGH = 4
 """Exit code, as of results that should not be used."""
 
 
-class DatumName(StrEnum):
-    """What holds still while a calibration is uncertain."""
-
-    CORNERS = "corners"
-    MEAN_FRAMES = "mean-frames"
-    IMAGE = "image"
-    AXES = "axes"
+DatumName = Literal["corners", "mean-frames", "image", "axes"]
+"""What holds still while a calibration is uncertain."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +37,11 @@ class Uncertainty:
             "--distance",
             metavar="D,D,..",
             help="Distances of maps of uncertainty, 1,inf. Default: infinity, and the boards' median.",
-            show_default=False,
         ),
     ] = None
     map_datum: Annotated[
         DatumName, typer.Option("--datum", help="What holds still in them (docs/targets.md).")
-    ] = DatumName.CORNERS
+    ] = "corners"
     noise_only: Annotated[
         bool, typer.Option("--noise-only", help="Errors of corners alone, not of priors, as mrcal has it.")
     ] = False
@@ -58,7 +51,6 @@ class Uncertainty:
             min=0.0,
             metavar="PX",
             help="End with exit code 4 where a map is above it within the area where the board was seen.",
-            show_default=False,
         ),
     ] = None
     cross_validate: Annotated[
@@ -68,11 +60,7 @@ class Uncertainty:
         ),
     ] = "odd"
     compare_with: Annotated[
-        Path | None,
-        Reads.FILE,
-        typer.Option(
-            "--compare", metavar="PATH", help="Another calibration, to be compared.", show_default=False
-        ),
+        InputFile, typer.Option("--compare", metavar="PATH", help="Another calibration, to be compared.")
     ] = None
     suggest: Annotated[
         int, typer.Option(min=0, metavar="K", help="Find the K views that would help most.")
@@ -80,11 +68,11 @@ class Uncertainty:
 
     def asked(self) -> WorthOptions:
         """Return what is asked of a calibration."""
-        from photogram.targets.appraisal_report import WorthOptions
+        from photogram.targets.calibration_result import WorthOptions
 
         return WorthOptions(
             distances=self.distances,
-            datum=self.map_datum.value,
+            datum=self.map_datum,
             noise_only=self.noise_only,
             cross_validate=self._split(),
             suggest=self.suggest,
@@ -118,8 +106,8 @@ class Uncertainty:
             Reads and adjusts another one, with the options of this.
         """
         from photogram.targets.appraisal import appraise
-        from photogram.targets.differences import difference
         from photogram.targets.findings import judged
+        from photogram.targets.uncertainty import difference
 
         with job.status("uncertainty") as status:
             own = appraise(found, self.asked(), None if status is None else status.update)
@@ -150,7 +138,3 @@ def distances_of(text: str | None, option: str) -> list[float]:
     if not all(each > 0 for each in found):
         raise typer.BadParameter(f"is a list of distances, 1,inf, not {text}", param_hint=option)
     return found
-
-
-AS_USUAL = Uncertainty()
-"""Maps at infinity and where boards were, and cross-validation."""

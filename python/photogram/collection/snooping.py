@@ -26,7 +26,7 @@ from photogram.network.subset import image_rows
 from photogram.results.exchanged_names import exchanged_names
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooping_result import Snooped
-from photogram.statistics.snooping.factors import MEDIAN_OF_TWO
+from photogram.statistics.snooping.robust_start import MEDIAN_OF_TWO
 from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 

@@ -8,11 +8,10 @@ calibration.correction.apply(xy_um)
 from photogram.arguments.annotations import check_arguments
 from photogram.comparator.calibration import Calibration, CaseResult, PlateResult, Pointing, calibrate
 from photogram.comparator.cards import read_cards, to_cards
-from photogram.comparator.correction import Correction
-from photogram.comparator.decomposition import Decomposition
+from photogram.comparator.correction import Correction, Identity
 from photogram.comparator.document import to_json
+from photogram.comparator.fits import Decomposition
 from photogram.comparator.grid import Grid, built_in_grid, find_grid, read_grid
-from photogram.comparator.identity import Identity
 from photogram.comparator.listing import listing
 from photogram.comparator.measurements import read, read_csv, to_csv
 from photogram.comparator.options import Options
@@ -80,5 +79,5 @@ check_arguments(
     },
 )
 
-WAYS = {"findings_of": ("findings",), "page_of": ("page",)}
+WAYS = {"findings_of": ("tables",), "page_of": ("page",)}
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""

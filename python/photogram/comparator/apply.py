@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.comparator.correction import Correction
+from photogram.comparator.csvfile import Table
 from photogram.comparator.readings import LARGEST_UM
 from photogram.errors import InputError
 from photogram.io.rows import cells
 from photogram.messages import Message, counted
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.correction import Correction
-    from photogram.comparator.csvfile import Table
 
 __all__ = ["correct_table"]
 
@@ -31,28 +28,13 @@ ROUNDING = 1e-6
 def correct_table(
     correction: Correction, table: Table, *, invert: bool = False, extrapolate: bool = False
 ) -> tuple[bytes, list[Message]]:
-    """Return a table with corrected coordinates and their standard deviations behind its columns.
+    """Return a table with corrected coordinates and their standard deviations added, and remarks.
 
     The standard deviations are what the calibration contributes; those of the readings come on top. The
-    column `in_range` says whether the calibration measured there.
+    column `in_range` says whether the calibration measured there. With `invert` coordinates are corrected
+    ones, and readings are added; `extrapolate` corrects points far outside the calibrated range, too.
 
-    Parameters
-    ----------
-    correction
-        The correction.
-    table
-        Its coordinates are readings; with `invert` they are corrected coordinates, and readings are added.
-    extrapolate
-        Correct points far outside the calibrated range, too.
-
-    Returns
-    -------
-    The table, and remarks on points outside the calibrated range.
-
-    Raises
-    ------
-    InputError
-        A row without coordinates, or no row; points far outside the calibrated range.
+    Raises InputError: a row without coordinates, or no row; points far outside the calibrated range.
     """
     places = []
     for row in table.records.rows():

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.affine import AffineFit, fit_affine
-from photogram.comparator.averages import PlateAverages, average_residuals
+from photogram.comparator.averages import (
+    ListedGridSigma,
+    PlateAverages,
+    average_residuals,
+    listed_grid_sigma,
+    text_grid_sigma,
+    unbiased_grid_sigma,
+)
 from photogram.comparator.case import PlacedCase, place_case
 from photogram.comparator.closeout import Closeout, close_out
 from photogram.comparator.combined_solution import (
@@ -20,37 +25,34 @@ from photogram.comparator.combined_solution import (
     combine_polynomial,
     single_polynomial,
 )
-from photogram.comparator.correction import Correction
-from photogram.comparator.gridsigma import (
-    ListedGridSigma,
-    listed_grid_sigma,
-    text_grid_sigma,
-    unbiased_grid_sigma,
-)
-from photogram.comparator.identity import Identity
+from photogram.comparator.correction import Correction, Identity
+from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_affine, fit_rigid
 from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
 from photogram.comparator.options import Options
-from photogram.comparator.outliers import FarPointing, Screening, far_pointings, screen
+from photogram.comparator.outliers import (
+    FarPointing,
+    Screening,
+    far_pointings,
+    plate_remarks,
+    problems,
+    screen,
+)
 from photogram.comparator.pointing import Precision, pool_points
-from photogram.comparator.remarks import plate_remarks, problems
-from photogram.comparator.residuals import Residuals
-from photogram.comparator.rigid import RigidFit, fit_rigid
-from photogram.comparator.significance import (
+from photogram.comparator.readings import Session
+from photogram.comparator.variance import (
     CaseVarianceTest,
     PolynomialTest,
+    VarianceAnalysis,
+    analyse_variance,
     compare_case_variances,
     polynomial_tests,
 )
-from photogram.comparator.variance import VarianceAnalysis, analyse_variance
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
 from photogram.messages import Message
 from photogram.show.methods import Judged, Paged
 from photogram.show.summary import Brief
-
-if TYPE_CHECKING:
-    from photogram.comparator.readings import Session
 
 __all__ = ["Calibration", "CaseResult", "PlateResult", "Pointing", "calibrate", "needed_memory"]
 

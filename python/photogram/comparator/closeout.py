@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.comparator.readings import Case
 from photogram.lazy_dataclasses import dataclass
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.readings import Case
-    from photogram.messages import Message
+from photogram.messages import Message
 
 __all__ = ["Closeout", "close_out"]
 
@@ -27,17 +23,7 @@ ENOUGH = 3
 
 @dataclass(frozen=True, eq=False)
 class Closeout:
-    """Returns to a point that was measured before.
-
-    Attributes
-    ----------
-    point
-        Its number.
-    counts
-        Pointings of each visit.
-    means_um
-        (visits, 2) their means.
-    """
+    """Returns to a point: how many pointings each visit has, and their means (visits, 2)."""
 
     point: int
     counts: tuple[int, ...]
@@ -70,15 +56,13 @@ class Closeout:
 def close_out(case: Case) -> tuple[list[Closeout], list[Message]]:
     """Check the returns to the first point of a case and, where it was visited again, to the second.
 
+    Raises InputError: the case is not closed and has no more than nine pointings: "INSUFFICIENT MEASUREMENTS
+    MADE".
+
     Returns
     -------
     closeouts, messages
         That of the first point always; the rules of the report as remarks.
-
-    Raises
-    ------
-    InputError
-        The case is not closed and has no more than nine pointings: "INSUFFICIENT MEASUREMENTS MADE".
     """
     first, *others = dict.fromkeys(case.points.tolist())
     closeouts = [_visits(case, first)]

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.affine import AffineFit
+from photogram.arguments.types import Floats
+from photogram.comparator.case import PlacedCase
 from photogram.comparator.correction import Correction
-from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_rigid, rotation_matrix
 from photogram.comparator.polynomial import COUNT, Polynomial, fit_polynomial
-from photogram.comparator.residuals import Residuals
-from photogram.comparator.rigid import RigidFit, fit_rigid
 from photogram.lazy_dataclasses import dataclass, replace
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.case import PlacedCase
 
 __all__ = ["CombinedLinear", "CombinedPolynomial", "SinglePolynomial", "combine_linear", "combine_polynomial"]
 
@@ -48,15 +42,7 @@ class CombinedLinear:
 
 @dataclass(frozen=True, eq=False)
 class SinglePolynomial:
-    """The polynomials of one case.
-
-    Attributes
-    ----------
-    polynomial
-        The polynomials.
-    residuals
-        What they leave of the residuals of the linear adjustment, in both systems.
-    """
+    """The polynomials of one case, and what they leave of the residuals of its linear adjustment."""
 
     polynomial: Polynomial
     residuals: Residuals
@@ -146,17 +132,8 @@ def _refit(
 def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_listed: bool = False) -> SinglePolynomial:
     """Fit polynomials to the residuals of the linear adjustment of one case (equations 59 to 61).
 
-    Parameters
-    ----------
-    case, fit
-        The case and its linear adjustment.
-    as_listed
-        Turn the residuals into the grid system without the change of sign that they have everywhere else.
-
-    Raises
-    ------
-    AdjustmentError
-        Too few points, or too few different coordinates.
+    `as_listed` turns the residuals into the grid system without the change of sign that they have everywhere
+    else. Raises AdjustmentError: too few points, or too few different coordinates.
     """
     parameters = fit.parameters
     linear = case.means_um @ parameters.linear_matrix.T
@@ -175,10 +152,7 @@ def combine_polynomial(
 ) -> CombinedPolynomial:
     """Fit one pair of polynomials to the residuals that the combined linear parameters leave in all cases.
 
-    Raises
-    ------
-    AdjustmentError
-        Too few points, or too few different coordinates.
+    Raises AdjustmentError: too few points, or too few different coordinates.
     """
     places = np.vstack([fit.residuals.xy_um for fit in linear.cases])
     residuals = np.vstack([fit.residuals.comparator_um for fit in linear.cases])

@@ -31,10 +31,7 @@ class Setting:
     def integer(self) -> int:
         """Return the whole number that it sets.
 
-        Raises
-        ------
-        InputError
-            It is none.
+        Raises InputError: it is none.
         """
         try:
             return whole_number(self.text)
@@ -57,10 +54,7 @@ class Setting:
     def switch(self) -> bool:
         """Return the yes or no that it sets.
 
-        Raises
-        ------
-        InputError
-            It is neither.
+        Raises InputError: it is neither.
         """
         if self.text.lower() not in ("yes", "no"):
             raise self.place.error(f"{self.key} = {quoted(self.text)} is neither yes nor no")
@@ -92,10 +86,7 @@ class Table:
     def coordinates_um(self, row: Row) -> tuple[float, float] | None:
         """Return x and y of a row in micrometres; None where both are blank.
 
-        Raises
-        ------
-        InputError
-            One of them is blank, or no number.
+        Raises InputError: one of them is blank, or no number.
         """
         x, y = row.number(f"x_{self.unit}"), row.number(f"y_{self.unit}")
         if x is None and y is None:
@@ -109,6 +100,9 @@ class Table:
 def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -> Table:
     """Read a table with coordinates in micrometres or millimetres.
 
+    Raises InputError: the file cannot be read, has no names of columns, lacks one, or mixes units; a key that
+    nothing reads, or one that is there twice.
+
     Parameters
     ----------
     path
@@ -117,12 +111,6 @@ def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -
         Columns that it must have besides coordinates.
     keys
         What `# key = value` lines may set besides `note`; None where nothing depends on them.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, has no names of columns, lacks one, or mixes units; a key that nothing
-        reads, or one that is there twice.
     """
     records = rows.Table.read(path, comment="#", spelling=str.lower)
     records.require(*columns)

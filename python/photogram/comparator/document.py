@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from photogram import _photocore
+from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
+from photogram.comparator.closeout import Closeout
+from photogram.comparator.correction import Correction
+from photogram.comparator.fits import Decomposition, Residuals, RigidFit
+from photogram.comparator.joint import JointFit
+from photogram.comparator.pointing import Precision
 from photogram.comparator.tables import precisions, terms
 from photogram.io import json
 from photogram.show.quantity import Quantity, of_each, records
-
-if TYPE_CHECKING:
-    from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
-    from photogram.comparator.closeout import Closeout
-    from photogram.comparator.correction import Correction
-    from photogram.comparator.decomposition import Decomposition
-    from photogram.comparator.joint import JointFit
-    from photogram.comparator.pointing import Precision
-    from photogram.comparator.residuals import Residuals
-    from photogram.comparator.rigid import RigidFit
 
 __all__ = ["to_json"]
 

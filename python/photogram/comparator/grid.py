@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.annotations import path
+from photogram.arguments.types import Floats, Indices
 from photogram.comparator.csvfile import read_table
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number, whole_number
@@ -17,9 +18,8 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    pass
 
-    from photogram.arguments.types import Floats
 
 __all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
 
@@ -55,7 +55,7 @@ class Grid(Brief):
     """
 
     number: int
-    points: NDArray[np.int64]
+    points: Indices
     xy_um: Floats
     sigma_um: float | None = None
     adopted: str = ""
@@ -101,10 +101,10 @@ class Grid(Brief):
         growth = 1.0 + self.expansion_per_k * (temperature_c - self.temperature_c)
         return replace(self, xy_um=self.xy_um * growth, temperature_c=temperature_c)
 
-    def rows_of(self, points: NDArray[np.int64]) -> NDArray[np.int64]:
+    def rows_of(self, points: Indices) -> Indices:
         """Return the rows of points, which must all be on the plate."""
         order = np.argsort(self.points)
-        rows: NDArray[np.int64] = order[np.searchsorted(self.points, points, sorter=order)]
+        rows: Indices = order[np.searchsorted(self.points, points, sorter=order)]
         return rows
 
     def to_csv(self) -> bytes:
@@ -187,12 +187,9 @@ def find_grid(name: str) -> Grid:
     """
     file = path("name", name)
     if is_whole_number(name) and not file.exists():
-        return built_in_grid(_plate_number(name))
+        try:
+            number = whole_number(name)
+        except ValueError as error:
+            raise InputError(f"grid {error}") from None
+        return built_in_grid(number)
     return read_grid(file)
-
-
-def _plate_number(name: str) -> int:
-    try:
-        return whole_number(name)
-    except ValueError as error:
-        raise InputError(f"grid {error}") from None

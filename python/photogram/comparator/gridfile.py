@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.gridsigma import corrected_grid_sigma
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.calibration import Calibration
-    from photogram.comparator.grid import Grid
-    from photogram.comparator.readings import Integers
+from photogram.arguments.types import Floats, Indices
+from photogram.comparator.averages import corrected_grid_sigma
+from photogram.comparator.calibration import Calibration
+from photogram.comparator.grid import Grid
 
 __all__ = ["adjusted_grid", "corrected", "corrected_grid"]
 
@@ -42,14 +38,14 @@ def adjusted_grid(calibration: Calibration, plate: int) -> Grid:
 
 
 def _of(
-    calibration: Calibration, plate: int, points: Integers, corrections_um: Floats, sigma_um: float
+    calibration: Calibration, plate: int, points: Indices, corrections_um: Floats, sigma_um: float
 ) -> Grid:
     session = calibration.session
     when = f"{session.date or 'undated'} by comparator {session.comparator}"
     return corrected(session.grids[plate], points, corrections_um, sigma_um, when)
 
 
-def corrected(grid: Grid, points: Integers, corrections_um: Floats, sigma_um: float, when: str) -> Grid:
+def corrected(grid: Grid, points: Indices, corrections_um: Floats, sigma_um: float, when: str) -> Grid:
     """Return a plate with corrections, their uncertainty, and what they rest on."""
     xy_um = grid.xy_um.copy()
     xy_um[grid.rows_of(points)] += corrections_um

@@ -10,25 +10,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
+from photogram.comparator.case import PlacedCase
+from photogram.comparator.combined_solution import CombinedLinear
 from photogram.comparator.correction import PARAMETERS, Correction
-from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.fits import Residuals, rotation_matrix
+from photogram.comparator.grid import Grid
 from photogram.comparator.polynomial import COUNT, Frame, Polynomial
-from photogram.comparator.residuals import Residuals
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import GlobalTest, global_test
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.case import PlacedCase
-    from photogram.comparator.combined_solution import CombinedLinear
-    from photogram.comparator.grid import Grid
-    from photogram.comparator.readings import Integers
 
 __all__ = ["JointCase", "JointFit", "JointPlate", "Weights", "adjust_jointly"]
 
@@ -108,7 +103,7 @@ class JointPlate:
         Of the corrections against the standard deviation a priori; None where it was estimated or fixed.
     """
 
-    points: Integers
+    points: Indices
     corrections_um: Floats
     covariance_um2: Floats
     sigma_um: float
@@ -155,11 +150,11 @@ class _Arrays:
     """The problem as the extension module takes it."""
 
     grid_xy: Floats
-    plate_of: Integers
-    measured_cases: Integers
-    measured_points: Integers
+    plate_of: Indices
+    measured_cases: Indices
+    measured_points: Indices
     measured_xy: Floats
-    counts: Integers
+    counts: Indices
     placements: Floats
     left_handed: list[bool]
     frame: Frame
@@ -174,27 +169,14 @@ def adjust_jointly(
     *,
     polynomial: bool = True,
 ) -> JointFit:
-    """Adjust everything together.
+    """Adjust everything together, from the combined linear adjustment, with or without polynomials.
 
-    Parameters
-    ----------
-    cases, grids
-        The cases and the plates by number.
-    linear
-        The combined linear adjustment: it gives initial values.
-    weights
-        Where the weights come from.
-    polynomial
-        Whether the comparator has correction polynomials.
-
-    Raises
-    ------
-    AdjustmentError
-        The measurements do not determine the unknowns, or the adjustment does not converge.
+    Raises AdjustmentError: the measurements do not determine the unknowns, or the adjustment does not
+    converge.
     """
     arrays, points_of = _arrays(cases, grids, linear, polynomial)
     random = weights.random_um if weights.random_um is not None else max(linear.sigma0_um, LEAST_UM)
-    grid = {plate: _initial_grid(sigma, random) for plate, sigma in weights.grid_um.items()}
+    grid = {plate: random / 2 if sigma is None else sigma for plate, sigma in weights.grid_um.items()}
     for _ in range(ROUNDS):
         variance, solution = _solve(arrays, grid, weights.pointing_um, random)
         known = (random, dict(grid))
@@ -210,13 +192,9 @@ def adjust_jointly(
     return _result(cases, arrays, points_of, solution, variance, known[0], known[1], weights)
 
 
-def _initial_grid(sigma_um: float | None, random_um: float) -> float:
-    return random_um / 2 if sigma_um is None else sigma_um
-
-
 def _arrays(
     cases: Sequence[PlacedCase], grids: Mapping[int, Grid], linear: CombinedLinear, polynomial: bool
-) -> tuple[_Arrays, dict[int, Integers]]:
+) -> tuple[_Arrays, dict[int, Indices]]:
     """Return the problem: points numbered through, placements counted from the middle of the range."""
     plates = list(dict.fromkeys(case.case.plate for case in cases))
     points_of = {
@@ -305,9 +283,8 @@ def _grid_test(
 ) -> GlobalTest | None:
     """Test the corrections of a plate against their standard deviation.
 
-    Their weighted squares are a sum of chi-squares, each times a redundancy, and thus nearly c times
-    chi-square with g degrees of freedom, of the same mean and variance (Satterthwaite): c = sum r^2 / sum r,
-    g = sum r / c.
+    Their weighted squares are nearly c times chi-square with g degrees of freedom, of the same mean and
+    variance (Satterthwaite): c = sum r^2 / sum r, g = sum r / c.
     """
     squares, redundancy = _grid_squares(arrays, solution, plate, sigma_um)
     if redundancy.sum() <= 1e-9:
@@ -328,7 +305,7 @@ def _grid_squares(
 def _result(
     cases: Sequence[PlacedCase],
     arrays: _Arrays,
-    points_of: Mapping[int, Integers],
+    points_of: Mapping[int, Indices],
     solution: _photocore.ComparatorSolution,
     variance: Floats,
     random: float,
@@ -396,7 +373,7 @@ def _case(
 
 def _plate(
     arrays: _Arrays,
-    points: Integers,
+    points: Indices,
     solution: _photocore.ComparatorSolution,
     plate: int,
     sigma_um: float,

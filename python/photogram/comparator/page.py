@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration
+from photogram.comparator.correction import Correction
+from photogram.comparator.joint import JointFit
 from photogram.comparator.tables import (
     cases,
     coefficients,
@@ -19,11 +20,6 @@ from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Section, Table, significant
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.correction import Correction
-    from photogram.comparator.joint import JointFit
 
 __all__ = ["calibration_page"]
 

@@ -1,29 +1,72 @@
-"""Pointing precision: statistics of repeated readings (NOAA TR NOS 57, equations 1 to 32; STAT)."""
+"""Readings of each point brought together (subroutine GROUP), and how precisely they were pointed."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from heapq import heappop, heappush
 
 import numpy as np
 
-from photogram.comparator.grouping import group
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.readings import Integers
 
 __all__ = [
     "CONFIDENCE_FACTORS",
     "Ellipse",
     "PointReadings",
     "Precision",
+    "group",
+    "group_as_listed",
     "pool",
     "pool_points",
     "read_points",
+    "rows_by_point",
 ]
+
+
+def group(points: Indices) -> Indices:
+    """Return the order of readings in which equal points stand together, points and readings as measured."""
+    _, first, inverse = np.unique(points, return_index=True, return_inverse=True)
+    order: Indices = np.argsort(first[inverse], kind="stable")
+    return order
+
+
+def rows_by_point(points: Indices) -> list[tuple[int, Indices]]:
+    """Return each point with the rows of its readings, points and rows in the order measured."""
+    order = group(points)
+    starts = np.flatnonzero(np.diff(points[order])) + 1
+    rows = np.split(order, starts) if len(points) else []
+    return list(zip(points[order[np.r_[0, starts]]].tolist() if rows else [], rows, strict=True))
+
+
+def group_as_listed(points: Indices) -> Indices:
+    """Return the order of readings that the listing makes.
+
+    It brings later readings of a point forward by swapping, so that points which stood in the way end
+    elsewhere: in figure 7 point 2 comes last, after the close-out on point 1 took its place.
+    """
+    order = list(range(len(points)))
+    numbers = points.tolist()
+    # Where the readings of each point stand; those before `start` have moved away.
+    places: dict[int, list[int]] = {}
+    for place, number in enumerate(numbers):
+        places.setdefault(number, []).append(place)
+    start = 0
+    while start < len(order):
+        own, end = places[numbers[start]], start
+        while own:
+            later = heappop(own)
+            if later < start:
+                continue
+            if later > end:
+                heappush(places[numbers[end]], later)
+                order[end], order[later] = order[later], order[end]
+                numbers[end], numbers[later] = numbers[later], numbers[end]
+            end += 1
+        start = end
+    return np.array(order, dtype=np.int64)
+
 
 CONFIDENCE_FACTORS = {39: 1.00, 50: 1.18, 95: 2.45, 99: 3.03}
 """Multiples of the semi-axes for an ellipse that holds so many percent (report; the program draws 39)."""
@@ -152,7 +195,7 @@ class PointReadings:
         return pool([self])
 
 
-def read_points(points: Integers, xy_um: Floats) -> list[PointReadings]:
+def read_points(points: Indices, xy_um: Floats) -> list[PointReadings]:
     """Sum up readings, point by point in the order of their first reading.
 
     Deviations are formed from the first reading of each point, so that large coordinates cost no digits and
@@ -181,16 +224,9 @@ def read_points(points: Integers, xy_um: Floats) -> list[PointReadings]:
 
 
 def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> Precision:
-    """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31).
+    """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31), or divide by `listed_dof` instead.
 
     Each variance is weighted by its degrees of freedom: sums of squares over readings less means.
-
-    Parameters
-    ----------
-    points
-        What to pool.
-    listed_dof
-        Degrees of freedom to divide by instead (see :func:`pool_points`).
     """
     readings = list(points)
     total = sum(point.count for point in readings)
@@ -217,18 +253,9 @@ def pool_points(
 ) -> tuple[dict[int, Precision], Precision]:
     """Pool many cases: each point over its cases (equations 25 to 27), then everything (28 to 32).
 
-    Parameters
-    ----------
-    cases
-        The points of each case.
-    as_listed
-        Divide as the listing does, where that departs from the text: the sums of a point by all its readings
-        less one (not less the number of its cases), those of all points by all readings less the number of
-        points.
-
-    Returns
-    -------
-    by_point, total
+    `as_listed` divides as the listing does, where that departs from the text: the sums of a point by all its
+    readings less one (not less the number of its cases), those of all points by all readings less the number
+    of points.
     """
     by_number: dict[int, list[PointReadings]] = {}
     for case in cases:

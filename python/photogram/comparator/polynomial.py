@@ -8,15 +8,12 @@ the scaled columns one of a few tens.
 from __future__ import annotations
 
 from math import comb
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
 
 __all__ = ["TERMS", "Frame", "Polynomial", "fit_polynomial"]
 
@@ -124,19 +121,9 @@ class Polynomial:
 
 
 def fit_polynomial(xy_um: Floats, residuals_um: Floats) -> Polynomial:
-    """Fit both polynomials to the residuals left by the linear adjustment.
+    """Fit both polynomials to the residuals (n, 2) that the linear adjustment left at places (n, 2).
 
-    Parameters
-    ----------
-    xy_um
-        (n, 2) linearly corrected coordinates, of one case or of many.
-    residuals_um
-        (n, 2) residuals in the comparator system.
-
-    Raises
-    ------
-    AdjustmentError
-        Fewer than ten points, or too few different coordinates.
+    Raises AdjustmentError: fewer than ten points, or too few different coordinates.
     """
     if len(xy_um) <= COUNT:
         raise AdjustmentError(f"{len(xy_um)} points were measured; the polynomials need {COUNT + 1} at least")

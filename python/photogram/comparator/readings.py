@@ -5,22 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats, Indices
+from photogram.comparator.grid import Grid
 from photogram.errors import InputError
 from photogram.io.places import Place
 from photogram.messages import Message
 from photogram.show.summary import Brief
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from photogram.arguments.types import Floats
-    from photogram.comparator.grid import Grid
-
-    Integers = NDArray[np.int64]
 
 __all__ = ["LARGEST_UM", "Case", "Reading", "Session", "collect_cases"]
 
@@ -85,8 +78,8 @@ class Case:
     number: int
     operator: int
     plate: int
-    points: Integers
-    legs: Integers
+    points: Indices
+    legs: Indices
     xy_um: Floats
     places: tuple[Place, ...]
 
@@ -134,7 +127,7 @@ class Case:
             )
 
 
-def _medians(groups: Integers, values: Floats) -> Floats:
+def _medians(groups: Indices, values: Floats) -> Floats:
     """Return the medians of columns by group, numbered from 0."""
     counts = np.bincount(groups)
     first = np.cumsum(counts) - counts

@@ -14,19 +14,15 @@ products of U, W and the errors of the grid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats, Indices
+from photogram.comparator.case import PlacedCase
 from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
-from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.polynomial import Frame, design
 from photogram.lazy_dataclasses import dataclass
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.case import PlacedCase
-    from photogram.comparator.readings import Integers
 
 __all__ = ["GridErrors", "Reduction"]
 
@@ -47,17 +43,17 @@ class GridErrors:
         (l,) in how many cases each point was measured.
     """
 
-    cases: Integers
-    rows: Integers
-    columns: Integers
+    cases: Indices
+    rows: Indices
+    columns: Indices
     turns: Floats
-    counts: Integers
+    counts: Indices
 
     @classmethod
     def of(
         cls,
         plate: int,
-        grid_rows: Sequence[Integers],
+        grid_rows: Sequence[Indices],
         cases: Sequence[PlacedCase],
         stage: CombinedLinear | CombinedPolynomial,
     ) -> GridErrors:
@@ -104,7 +100,7 @@ class Reduction:
         (m, 2, k) U and W.
     """
 
-    starts: Integers
+    starts: Indices
     rigid: Floats
     left: Floats
     right: Floats

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.arrays import shaped
+from photogram.arguments.types import Floats
+from photogram.comparator.calibration import Calibration, calibrate
+from photogram.comparator.case import exchanged
 from photogram.comparator.correction import Correction
-from photogram.comparator.decomposition import rotation_matrix
-from photogram.comparator.orientation import exchanged
+from photogram.comparator.fits import rotation_matrix
+from photogram.comparator.grid import Grid, built_in_grid
+from photogram.comparator.polynomial import Polynomial
 from photogram.comparator.readings import Case, Session
 from photogram.errors import InputError
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
 
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.grid import Grid
-    from photogram.comparator.readings import Integers
+__all__ = ["Simulation", "simulate_calibration", "simulated_years"]
 
-__all__ = ["Simulation", "simulate_calibration"]
 
 IDEAL = Correction(1.0, 1.0, 0.0)
 
@@ -104,7 +103,9 @@ def simulate_calibration(
     drawn = grid_um * random.standard_normal((len(grid.points), 2))
     errors = drawn if grid_errors_um is None else shaped("grid_errors_um", grid_errors_um, drawn.shape)
     plate = replace(grid, xy_um=grid.xy_um + errors)
-    points = _default_sequence(grid.points) if sequence is None else np.array(sequence, dtype=np.int64)
+    points = np.concatenate([np.repeat(grid.points, 5), np.repeat(grid.points[:1], 3)])
+    if sequence is not None:
+        points = np.array(sequence, dtype=np.int64)
     rows = grid.rows_of(points)
     measured = []
     for k in range(cases):
@@ -123,11 +124,6 @@ def simulate_calibration(
     return Simulation(session, correction, errors)
 
 
-def _default_sequence(points: Integers) -> Integers:
-    """Return every point five times, and the first three times again."""
-    return np.concatenate([np.repeat(points, 5), np.repeat(points[:1], 3)])
-
-
 def _readings(
     plate: Grid, correction: Correction, rotation: float, centre: tuple[float, float], left_handed: bool
 ) -> Floats:
@@ -135,3 +131,34 @@ def _readings(
     own = exchanged(plate.xy_um, left_handed)
     middle = (own.min(axis=0) + own.max(axis=0)) / 2
     return correction.invert((own - middle) @ rotation_matrix(rotation) + centre)
+
+
+DAYS = ("1970-01-15", "1970-07-02", "1971-01-20", "1971-06-28", "1972-01-11", "1972-07-17")
+STEP = 20e-6
+"""Of the x scale, before the fourth calibration."""
+
+
+def simulated_years() -> list[Calibration]:
+    """Calibrate comparator 3 of the example six times on grid 1320, whose errors stay the same."""
+    grid = built_in_grid(1320)
+    errors = np.random.default_rng(1320).standard_normal(grid.xy_um.shape) * (grid.sigma_um or 0.0)
+    x = np.array([0.012, -0.004, -0.006, 0.003, 0.001, -0.001, 0.0, 0.0, 0.0])
+    y = np.array([-0.006, 0.005, 0.003, -0.004, -0.0005, 0.001, 0.0, 0.0, 0.0])
+    first = Correction(1 - 7e-6, 1 - 24e-6, 5e-5, Polynomial.from_metres(x, y))
+    found = []
+    for k, day in enumerate(DAYS):
+        own = replace(first, scale_x=first.scale_x + (STEP if k >= 3 else 0.0))
+        session = simulate_calibration(
+            grid,
+            own,
+            rotation_rad=0.17 + 0.05 * k,
+            pointing_um=0.9,
+            random_um=0.7,
+            grid_errors_um=errors,
+            operators=(18,),
+            comparator=3,
+            date=day,
+            seed=1970 + k,
+        ).session
+        found.append(calibrate(session))
+    return found

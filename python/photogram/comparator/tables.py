@@ -1,24 +1,24 @@
-"""What is known of a calibration, quantity by quantity."""
+"""What is known of a calibration, quantity by quantity, and what the verdict on it rests on."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.comparator.calibration import Calibration
+from photogram.comparator.combined_solution import CombinedPolynomial
+from photogram.comparator.correction import Correction
+from photogram.comparator.joint import JointFit
+from photogram.comparator.outliers import FarPointing, Outlier
+from photogram.comparator.pointing import Precision
 from photogram.comparator.polynomial import TERMS
+from photogram.comparator.variance import TermTest
 from photogram.show.angles import ARCSEC
+from photogram.show.methods import findings_of
 from photogram.show.quantity import Axis, Quantity, component, of_each
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.calibration import Calibration
-    from photogram.comparator.combined_solution import CombinedPolynomial
-    from photogram.comparator.correction import Correction
-    from photogram.comparator.outliers import FarPointing, Outlier
-    from photogram.comparator.pointing import Precision
-    from photogram.comparator.significance import TermTest
+from photogram.statistics.findings import Findings, Systematic, Tested
 
 __all__ = [
     "UM",
@@ -32,6 +32,7 @@ __all__ = [
     "terms",
     "variance",
 ]
+
 
 UM = (Axis.of("", "um"),)
 XY = (Axis.of("x", "um"), Axis.of("y", "um"))
@@ -180,4 +181,64 @@ def precisions(found: Sequence[Precision]) -> list[Quantity]:
         of_each(found, "mean_sd_um", member="sd_mean_um"),
         of_each(found, "mean_sd_point_um", member="sd_mean_point_um"),
         Quantity(ellipses, member="ellipse"),
+    ]
+
+
+FAR = 3.0
+"""A grid that differs from its values by so many times their standard deviation is another grid."""
+
+
+@findings_of.register(Calibration)
+def comparator_findings(calibration: Calibration) -> Findings:
+    """Return the tests of a calibration: readings have no standard deviation of their own, t decides."""
+    screening = calibration.screening
+    places = [
+        (case.number, point, axis)
+        for case in calibration.cases
+        for point in case.placed.points.tolist()
+        for axis in "xy"
+    ]
+
+    def name(index: tuple[int, ...]) -> str:
+        case, point, axis = places[index[0]]
+        return f"{axis} of point {point} of case {case}"
+
+    values = np.vstack(screening.ratios).ravel()
+    readings = Tested("readings of the grid", values, name, "t", second=max(screening.freedom - 1, 1))
+    return Findings(
+        status="converged",
+        observations=[readings],
+        degrees_of_freedom=screening.freedom,
+        untested="readings have no standard deviation of their own",
+        spoiled=f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
+        f" and a coordinate is uncertain by {screening.sigma_um:.3f} um"
+        if screening.harmful
+        else "",
+        systematic=_grids(calibration.joint) if calibration.joint else [],
+        if_usable=[
+            "Correct measurements with `photogram comparator correct correction.json FILE`.",
+            "Keep the document of `--json`: `photogram comparator compare` finds what changes over years.",
+        ],
+        if_withheld=[
+            "The correction is withheld: measure the readings that are named again, or leave them out."
+        ],
+    )
+
+
+def _grids(joint: JointFit) -> list[Systematic]:
+    """Return the tests of the corrections of the plates against their standard deviations."""
+    return [
+        Systematic(
+            name=f"corrections of plate {plate}",
+            sentence=f"the grid of plate {plate} is off by {own.test.factor:.3g} standard deviations",
+            statistic="s^2",
+            distribution="chi2/f",
+            dof=(own.test.degrees_of_freedom,),
+            value=own.test.variance,
+            probability=own.test.probability_above,
+            level=own.test.level / 2,
+            large=own.test.factor > FAR,
+        )
+        for plate, own in joint.plates.items()
+        if own.test is not None
     ]

@@ -1,21 +1,36 @@
-"""Where the errors come from: the analysis of variance (NOAA TR NOS 57, equations 66 to 68, figure 30)."""
+"""Where errors come from (NOAA TR NOS 57, equations 66 to 68, figure 30), and tests of significance.
+
+Probabilities of the tests need scipy (`pip install 'photogram[statistics]'`) and are None without it.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from functools import cache
+from importlib.util import find_spec
 
 import numpy as np
 
+from photogram.arguments.types import Floats
+from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
+from photogram.comparator.fits import RigidFit
+from photogram.comparator.pointing import Precision
+from photogram.comparator.polynomial import TERMS
 from photogram.lazy_dataclasses import dataclass
 
-if TYPE_CHECKING:
-    from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
-    from photogram.comparator.pointing import Precision
-    from photogram.comparator.rigid import RigidFit
+__all__ = [
+    "AxisSigma",
+    "CaseVarianceTest",
+    "PolynomialTest",
+    "TermTest",
+    "VarianceAnalysis",
+    "analyse_variance",
+    "compare_case_variances",
+    "difference",
+    "polynomial_tests",
+]
 
-__all__ = ["AxisSigma", "VarianceAnalysis", "analyse_variance", "difference"]
 
 NM = 1000.0
 
@@ -141,3 +156,184 @@ def analyse_variance(
 def _pooled(fits: Sequence[RigidFit], dof: float) -> AxisSigma:
     squares = np.array([fit.residuals.squares_um2[:2] for fit in fits]).sum(axis=0) / dof
     return AxisSigma(math.sqrt(squares[0]), math.sqrt(squares[1]))
+
+
+OWN_TERMS = 6
+"""Terms that are tested: those of first and zeroth degree belong to the linear parameters as well."""
+
+
+@dataclass(frozen=True)
+class TermTest:
+    """Student's test of one term, given all others.
+
+    Attributes
+    ----------
+    axis, term
+        `x` or `y`, and the term, its argument counted from the middle of the measured range.
+    coefficient_um, sd_um
+        Its effect at the edge of the range, and the standard deviation.
+    probability
+        Of a ratio as large as this (two-sided) without the term; None without scipy.
+    """
+
+    axis: str
+    term: str
+    coefficient_um: float
+    sd_um: float
+    probability: float | None
+
+    @property
+    def ratio(self) -> float:
+        """Coefficient over standard deviation (t)."""
+        return self.coefficient_um / self.sd_um if self.sd_um > 0 else math.nan
+
+
+@dataclass(frozen=True)
+class PolynomialTest:
+    """Fisher's test of all terms together, and Student's of each.
+
+    Attributes
+    ----------
+    ratio, degrees_of_freedom
+        F, and its two degrees of freedom.
+    probability
+        Of so large a ratio without polynomials; None without scipy.
+    terms
+        Each term.
+    """
+
+    ratio: float
+    degrees_of_freedom: tuple[int, int]
+    probability: float | None
+    terms: tuple[TermTest, ...]
+
+
+@dataclass(frozen=True)
+class CaseVarianceTest:
+    """Tests of equal variances of the cases: Hartley's F-max, as the report says, and two more.
+
+    Attributes
+    ----------
+    f_max
+        Largest variance of unit weight of a single case over the smallest.
+    degrees_of_freedom
+        The fewest of a case.
+    f_max_probability, f_max_limit
+        Of so large a ratio for equal variances, and the ratio of probability 0.05.
+    bartlett_probability, levene_probability
+        Of Bartlett's and Levene's tests.
+    """
+
+    f_max: float
+    degrees_of_freedom: int
+    f_max_probability: float | None
+    f_max_limit: float | None
+    bartlett_probability: float | None
+    levene_probability: float | None
+
+
+NODES = 200
+
+
+def _scipy() -> bool:
+    return find_spec("scipy") is not None
+
+
+def polynomial_tests(linear: CombinedLinear, nonlinear: CombinedPolynomial) -> PolynomialTest:
+    """Test the polynomials of the combined adjustment."""
+    polynomial = nonlinear.polynomial
+    dof = linear.degrees_of_freedom - 2 * OWN_TERMS
+    before = sum(sum(fit.residuals.squares_um2[:2]) for fit in linear.cases)
+    after = sum(sum(fit.residuals.squares_um2[:2]) for fit in nonlinear.cases)
+    ratio = (before - after) / (2 * OWN_TERMS) / (after / dof) if after > 0 else math.nan
+    sd = np.sqrt(after / dof * np.diag(polynomial.scaled_cofactors)).reshape(2, -1)
+    terms = tuple(
+        TermTest(
+            axis,
+            TERMS[term],
+            float(polynomial.scaled_um[row, term]),
+            float(sd[row, term]),
+            _student(float(polynomial.scaled_um[row, term]), float(sd[row, term]), dof),
+        )
+        for row, axis in enumerate("xy")
+        for term in range(OWN_TERMS)
+    )
+    return PolynomialTest(ratio, (2 * OWN_TERMS, dof), _fisher(ratio, 2 * OWN_TERMS, dof), terms)
+
+
+def compare_case_variances(residuals: Sequence[Floats], dof: Sequence[int]) -> CaseVarianceTest:
+    """Compare the variances of unit weight of single cases, by their residuals (n, 2) in micrometres.
+
+    Where degrees of freedom differ, F-max takes the fewest, and errs on the safe side.
+    """
+    squares = [float((values**2).sum()) for values in residuals]
+    variances = [square / own for square, own in zip(squares, dof, strict=True)]
+    ratio = max(variances) / min(variances) if min(variances) > 0 else math.inf
+    few = min(dof)
+    if not _scipy() or not math.isfinite(ratio):
+        return CaseVarianceTest(ratio, few, None, None, None, None)
+    from scipy.stats import levene
+
+    return CaseVarianceTest(
+        ratio,
+        few,
+        _f_max_tail(ratio, len(dof), few),
+        _f_max_limit(len(dof), few),
+        _bartlett(variances, dof),
+        float(levene(*(values.ravel() for values in residuals)).pvalue),
+    )
+
+
+def _student(value: float, sd: float, dof: int) -> float | None:
+    if not _scipy() or sd == 0:
+        return None
+    from scipy.stats import t
+
+    return float(2 * t.sf(abs(value / sd), dof))
+
+
+def _fisher(ratio: float, first: int, second: int) -> float | None:
+    if not _scipy() or math.isnan(ratio):
+        return None
+    from scipy.stats import f
+
+    return float(f.sf(ratio, first, second))
+
+
+def _bartlett(variances: Sequence[float], dof: Sequence[int]) -> float:
+    """Return the probability of Bartlett's statistic, from variances and degrees of freedom."""
+    from scipy.stats import chi2
+
+    own = np.array(dof, dtype=float)
+    total = own.sum()
+    pooled = float(own @ variances / total)
+    statistic = total * math.log(pooled) - float(own @ np.log(variances))
+    correction = 1 + (float((1 / own).sum()) - 1 / total) / (3 * (len(own) - 1))
+    return float(chi2.sf(statistic / correction, len(own) - 1))
+
+
+def _f_max_tail(ratio: float, groups: int, dof: int) -> float:
+    """Probability that the largest of `groups` variances is `ratio` times the smallest, or more.
+
+    1 - k times the integral over u = G(x) from 0 to 1 of [G(ratio x) - u]^(k-1), with G the distribution of
+    chi squared: x is the smallest. Gauss-Legendre nodes.
+    """
+    from scipy.stats import chi2
+
+    u, weights = _unit_nodes()
+    inside = chi2.cdf(ratio * chi2.ppf(u, dof), dof) - u
+    within = groups * float(weights @ inside ** (groups - 1))
+    return min(1.0, max(0.0, 1 - within))
+
+
+@cache
+def _unit_nodes() -> tuple[Floats, Floats]:
+    """Gauss-Legendre nodes and weights of the interval from 0 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return (nodes + 1) / 2, weights / 2
+
+
+def _f_max_limit(groups: int, dof: int) -> float:
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda ratio: _f_max_tail(ratio, groups, dof) - 0.05, 1.0, 1e4, xtol=1e-4))

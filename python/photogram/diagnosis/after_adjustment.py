@@ -41,10 +41,7 @@ def errors_explained(block: Block | FirstValues) -> Iterator[None]:
 
         block = block if isinstance(block, Block) else block.usable()
         found = _of_block(block) or shutter_hints(block, None, Adjuster({}))
-        error.args = (
-            "\n".join([str(error), *(f"  hint: {hint}" for hint in found)]),
-            *error.args[1:],
-        )
+        error.args = ("\n".join([str(error), *(f"  hint: {hint}" for hint in found)]), *error.args[1:])
         raise
 
 
@@ -77,11 +74,9 @@ def remarks(result: Result) -> list[Message]:
     if not (result.converged and (result.unknowns or result.block.observations)):
         return []
     from photogram.diagnosis.clocks import known_offsets
-    from photogram.diagnosis.film_axes import axis_hints
     from photogram.diagnosis.film_lenses import lens_hints
-    from photogram.diagnosis.film_lines import line_hints
-    from photogram.diagnosis.film_marks import mark_hints
-    from photogram.diagnosis.film_scans import seam_hints
+    from photogram.diagnosis.film_marks import axis_hints, mark_hints
+    from photogram.diagnosis.film_scans import line_hints, seam_hints
     from photogram.diagnosis.shutters import backward_readouts
 
     # A film in two pieces makes marks fail, too, and so does one that has changed along one axis.

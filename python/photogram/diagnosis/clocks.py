@@ -1,4 +1,4 @@
-"""Offsets of clocks that are differences of scales of time; lines of scanners that are counted otherwise."""
+"""Scales of time and offsets of clocks that are their differences; lines of scanners counted otherwise."""
 
 from __future__ import annotations
 
@@ -9,14 +9,45 @@ import numpy as np
 
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.findings import Finding
-from photogram.diagnosis.time_bases import named
 from photogram.messages import Message, listed
 from photogram.network.block import Block
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Clock
 from photogram.results.result import Result
 
-__all__ = ["counted_lines", "known_offsets"]
+__all__ = ["counted_lines", "differences", "known_offsets", "named"]
+
+LEAPS = range(13, 19)
+"""GPS - UTC in seconds from 1999 on; 18 since 2017."""
+TAI_GPS, ET_TAI = 19.0, 32.184
+"""TAI - GPS and ET - TAI, seconds; ET is that of SPICE, but for 2 ms."""
+WITHIN = 0.010
+"""Seconds: a shift of time this near to a difference is that."""
+
+
+def differences() -> Iterator[tuple[str, str, float]]:
+    """Return two scales and by how many seconds the first is ahead of the second."""
+    yield "TAI", "GPS", TAI_GPS
+    yield "ET", "TAI", ET_TAI
+    yield "ET", "GPS", TAI_GPS + ET_TAI
+    for leap in reversed(LEAPS):
+        yield "GPS", "UTC", float(leap)
+        yield "TAI", "UTC", leap + TAI_GPS
+        yield "ET", "UTC", leap + TAI_GPS + ET_TAI
+
+
+def named(shift: float) -> str:
+    """Return the two scales whose difference is a shift of time in seconds; nothing where there are none.
+
+    The shift is what times of the one lack to be times of the other.
+    """
+    found = []
+    for ahead, behind, seconds in differences():
+        for sign, of, to in ((1, behind, ahead), (-1, ahead, behind)):
+            if abs(shift - sign * seconds) < WITHIN:
+                found.append(f"{to} - {of} ({sign * seconds:+g} s)")
+    return " or ".join(found)
+
 
 SIGNIFICANT = 5.0
 HALVES, NEARLY = (0.5, 1.0), 0.1
@@ -52,10 +83,8 @@ def counted_lines(block: Block, adjusted: Adjuster) -> list[Finding]:
         return replace(own, offset=clocks.setdefault(rate, Clock(f"lines of {rate:g} s")))
 
     timed = [freed(each) for each in block.timed]
-    result = adjusted.tried(block.replace(timed=timed)) if clocks else None
-    if result is None or not result.converged:
-        return []
-    return list(_off(result, clocks, timed))
+    result = adjusted.converged(block.replace(timed=timed)) if clocks else None
+    return [] if result is None else list(_off(result, clocks, timed))
 
 
 def _off(result: Result, clocks: dict[float, Clock], timed: list[Timed]) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.diagnosis.editing import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words
+from photogram.diagnosis.findings import Finding, Level, Section, Words, note
 from photogram.results.result import Result
 
 __all__ = ["control"]
@@ -17,8 +17,7 @@ MANY = 0.2
 def control(edited: Edited, words: Words) -> Section:
     """Say which control does not fit, and what may be done about it."""
     section = Section(
-        "Control",
-        "Control fails by misidentification, poor transfer of the point, or bad coordinates.",
+        "Control", "Control fails by misidentification, poor transfer of the point, or bad coordinates."
     )
     result = edited.last
     if result is None:
@@ -31,13 +30,13 @@ def control(edited: Edited, words: Words) -> Section:
             f"{len(edited.control)} control points do not fit: rather than all of them, something common may"
             " be wrong (lens, film, refraction, curvature of the earth, datum, standard deviations)"
         )
-        section.findings.append(Finding("control-system", "grave", text, [], list(edited.control)))
+        note(section, "control-system", "grave", text, [], list(edited.control))
     for one, other in edited.exchanged:
         text = (
             f"the control points {one} and {other} are exchanged: each has the coordinates that the images"
             " give the other; what follows holds with them exchanged back"
         )
-        section.findings.append(Finding("exchanged-control", "grave", text, [], [one, other]))
+        note(section, "exchanged-control", "grave", text, [], [one, other])
     spoilt = {point for finding in edited.section.findings for point in finding.points}
     for name, findings in edited.control.items():
         section.findings.append(_misfit(result, name, findings, name in spoilt, common, words))

@@ -81,9 +81,7 @@ def _scaled(*factors: float) -> Change:
 SETS = (
     _Set("feet in heights", "heights of the control are in feet, all else in metres", _scaled(1, 1, FOOT)),
     _Set(
-        "metres in heights",
-        "heights of the control are in metres, all else in feet",
-        _scaled(1, 1, 1 / FOOT),
+        "metres in heights", "heights of the control are in metres, all else in feet", _scaled(1, 1, 1 / FOOT)
     ),
     _Set("feet in X", "X of the control is in feet, all else in metres", _scaled(FOOT, 1, 1)),
     _Set("feet in Y", "Y of the control is in feet, all else in metres", _scaled(1, FOOT, 1)),

@@ -17,7 +17,7 @@ import numpy as np
 
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Finding, Section
+from photogram.diagnosis.findings import Finding, Section, note
 from photogram.diagnosis.hypotheses import TURNS, Hypothesis, attitude_readings, hypotheses
 from photogram.diagnosis.regression import (
     LEAST,
@@ -345,11 +345,11 @@ def conventions(view: View) -> tuple[Section, View, bool]:
         if not whole:
             break
         best = whole[0]
-        section.findings.append(Finding("convention", "grave", best.text))
+        note(section, "convention", "grave", best.text)
         view, exact = view.changed(best.change), exact and best.exact
     bars = distances_in_millimetres(view.seen)
     if bars is not None:
-        section.findings.append(Finding("convention", "grave", bars.text))
+        note(section, "convention", "grave", bars.text)
         view = view.changed(bars.change)
     if section.findings:
         section.parts.append("the sections below hold with this put right")

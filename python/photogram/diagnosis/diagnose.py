@@ -22,16 +22,15 @@ from photogram.diagnosis.control import control
 from photogram.diagnosis.control_sets import doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
 from photogram.diagnosis.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
-from photogram.diagnosis.findings import Diagnosis, Explained, Finding, Level, Section, Words
+from photogram.diagnosis.findings import Diagnosis, Explained, Finding, Level, Section, Words, note
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
-from photogram.diagnosis.heights import two_ray_heights
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
 from photogram.diagnosis.orientation import orientation, spare_explained
 from photogram.diagnosis.positions import wrong_positions
 from photogram.diagnosis.residuals import residuals
 from photogram.diagnosis.rolling import rolling_hints
-from photogram.diagnosis.stations import stations
+from photogram.diagnosis.stations import stations, two_ray_heights
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectories import flown_checked
 from photogram.diagnosis.views import View
@@ -163,12 +162,12 @@ def _started(block: Block) -> tuple[Block | None, Section]:
         found: FirstValues = first_values(block)
         usable = found.usable()
     except (AdjustmentError, InputError) as error:
-        section.findings.append(Finding("no-first-values", "grave", f"nothing can be checked: {error}"))
+        note(section, "no-first-values", "grave", f"nothing can be checked: {error}")
         return None, section
     section.parts.append(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
     for photo, why in found.missing.items():
         text = f"photo {photo} could not be started: {why}"
-        section.findings.append(Finding("no-first-values", "grave", text, [photo]))
+        note(section, "no-first-values", "grave", text, [photo])
     return usable, section
 
 
@@ -254,7 +253,7 @@ def _sets(section: Section, view: View, suspects: Suspects, adjusted: Adjuster) 
             break
         values = {"likelihood_ratio": found.judged.likelihood, "times_smaller": found.judged.fall}
         level: Level = "grave" if found.judged.explained else "look"
-        section.findings.append(Finding(kind, level, found.text, values=values))
+        note(section, kind, level, found.text, values=values)
         if level == "look":
             break
         view, changed = view.changed(found.change), True

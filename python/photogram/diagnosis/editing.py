@@ -98,6 +98,11 @@ class Edited:
     cleared: list[str] = field(default_factory=list)
     asked: bool = True
 
+    @property
+    def taken_out(self) -> int:
+        """How many observations the last adjustment did without."""
+        return len(self.section.findings) + sum(len(each) for each in self.control.values())
+
 
 @dataclass(frozen=True)
 class _Suspect:
@@ -131,15 +136,10 @@ def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
     none = np.zeros_like(suspects.control)
     plain = _edited(block, replace(suspects, control=none), adjusted)
     usable = plain.last is not None and plain.last.converged and plain.spread < HOPELESS
-    if not usable or _named(plain) >= _named(found):
+    if not usable or plain.taken_out >= found.taken_out:
         return found
     left = [block.point_ids[point] for point in np.flatnonzero(suspects.control).tolist()]
     return replace(plain, cleared=[name for name in left if name not in plain.control])
-
-
-def _named(edited: Edited) -> int:
-    """Return how many observations an adjustment did without."""
-    return len(edited.section.findings) + sum(len(each) for each in edited.control.values())
 
 
 def _edited(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
@@ -204,10 +204,10 @@ def _gross_control(block: Block, adjusted: Adjuster) -> Indices:
     per_unit = np.array([block.spheroid.a, block.spheroid.a, 1.0] if block.spheroid else [1.0] * 3)
     held = np.isfinite(block.point_sd)
     relaxed = block.replace(point_sd=np.where(held, np.maximum(block.point_sd, loose / per_unit), np.inf))
-    try:
-        _, _, control = _snoop(adjusted(relaxed), relaxed, adjusted, blunder_section())
-    except AdjustmentError:
+    first = adjusted.tried(relaxed)
+    if first is None:
         return np.empty(0, dtype=np.int64)
+    _, _, control = _snoop(first, relaxed, adjusted, blunder_section())
     return np.array([block.point_ids.index(name) for name in control], dtype=np.int64)
 
 
@@ -219,10 +219,10 @@ def _exchanged(
     if len(points) < 2:
         return None
     if np.isfinite(result.block.point_sd[points]).any():
-        try:
-            result = adjusted(freed(result.block, points))
-        except AdjustmentError:
+        without = adjusted.tried(freed(result.block, points))
+        if without is None:
             return None
+        result = without
     return exchanged_pair(result, given, points, spread) if result.converged else None
 
 
@@ -503,8 +503,8 @@ def _returned(result: Result, whole: Block, section: Section, spread: float, adj
             image_xy=np.vstack([block.image_xy, whole.image_xy[[row]]]),
             image_sd=np.vstack([block.image_sd, whole.image_sd[[row]]]),
         )
-        tried = adjusted.tried(back)
-        if tried is None or not tried.converged or not tried.used_images[-1]:
+        tried = adjusted.converged(back)
+        if tried is None or not tried.used_images[-1]:
             continue
         values = tests(tried)
         limit = critical(sum(int((each > 0).sum()) for each in values.values())) * spread

@@ -1,4 +1,15 @@
-"""Fiducial marks that do not fit: of all photos, of one photo, or one reading; what to look at first."""
+"""Fiducial marks that do not fit: of all photos, of one photo, or one reading; what to look at first.
+
+Films that have changed along one axis and are taken for conformal: marks of a photo lie apart alike.
+
+With d the readings of a photo's marks, brought back to the frame of the camera, less their places in the
+certificate, and the covariance of both, d is fitted by a shift, a rotation and a change of size, and then by
+
+    d = (b1 x + b2 y, b2 x - b1 y)
+
+besides: along the axis at atan2(b2, b1)/2 the film is longer by h = sqrt(b1^2 + b2^2), and shorter across.
+What that takes of the weighted sum of squares is chi-square (2) where there is nothing of the kind.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +17,24 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.diagnosis.robust import critical
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted, listed
-from photogram.network.films import Mark
+from photogram.network.films import Film, Mark
 from photogram.network.observations import Fiducial, KnownTogether
+from photogram.network.unknowns import Unknown
+from photogram.results.film_pictures import mark_residuals
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
+from photogram.statistics.distributions import critical_chi_square
 
-__all__ = ["mark_hints"]
+__all__ = ["axis_hints", "mark_hints"]
 
 CERTIFICATE = "certificate"
 ALIKE = 0.7
 """What has at least this part of the largest test value is named beside it: less may be its consequence."""
-FEWEST = 3
+FEWEST_FAILING = 3
 """Marks of a photo that all fail."""
 
 
@@ -63,7 +78,7 @@ def mark_hints(result: Result) -> list[Message]:
         for each in order
         if not each.photo
     ]
-    several = len(named) >= FEWEST and all(film.pattern is None for _, film in result.films)
+    several = len(named) >= FEWEST_FAILING and all(film.pattern is None for _, film in result.films)
     pattern = ", or films have a pattern that was left out (`pattern` of the table films)" if several else ""
     return [
         Message(
@@ -82,7 +97,8 @@ def _photos(readings: list[_Tested], limit: float) -> list[str]:
     return [
         photo
         for photo, values in found.items()
-        if sum(each > limit for each in values) >= max(FEWEST, len(values) / 2 + 0.5) and size[photo] >= worst
+        if sum(each > limit for each in values) >= max(FEWEST_FAILING, len(values) / 2 + 0.5)
+        and size[photo] >= worst
     ]
 
 
@@ -110,3 +126,117 @@ def _rows(kind: ObservedKind | None) -> Iterator[tuple[int, np.ndarray]]:
     """Yield the number of each observation of a kind, and how large its test values are."""
     if kind is not None:
         yield from zip(kind.rows.tolist(), np.abs(np.nan_to_num(kind.standardized)), strict=True)
+
+
+FEWEST = 4
+"""Marks of a photo: three are alike along any axis."""
+CHANCE = 1e-3
+"""Of a hint where nothing is wrong."""
+EXPLAINED = 0.7
+"""Of the weighted sum of squares of a photo's marks that is explained at least: half of it by one of four."""
+ALONE = 1e-6
+"""Part of the largest column that the others must leave of one."""
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """How much longer the film of a photo is along an axis than across, and the axis: degrees from x."""
+
+    photo: str
+    longer: float
+    angle: float
+    far: float
+
+
+def axis_hints(result: Result) -> list[Message]:
+    """Name photos whose marks say that their films have changed along one axis, and whose model cannot."""
+    held = {row: film for row, film in result.films if _is_conformal(film)}
+    found = list(_axes(result, held))
+    if not found:
+        return []
+    found.sort(key=lambda each: -each.longer)
+    most = found[0]
+    return [
+        Message(
+            f"fiducials of {listed([each.photo for each in found], 5)} are apart alike along one axis: the"
+            f" film of {most.photo} is longer by {most.longer:.2g} at {most.angle:.0f} degrees from x than"
+            f" across ({1e3 * most.far:.0f} um at its marks), which no conformal film is."
+            " --set film.model=affine gives films b1 and b2; where all scans are alike, Sx and Sy of the"
+            " scanner may be wrong"
+        )
+    ]
+
+
+def _is_conformal(film: Film) -> bool:
+    return not film.placement.is_held and bool((film.size.deviations[1:] == 0).all())
+
+
+def _axes(result: Result, films: dict[int, Film]) -> Iterator[_Axis]:
+    """Yield what the marks of photos say, where it is beyond chance and most of what they say."""
+    if not films:
+        return
+    residuals, marks = mark_residuals(result), result.fiducials
+    kind = result.kinds.get(Fiducial.KIND)
+    read = [] if kind is None else [result.block.observations[row] for row in kind.rows.tolist()]
+    every = (each for each in result.block.observations if isinstance(each, KnownTogether))
+    known = [each for each in every if all(isinstance(own, Mark) for own in each.joined)]
+    limit = critical_chi_square(CHANCE / len(films), 2)
+    for photo, film in films.items():
+        own = np.flatnonzero(residuals.photos == photo).tolist()
+        if len(own) < FEWEST:
+            continue
+        adjusted = [marks[residuals.marks[k]] for k in own]
+        sd = film.readings.pitch * np.concatenate([_sd_of(read[k]) for k in own])
+        covariance = _certificate(known, [each.given for each in adjusted]) + np.diag(sd**2)
+        places = np.array([each.given.position[:2] for each in adjusted])
+        away = residuals.xy[own] + np.array([each.position[:2] for each in adjusted]) - places
+        whole, gain, b = _fitted(places, away.ravel(), covariance)
+        if gain > limit and gain > EXPLAINED * whole:
+            longer, far = 2.0 * float(np.hypot(*b)), float(np.linalg.norm(places, axis=1).max())
+            angle = float(np.degrees(np.arctan2(b[1], b[0]) / 2))
+            yield _Axis(result.block.photo_ids[photo], longer, angle, longer * far)
+
+
+def _sd_of(read: object) -> Floats:
+    assert isinstance(read, Fiducial)
+    own = read.sd if read.covariance is None else np.sqrt(np.diag(np.asarray(read.covariance)))
+    return np.broadcast_to(np.asarray(own, dtype=float), (2,))
+
+
+def _certificate(known: list[KnownTogether], marks: list[Unknown]) -> Floats:
+    """Return (2 n, 2 n) the covariance of what is known of marks; 0 of marks that are errorless."""
+    first = {id(mark): 2 * k for k, mark in enumerate(marks)}
+    found = np.zeros((2 * len(marks),) * 2)
+    for each in known:
+        rows = [(k, first[id(mark)]) for k, mark in enumerate(each.joined) if id(mark) in first]
+        width = 2 * len(each.joined)
+        whole = (
+            np.diag(np.broadcast_to(np.asarray(each.sd, dtype=float), (width,)) ** 2)
+            if each.covariance is None
+            else np.asarray(each.covariance)
+        )
+        here = [at + axis for _, at in rows for axis in (0, 1)]
+        there = [2 * k + axis for k, _ in rows for axis in (0, 1)]
+        found[np.ix_(here, here)] = whole[np.ix_(there, there)]
+    return found
+
+
+def _fitted(places: Floats, away: Floats, covariance: Floats) -> tuple[float, float, Floats]:
+    """Return the weighted sum of squares of a conformal fit, what b1 and b2 take of it, and these.
+
+    Marks in one line tell nothing of them: both are 0 then.
+    """
+    x, y = places.T
+    one, none = np.ones_like(x), np.zeros_like(x)
+    columns = [(one, none), (none, one), (x, y), (-y, x), (x, -y), (y, x)]
+    design = np.array([np.column_stack(each).ravel() for each in columns]).T
+    root = np.linalg.cholesky(covariance)
+    basis, triangle = np.linalg.qr(np.linalg.solve(root, design))
+    right = np.linalg.solve(root, away)
+    parts = basis.T @ right
+    size = np.abs(np.diag(triangle))
+    if size.min() < ALONE * size.max():
+        return 0.0, 0.0, np.zeros(2)
+    whole = float(right @ right - parts[:4] @ parts[:4])
+    b: Floats = np.linalg.solve(triangle[4:, 4:], parts[4:])
+    return whole, float(parts[4:] @ parts[4:]), b

@@ -31,6 +31,7 @@ __all__ = [
     "Part",
     "Section",
     "Words",
+    "note",
     "small_unit",
 ]
 
@@ -262,6 +263,19 @@ class Section:
             if len(of_level) > SHOWN:
                 shown.append(f"{mark}and {len(of_level) - SHOWN} more")
         return [self.why, *self.lines, *(shown or ["nothing found"])]
+
+
+def note(
+    section: Section,
+    kind: str,
+    level: Level,
+    text: str,
+    photos: Sequence[str] = (),
+    points: Sequence[str] = (),
+    values: dict[str, float] | None = None,
+) -> None:
+    """Add a finding to a section; see :class:`Finding`."""
+    section.findings.append(Finding(kind, level, text, list(photos), list(points), values or {}))
 
 
 @dataclass(repr=False)

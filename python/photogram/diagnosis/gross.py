@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.findings import Finding, Level, Section, note
 from photogram.diagnosis.robust import fit, mad_sd
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -89,7 +89,7 @@ def gross(block: Block, unit: str = "mm") -> tuple[Section, Suspects]:
             " their rays; look at its station (position, angles), the preprocessing of its plate, and whether"
             " the points under its name are its own"
         )
-        section.findings.append(Finding("bad-photo", "grave", text, [name], [], {"points": float(count)}))
+        note(section, "bad-photo", "grave", text, [name], [], {"points": float(count)})
         rays = rays.without(block.image_photos == photo)
         findings, images = _broken(rays)
     section.findings += findings
@@ -175,7 +175,7 @@ def _bad_photos(rays: Rays, section: Section) -> tuple[Rays, Bools]:
             " of its plate, and whether the points under its name are its own"
         )
         values = {f"median_residual_{rays.unit}": size, "times_usual": size / usual}
-        section.findings.append(Finding("bad-photo", "grave", text, [name], [], values))
+        note(section, "bad-photo", "grave", text, [name], [], values)
     return rays, bad
 
 
@@ -448,4 +448,4 @@ def _control_component(
             )
             level: Level = "grave" if size > CONTROL_GRAVE else "look"
             values = {f"difference_{name}": difference}
-            section.findings.append(Finding("control-difference", level, text, [], [point], values))
+            note(section, "control-difference", level, text, [], [point], values)

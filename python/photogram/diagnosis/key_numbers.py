@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection
 
 from photogram.diagnosis.editing import Edited
-from photogram.diagnosis.findings import Finding, Level, Section, Words, small_unit
+from photogram.diagnosis.findings import Finding, Level, Section, Words, note, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import HELD
@@ -29,7 +29,7 @@ def key_numbers(edited: Edited, words: Words) -> Section:
     first, last = edited.first, edited.last
     if first is None or last is None:
         level: Level = "grave" if edited.asked else "look"
-        section.findings.append(Finding("no-adjustment", level, f"no adjustment: {edited.reason}"))
+        note(section, "no-adjustment", level, f"no adjustment: {edited.reason}")
         return section
     _statuses(first, last, section)
     rows = [("as it is", first)] if first is last else [("as it is", first), ("without what is named", last)]
@@ -63,24 +63,22 @@ def _statuses(first: Result, last: Result, section: Section) -> None:
     section.figure("status", f"{last.status} after {len(last.iterations)} iterations")
     if not last.converged:
         text = f"the adjustment has {last.status}: the data are bad or the geometry is weak"
-        section.findings.append(Finding("not-converged", "grave", text))
+        note(section, "not-converged", "grave", text)
     elif not first.converged:
         text = f"with the observations named above the adjustment has {first.status}"
-        section.findings.append(Finding("not-converged", "look", text))
+        note(section, "not-converged", "look", text)
 
 
 def _variance(result: Result, section: Section) -> None:
     variance = result.variance_of_unit_weight
     if variance is None:
-        section.findings.append(Finding("no-redundancy", "grave", "there are no degrees of freedom"))
+        note(section, "no-redundancy", "grave", "there are no degrees of freedom")
     elif not VARIANCE[0] < variance < VARIANCE[1] and result.unit_variance != "unity":
         text = (
             f"the variance of unit weight is {variance:.3f}: if no gross or systematic error is left, the"
             f" standard deviations should be {math.sqrt(variance):.2f} times what they are"
         )
-        section.findings.append(
-            Finding("weights", "look", text, values={"variance_of_unit_weight": variance})
-        )
+        note(section, "weights", "look", text, values={"variance_of_unit_weight": variance})
 
 
 def _between(low: str, high: str, unit: str) -> str:
@@ -95,8 +93,7 @@ def _weights(result: Result, words: Words, section: Section) -> None:
     section.figure("standard deviations of image coordinates", _between(f"{low:g}", f"{high:g}", unit))
     spread = mad_sd(result.standardized)
     section.figure(
-        "the same as the residuals have them",
-        _between(f"{low * spread:.3g}", f"{high * spread:.3g}", unit),
+        "the same as the residuals have them", _between(f"{low * spread:.3g}", f"{high * spread:.3g}", unit)
     )
     usual = words.usual_um
     if usual is not None and unit == "um" and (low < usual[0] or high > usual[1]):
@@ -104,9 +101,7 @@ def _weights(result: Result, words: Words, section: Section) -> None:
             f"standard deviations of image coordinates are usually {usual[0]:g} to {usual[1]:g} um:"
             " are these meant?"
         )
-        section.findings.append(
-            Finding("weights", "look", text, values={"least_um": low, "largest_um": high})
-        )
+        note(section, "weights", "look", text, values={"least_um": low, "largest_um": high})
 
 
 def points_left_out(result: Result, named: Collection[str]) -> list[Finding]:

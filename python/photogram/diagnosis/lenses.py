@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.adjusting import Adjuster, put_right
 from photogram.diagnosis.findings import Finding
-from photogram.diagnosis.trials import put_right
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.results.fixed_tests import usual_parameters
@@ -39,7 +38,8 @@ def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) 
     if not any(_given_terms(camera) for camera in block.cameras):
         return block
     first = adjusted.tried(block)
-    if first is not None and first.converged and _fits(first):
+    test = None if first is None or not first.converged else first.global_test
+    if test is not None and not test.rejected_high:
         return block
     found = put_right(first, _hypotheses(block, adjusted), adjusted)
     if found is None:
@@ -57,19 +57,15 @@ def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) 
     Good observations look gross where the lens is wrong, those of the positions of photos and control first.
     """
     names = [usual_parameters(camera) for camera in block.cameras]
-    first = adjusted.tried(block) if any(names) else None
-    if first is None or not first.converged or first.global_test is None or not first.global_test.problem():
+    first = adjusted.converged(block) if any(names) else None
+    if first is None or first.global_test is None or not first.global_test.problem():
         return block
     found = findings_of(first)
     if not Evidence(found).lens:
         return block
-    cameras = []
-    for camera, own in zip(block.cameras, names, strict=True):
-        held = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-        sd = {name: value for name, value in held.items() if value} | dict.fromkeys(own, math.inf)
-        cameras.append(replace(camera, sd=sd, covariance=None))
-    freed = adjusted.tried(block.replace(cameras=cameras))
-    if freed is None or not freed.converged or freed.global_test is None:
+    cameras = [_freed(camera, own) for camera, own in zip(block.cameras, names, strict=True)]
+    freed = adjusted.converged(block.replace(cameras=cameras))
+    if freed is None or freed.global_test is None:
         return block
     times = first.global_test.factor / freed.global_test.factor
     largest = max((each for each in found.systematic if each.large), key=lambda each: each.fall)
@@ -78,9 +74,11 @@ def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) 
     return block.replace(cameras=[each.restarted() for each in freed.cameras])
 
 
-def _fits(result: Result) -> bool:
-    test = result.global_test
-    return test is not None and not test.rejected_high
+def _freed(camera: Camera, names: Iterable[str]) -> Camera:
+    """Return a camera of which some parameters are unknown, the others as well known as they are."""
+    known = zip(camera.names, camera.deviations.tolist(), strict=True)
+    sd = {name: value for name, value in known if value} | dict.fromkeys(names, math.inf)
+    return replace(camera, sd=sd, covariance=None)
 
 
 def _given_terms(camera: Camera) -> dict[str, int]:
@@ -132,20 +130,14 @@ def _scaled(block: Block, factors: list[float], power: int) -> Block:
 
 def _free_ratio(block: Block, adjusted: Adjuster) -> float:
     """Return the first radial term as the block has it from zero, in that given; 0 where it is not known."""
-    rows = [row for row, camera in enumerate(block.cameras) if _given_terms(camera)]
-    row = rows[0]
+    row = next(row for row, camera in enumerate(block.cameras) if _given_terms(camera))
     camera, terms = block.cameras[row], _given_terms(block.cameras[row])
     name = min(terms, key=lambda each: terms[each])
     cameras = list(block.cameras)
-    sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-    cameras[row] = replace(
-        camera,
-        parameters={**camera.parameters, **dict.fromkeys(terms, 0.0)},
-        sd={**{key: value for key, value in sd.items() if value}, name: math.inf},
-        covariance=None,
-    )
-    result = adjusted.tried(block.replace(cameras=cameras))
-    if result is None or not result.converged:
+    without = {**camera.parameters, **dict.fromkeys(terms, 0.0)}
+    cameras[row] = replace(_freed(camera, [name]), parameters=without)
+    result = adjusted.converged(block.replace(cameras=cameras))
+    if result is None:
         return 0.0
     found = result.cameras[row]
     place = camera.names.index(name)
@@ -167,13 +159,9 @@ def half_pixel(result: Result, adjusted: Adjuster) -> list[Finding]:
         if "w" in camera.names:
             continue
         cameras = list(block.cameras)
-        cameras[row] = replace(
-            camera,
-            sd={**{key: value for key, value in sd.items() if value}, "cx": math.inf, "cy": math.inf},
-            covariance=None,
-        )
-        freed = adjusted.tried(block.replace(cameras=cameras))
-        if freed is None or not freed.converged:
+        cameras[row] = _freed(camera, ["cx", "cy"])
+        freed = adjusted.converged(block.replace(cameras=cameras))
+        if freed is None:
             continue
         places = [camera.names.index(name) for name in ("cx", "cy")]
         changes = freed.cameras[row].values[places] - camera.values[places]

@@ -55,9 +55,7 @@ class _Trial:
     @property
     def left(self) -> float:
         """Omega; infinite where it cannot be adjusted."""
-        if self.result is None or not self.result.converged:
-            return math.inf
-        return self.result.sums_of_squares.total
+        return math.inf if self.result is None else self.result.sums_of_squares.total
 
 
 def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
@@ -68,7 +66,7 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
     given = _positions(block)
     if len(given) < FEWEST:
         return None
-    first = adjusted.tried(_with(block, given))
+    first = adjusted.converged(_with(block, given))
     found = [*_coordinates(block, given, adjusted), *_unknown(block, given, adjusted)]
     found += _later(block, given, adjusted)
     found = [each for each in found if math.isfinite(each.left)]
@@ -82,8 +80,7 @@ def wrong_positions(block: Block, adjusted: Adjuster) -> Explained | None:
         if whole and part and likelihood(part.left, whole.left, freedom) < RIVAL + 2 * math.log(freedom):
             found.remove(whole)
     left = [each.left for each in found]
-    usable = first is not None and first.converged
-    before = first.sums_of_squares.total if first is not None and usable else WORST * max(left)
+    before = WORST * max(left) if first is None else first.sums_of_squares.total
     verdict = judged(before, left, freedom, parameters=[each.parameters for each in found], known_weight=True)
     if verdict is None:
         return None
@@ -149,7 +146,7 @@ def _coordinates(block: Block, given: list[Position], adjusted: Adjuster) -> lis
     for kind, text, order, first in hypotheses:
         factors = np.where(np.arange(3) >= first, FOOT, 1.0)
         meant = [_changed(each, np.asarray(each.position)[order] * factors) for each in given]
-        trials.append(_Trial(kind, text, adjusted.tried(_with(block, meant)), 0, meant))
+        trials.append(_Trial(kind, text, adjusted.converged(_with(block, meant)), 0, meant))
     return trials
 
 
@@ -168,8 +165,8 @@ def _unknown(block: Block, given: list[Position], adjusted: Adjuster) -> list[_T
             changed = [_changed(each, shift=unknown) for each in given]
         else:
             changed = [_changed(each, arm=unknown) for each in given]
-        result = adjusted.tried(_with(block, changed))
-        if result is None or not result.converged:
+        result = adjusted.converged(_with(block, changed))
+        if result is None:
             continue
         (found,) = [each for each in result.unknowns if each.given is unknown]
         value = np.asarray(found.position)
@@ -232,8 +229,8 @@ def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Tri
         return [_changed(each, place) for each, place in zip(given, axes.from_local(places), strict=True)]
 
     def omega(tau: float) -> float:
-        result = adjusted.tried(_with(block, earlier(tau)))
-        return math.inf if result is None or not result.converged else result.sums_of_squares.total
+        result = adjusted.converged(_with(block, earlier(tau)))
+        return math.inf if result is None else result.sums_of_squares.total
 
     step = float(np.median([np.sqrt(np.diagonal(each.precision)).max() for each in given]))
     step *= 3 / float(np.median(np.linalg.norm(velocities, axis=1)))
@@ -245,4 +242,4 @@ def _later(block: Block, given: list[Position], adjusted: Adjuster) -> list[_Tri
     per = "s" if timed else "steps from photo to photo"
     text = f"the {WHAT} are those of another time, {abs(tau):.4g} {per} {'later' if tau > 0 else 'earlier'}"
     meant = earlier(tau)
-    return [_Trial("time offset", text, adjusted.tried(_with(block, meant)), 1, meant)]
+    return [_Trial("time offset", text, adjusted.converged(_with(block, meant)), 1, meant)]

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
+from photogram.diagnosis.findings import Listing, Section, note, small_unit
 from photogram.diagnosis.robust import critical, normal_of_chi_square
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
@@ -106,7 +106,7 @@ def _sums(result: Result, section: Section) -> None:
                 f"the residuals of point {block.point_ids[point]} do not balance: they sum to {x:.1f} {unit}"
                 f" in x and {y:.1f} {unit} in y; is its control, or one of its images, wrong?"
             )
-            section.findings.append(Finding("unbalanced-point", "look", text, [], [block.point_ids[point]]))
+            note(section, "unbalanced-point", "look", text, [], [block.point_ids[point]])
 
 
 def _terms(xy: Floats, size: float) -> tuple[list[str], Floats]:
@@ -152,7 +152,7 @@ def _frame_pattern(result: Result, plain: Block, spread: float, section: Section
                 f" {block.image_unit} from the centre; is the lens, the film or the refraction corrected?"
             )
             values = {f"amplitude_{unit}": factor * amplitude, "significance_sd": significance}
-            section.findings.append(Finding("systematic-pattern", "look", text, values=values))
+            note(section, "systematic-pattern", "look", text, values=values)
 
 
 def _photo_patterns(result: Result, plain: Block, spread: float, section: Section) -> None:
@@ -182,7 +182,7 @@ def _photo_patterns(result: Result, plain: Block, spread: float, section: Sectio
                 f"mean_y_{unit}": float(mean[1]),
                 "significance_sd": significance,
             }
-            section.findings.append(Finding("photo-pattern", "look", text, [name], [], values))
+            note(section, "photo-pattern", "look", text, [name], [], values)
     section.figure("photos tested for a pattern of their own", f"{tested} of {len(block.photo_ids)}")
 
 

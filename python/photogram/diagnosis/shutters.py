@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.trials import put_right
+from photogram.diagnosis.adjusting import Adjuster, put_right
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.moving_photos import Direction, Shutter, Timed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.diagnosis.findings import Figure, Finding, Section, Words
+from photogram.diagnosis.findings import Figure, Section, Words, note
 from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.structuring import structure
@@ -50,7 +50,7 @@ def structure_section(block: Block, result: Result | None, words: Words) -> Sect
     for photo in np.flatnonzero(tied < FEWEST_TIES).tolist():
         name = block.photo_ids[photo]
         text = f"photo {name} has only {tied[photo]} points that other photos or control tie"
-        section.findings.append(Finding("few-ties", "grave", text, [name], [], {"ties": float(tied[photo])}))
+        note(section, "few-ties", "grave", text, [name], [], {"ties": float(tied[photo])})
     _parts(block, section)
     return section
 
@@ -85,7 +85,7 @@ def _parts(block: Block, section: Section) -> None:
     for number in numbers[numbers != largest].tolist():
         names = [block.photo_ids[photo] for photo in np.flatnonzero(parts == number).tolist()]
         text = f"no point ties the photos {listed(names)} to the others: are names of points spelt alike?"
-        section.findings.append(Finding("separate-part", "grave", text, names))
+        note(section, "separate-part", "grave", text, names)
 
 
 def parts_of(block: Block) -> Indices:

@@ -14,7 +14,7 @@ from photogram.adjustment.snooping import snoop
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.findings import Finding, Level, Section
+from photogram.diagnosis.findings import Finding, Level, Section, note
 from photogram.diagnosis.shutters import shutter_hints
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectory_hints import flown_hints
@@ -60,7 +60,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
     try:
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
-        section.findings.append(Finding("no-adjustment", "grave", f"it cannot be adjusted: {error}"))
+        note(section, "no-adjustment", "grave", f"it cannot be adjusted: {error}")
         mistakes = flown_hints(block) or shutter_hints(block, None, adjusted)
         section.findings += [Finding("convention", "grave", str(each)) for each in mistakes]
         return [structure, section], None

@@ -1,29 +1,51 @@
 """Mistakes in what photos on trajectories are given, found by trying: the rule is that of photos at rest.
 
-Images are predicted from the tables (:mod:`photogram.diagnosis.trajectory_images`), observed positions
-likewise: their misfit is that from the trajectory at their time, in their spread.
+Images are predicted from tables, points and cameras as they are given; observed positions likewise: their
+misfit is that from the trajectory at their time, in their spread.
+
+m = rms(observed - predicted) / rms(observed - mean)          (:mod:`photogram.diagnosis.regression`)
+
+Samples and lines of scanners are image coordinates like others here: what their trajectory passes at a wrong
+time, or with a wrong attitude, is seen many lines away.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from photogram.arguments.arrays import shaped
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
+from photogram.diagnosis.clocks import differences
 from photogram.diagnosis.conventions import SUSPICION, Verdict, passing
-from photogram.diagnosis.hypotheses import Hypothesis
-from photogram.diagnosis.regression import UNKNOWN, relative
-from photogram.diagnosis.trajectory_hypotheses import flown_hypotheses, shifted_records, shifts
-from photogram.diagnosis.trajectory_images import flown_misfits, flown_view
+from photogram.diagnosis.hypotheses import Change, Hypothesis, quaternion_readings
+from photogram.diagnosis.regression import UNKNOWN, given_points, relative, spread
+from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.moving_photos import Moment
+from photogram.network.directions import image_directions
+from photogram.network.geometry import geographic_to_geocentric
+from photogram.network.motion import given_poses, timed_images, timed_photos
+from photogram.network.moving_photos import Lines, Moment, Timed
 from photogram.network.observations import Position
+from photogram.network.projecting import camera_of, projected
+from photogram.network.rays import meet
+from photogram.network.subset import kept_images
+from photogram.network.trajectories import Table, Trajectory
 from photogram.network.unknowns import LeverArm
 
-__all__ = ["flown_hints"]
+__all__ = [
+    "flown_hints",
+    "flown_hypotheses",
+    "flown_misfits",
+    "flown_predictions",
+    "flown_view",
+    "shifted_records",
+    "shifts",
+]
 
 
 def flown_hints(block: Block) -> list[Message]:
@@ -91,3 +113,241 @@ def _records_misfit(block: Block) -> Floats:
         return np.zeros(1)
     m = relative(np.concatenate(apart), observed) if 2 * inside >= len(observed) else UNKNOWN
     return np.array([m])
+
+
+KILOMETRE = 1000.0
+
+
+def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Hypothesis]:
+    """Propose mistakes for a block without observations; `photos` on trajectories are looked at."""
+    if any(each.trajectory is not None for each in block.timed):
+        yield from _of_tables()
+        for text, seconds in shifts("images"):
+            yield Hypothesis(f"images {seconds:+g} s", text, partial(_shifted_images, seconds=seconds))
+    if block.principal_distances is not None or any("c" in each.names for each in block.cameras):
+        yield Hypothesis("sign of c", "the principal distance has the wrong sign", _looking_back)
+    if any(each.lines is not None for each in block.timed):
+        yield from _of_scanners(block, photos)
+
+
+def shifts(of: str) -> Iterator[tuple[str, float]]:
+    """Return in which scale times of something may be, and what they lack in seconds."""
+    for ahead, behind, seconds in differences():
+        for sign, own, table in ((1, behind, ahead), (-1, ahead, behind)):
+            yield (
+                f"times of the {of} are {own}, those of the trajectories' tables {table}: they lack"
+                f" {sign * seconds:+g} s",
+                sign * seconds,
+            )
+
+
+def _of_tables() -> Iterator[Hypothesis]:
+    def changed(name: str, text: str, change: Callable[[Table], Table]) -> Hypothesis:
+        return Hypothesis(name, text, partial(_with_tables, change=change))
+
+    inverse = "attitudes of the trajectories are matrices from object to photo, not from photo to object"
+    yield changed("inverse", inverse, lambda table: _turned(table, np.swapaxes(table.attitudes, 1, 2)))
+    for name in quaternion_readings(np.eye(3)[np.newaxis]):
+
+        def read(table: Table, name: str = name) -> Table:
+            return _turned(table, quaternion_readings(table.attitudes)[name][1])
+
+        text, _ = quaternion_readings(np.eye(3)[np.newaxis])[name]
+        yield changed(name, f"{text} (attitudes of the trajectories)", read)
+    for name, factor, text in (
+        ("kilometres", KILOMETRE, "in kilometres, all else in metres"),
+        ("metres", 1 / KILOMETRE, "in metres, all else in kilometres"),
+    ):
+        said = f"positions of the trajectories are {text}"
+        yield changed(name, said, partial(_scaled, factor=factor))
+
+
+def _turned(table: Table, attitudes: Floats) -> Table:
+    return replace(table, attitudes=attitudes)
+
+
+def _scaled(table: Table, factor: float) -> Table:
+    velocities = None if table.velocities is None else table.velocities * factor
+    return replace(table, positions=table.positions * factor, velocities=velocities)
+
+
+def _with_tables(block: Block, change: Callable[[Table], Table]) -> Block:
+    """Return a block without observations whose trajectories have other tables."""
+    known: dict[int, Trajectory] = {}
+
+    def meant(given: Trajectory) -> Trajectory:
+        return known.setdefault(id(given), replace(given, table=change(given.table)))
+
+    timed = [
+        each if each.trajectory is None else replace(each, trajectory=meant(each.trajectory))
+        for each in block.timed
+    ]
+    return block.replace(timed=timed)
+
+
+def _looking_back(block: Block) -> Block:
+    """Return a block whose principal distances have the other sign."""
+    if block.principal_distances is not None:
+        return block.replace(principal_distances=-block.principal_distances)
+    cameras = [
+        each.replace(parameters={**each.parameters, "c": -each.parameters["c"]})
+        if "c" in each.names
+        else each
+        for each in block.cameras
+    ]
+    return block.replace(cameras=cameras)
+
+
+def _shifted_images(block: Block, seconds: float) -> Block:
+    """Return a block whose photos on given trajectories were taken later."""
+
+    def later(own: Timed) -> Timed:
+        if own.trajectory is None:
+            return own
+        time = None if own.time is None and own.lines is not None else (own.time or 0.0) + seconds
+        lines = None if own.lines is None else Lines(np.add(own.lines.table, [0.0, seconds, 0.0]))
+        return replace(own, time=time, lines=lines)
+
+    return block.replace(timed=[later(each) for each in block.timed])
+
+
+def shifted_records(block: Block, seconds: float) -> Block:
+    """Return a block whose observed positions on trajectories are of later times."""
+    return block.replace(
+        observations=[
+            replace(each, time=each.time + seconds)
+            if isinstance(each, Position) and each.moment is not None and each.time is not None
+            else each
+            for each in block.observations
+        ]
+    )
+
+
+def _of_scanners(block: Block, photos: Indices) -> Iterator[Hypothesis]:
+    """Propose that lines, samples or both are counted from the other end.
+
+    With l the observed and p the predicted lines, l = s - p where they are; s is the middle one of l + p.
+    """
+    predicted = flown_predictions(block, photos)
+    for name, axes, text in (
+        ("reversed", (1,), "lines of the scanners are counted against the scan, from the last one"),
+        ("turned", (0, 1), "images of the scanners are turned by 180 degrees"),
+        ("mirrored samples", (0,), "samples of the scanners are counted from the other end"),
+    ):
+        change: Change = partial(_counted_back, predicted=predicted, axes=axes)
+        yield Hypothesis(name, text, change, exact=False)
+
+
+def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Block:
+    xy = block.image_xy.copy()
+    for own, _, _, images in timed_images(block):
+        if own.lines is None or own.line_sensor is None:
+            continue
+        known = images[np.isfinite(predicted[images]).all(axis=1)]
+        if 0 in axes:
+            xy[images, 0] = 2 * own.line_sensor.s0 - xy[images, 0]
+        if 1 in axes and len(known):
+            ends = float(np.median(block.image_xy[known, 1] + predicted[known, 1]))
+            xy[images, 1] = ends - xy[images, 1]
+    return block.replace(image_xy=xy)
+
+
+LEAST = 4
+"""Points with a place that a photo which is looked at has."""
+MOST = 12
+"""Photos that are looked at."""
+POINTS = 300
+"""Points of each of them."""
+SEEN = 0.8
+"""Of the points of a photo its trajectory must pass more than this part."""
+
+
+def flown_view(block: Block) -> tuple[Block, Indices]:
+    """Return what it takes to compare some photos on trajectories, nothing observed, and which these are."""
+    rays = np.bincount(block.image_points, minlength=len(block.point_ids))
+    usable = (given_points(block) | (rays > 1))[block.image_points]
+    counts = np.bincount(block.image_photos[usable], minlength=len(block.photo_ids))
+    photos = spread(np.flatnonzero(timed_photos(block) & (counts >= LEAST)), MOST)
+    own = np.flatnonzero(usable & np.isin(block.image_photos, photos))
+    points = np.unique(block.image_points[own])
+    points = points[:: max(1, len(points) // (POINTS * max(len(photos), 1)))]
+    moving = timed_photos(block)[block.image_photos]
+    looked = kept_images(block, np.isin(block.image_points, points) & moving)
+    return looked.replace(observations=(), refraction=None), photos
+
+
+def flown_misfits(block: Block, photos: Indices) -> Floats:
+    """(k,) m of some photos, of all points or of given ones, whichever is larger.
+
+    Points that are not given fit whatever the scale is. Very large where many are not seen there at all.
+    """
+    predicted = flown_predictions(block, photos)
+    apart = np.linalg.norm(block.image_xy - predicted, axis=1)
+    given = given_points(block)[block.image_points]
+    found = np.full(len(photos), UNKNOWN)
+    images = {photo: own for _, _, photo, own in timed_images(block)}
+    for k, photo in enumerate(photos.tolist()):
+        rows = images[photo]
+        xy = block.image_xy[rows]
+        extent = float(np.sqrt(((xy - xy.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        parts = [own for own in (rows, rows[given[rows]]) if len(own)]
+        seen = [apart[own[np.isfinite(apart[own])]] for own in parts]
+        whole = all(len(own) > SEEN * len(all_) for own, all_ in zip(seen, parts, strict=True))
+        if whole and extent > 0:
+            found[k] = max(float(np.sqrt((own**2).mean())) for own in seen) / extent
+    return found
+
+
+def flown_predictions(block: Block, photos: Indices) -> Floats:
+    """(m, 2) images of some photos as they are predicted; NaN of others, and where a point is not seen."""
+    places = _places(block)
+    found = np.full(block.image_xy.shape, np.nan)
+    wanted = set(photos.tolist())
+    for own, trajectory, row, images in timed_images(block):
+        if row not in wanted:
+            continue
+        images = images[np.isfinite(places[block.image_points[images]]).all(axis=1)]
+        try:
+            seen = projected(own, trajectory, camera_of(block, row), places[block.image_points[images]])
+        except InputError:
+            # A scanner of whose trajectory there is one record.
+            continue
+        found[images] = seen
+    return found
+
+
+def _places(block: Block) -> Floats:
+    """(n, 3) points in the axes of trajectories: as they are given, or where their rays meet."""
+    places = block.point_positions
+    if block.spheroid is not None:
+        places = geographic_to_geocentric(places, block.spheroid)
+    given = given_points(block)
+    if given.all():
+        return places
+    centres, directions = _rays(block)
+    own = np.isfinite(directions).all(axis=1)
+    origin = np.median(centres[own], axis=0) if own.any() else np.zeros(3)
+    across = np.eye(3) - directions[own, :, np.newaxis] * directions[own, np.newaxis]
+    points, count = block.image_points[own], len(places)
+    normal, constant = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    np.add.at(normal, points, across)
+    np.add.at(constant, points, np.einsum("mij,mj->mi", across, centres[own] - origin))
+    return np.where(given[:, np.newaxis], places, meet(normal, constant, _counts(points, count)) + origin)
+
+
+def _counts(points: Indices, count: int) -> Floats:
+    return np.bincount(points, minlength=count).astype(np.float64)
+
+
+def _rays(block: Block) -> tuple[Floats, Floats]:
+    """(m, 3) where the rays of images come from, and their unit directions; NaN of photos at rest."""
+    seen = image_directions(block)
+    centres, directions = np.full(seen.shape, np.nan), np.full(seen.shape, np.nan)
+    for own, trajectory, _, images in timed_images(block):
+        times = np.clip(own.times(block.image_xy[images]), *trajectory.reach)
+        at, turned = given_poses(trajectory, times)
+        if own.sensor is not None:
+            at, turned = at + turned @ own.sensor.position, turned @ own.sensor.attitude
+        centres[images] = at
+        directions[images] = np.einsum("mij,mj->mi", turned, seen[images])
+    return centres, directions

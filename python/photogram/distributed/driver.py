@@ -343,7 +343,7 @@ class Driver:
     def _with_chord(self, up: Up, after: str, change: float) -> str:
         """Return the state after a chord that follows a step; that after the step, where none is taken.
 
-        A chord is a second step with the same factors (crates/photocore/src/adjustment/chord.rs).
+        A chord is a second step with the same factors (crates/photocore/src/adjustment/corrected.rs).
         """
         walks = self._walks
         # So little is left that it goes through here: who loses a worker has it still.

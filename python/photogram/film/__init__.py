@@ -10,11 +10,10 @@ from photogram.on_demand import on_demand
 if TYPE_CHECKING:
     from photogram.film.certificate import CalibratedMarks, Certificate
     from photogram.film.certificate_check import DistanceDifference, Explanation
-    from photogram.film.decentring import Tangential
     from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
     from photogram.film.interior import Affine, Interior, interior_orientation
-    from photogram.film.lens_table import Curve, LensParameters, RadialTable
-    from photogram.film.mark_identity import FilmWay, WhichMark, which_mark
+    from photogram.film.lens_table import Curve, LensParameters, RadialTable, Tangential
+    from photogram.film.marks import FilmWay, WhichMark, which_mark
     from photogram.film.steps import StepsCompared, compare_steps
     from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
 
@@ -59,7 +58,7 @@ _HOMES = {
     "DatedCamera": "years",
     "DistanceDifference": "certificate_check",
     "Explanation": "certificate_check",
-    "FilmWay": "mark_identity",
+    "FilmWay": "marks",
     "Interior": "interior",
     "interior_orientation": "interior",
     "LensParameters": "lens_table",
@@ -67,17 +66,17 @@ _HOMES = {
     "RadialTable": "lens_table",
     "RightAngle": "distances",
     "StepsCompared": "steps",
-    "Tangential": "decentring",
-    "which_mark": "mark_identity",
-    "WhichMark": "mark_identity",
+    "Tangential": "lens_table",
+    "which_mark": "marks",
+    "WhichMark": "marks",
 }
 """The module of each name, loaded when it is first asked for: most blocks are not on film."""
 
 WAYS = {
-    "document_of": {"Certificate": ("certificate_document",), "StepsCompared": ("steps_report",)},
+    "document_of": {"Certificate": ("certificate_report",), "StepsCompared": ("steps",)},
     "findings_of": {"Certificate": ("certificate_findings",)},
-    "page_of": {"Certificate": ("certificate_page",), "StepsCompared": ("steps_report",)},
-    "report_of": {"Certificate": ("certificate_report",), "StepsCompared": ("steps_report",)},
+    "page_of": {"Certificate": ("certificate_report",), "StepsCompared": ("steps",)},
+    "report_of": {"Certificate": ("certificate_report",), "StepsCompared": ("steps",)},
 }
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 

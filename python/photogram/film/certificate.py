@@ -15,20 +15,13 @@ from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.certificate_check import DistanceDifference, difference_of
-from photogram.film.certificate_file import REFERENCES, read_toml
-from photogram.film.certificate_table import read_table
-from photogram.film.decentring import Tangential
-from photogram.film.distances import (
-    AdjustedMarks,
-    Crossing,
-    MarkDistance,
-    RightAngle,
-    adjust_distances,
-)
+from photogram.film.certificate_file import REFERENCES, read_table, read_toml
+from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
 from photogram.film.lens_table import (
     Curve,
     LensParameters,
     RadialTable,
+    Tangential,
     backward,
     chosen,
     curves_of,

@@ -14,7 +14,7 @@ from typing import Literal, get_args
 
 from photogram.lazy_dataclasses import dataclass, replace
 
-__all__ = ["DistanceDifference", "Explanation", "difference_of", "explained"]
+__all__ = ["DistanceDifference", "Explanation", "difference_of"]
 
 How = Literal["exchange", "sign", "digit", "lost or extra"]
 
@@ -91,32 +91,19 @@ class DistanceDifference:
         if not self.explanations:
             return f"{said}; no single change of a typed figure explains it" if self.beyond else said
         first, *others = self.explanations
-        more = (
-            f", or {len(others)} other single changes"
-            if len(others) > 1
-            else f", or {others[0]}"
-            if others
-            else ""
-        )
-        return f"{said}; perhaps {first}{more}"
+        found = f"{said}; perhaps {first}"
+        if len(others) > 1:
+            return f"{found}, or {len(others)} other single changes"
+        return f"{found}, or {others[0]}" if others else found
 
 
 def difference_of(
-    first: str,
-    second: str,
-    typed: Mapping[str, str],
-    usual: Mapping[str, tuple[float, float]],
+    first: str, second: str, typed: Mapping[str, str], usual: Mapping[str, tuple[float, float]]
 ) -> DistanceDifference:
     """Compare a distance with the coordinates of its marks; explain what differs by more than 0.010 mm.
 
-    Parameters
-    ----------
-    first, second
-        The marks.
-    typed
-        All figures as they stand in the certificate, by their fields.
-    usual
-        Usual places of marks (mm), where they are known.
+    `typed` are all figures as they stand in the certificate, by their fields; `usual` the usual places of
+    marks (mm), where they are known.
     """
     name = f"{first}-{second}"
     fields = [*(f"{mark}.{axis}" for mark in (first, second) for axis in "xy"), name]
@@ -134,16 +121,9 @@ def explained(
     """Return the single changes that bring a distance and four coordinates together.
 
     In the order of the kinds of slips and, among changes of a kind, by how far from its usual place the
-    farthest of both marks then is; where these are not known, by what is left.
-
-    Parameters
-    ----------
-    fields
-        x and y of the one and of the other mark, then the distance.
-    typed
-        The figures by these.
-    places
-        Usual coordinates by the same fields, as far as they are known.
+    farthest of both marks then is; where these are not known, by what is left. Fields are x and y of the one
+    and of the other mark, then the distance; `typed` the figures by these, `places` usual coordinates as far
+    as they are known.
     """
     found: list[tuple[tuple[int, float, int, int], Explanation]] = []
     kinds = get_args(How)

@@ -1,9 +1,13 @@
-"""The report of a certificate as text."""
+"""What is told of a certificate: text, JSON document (docs/certificates.md lists its members), page."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram import _photocore
 from photogram.film.certificate import Certificate
-from photogram.film.certificate_document import limit_of
 from photogram.film.certificate_tables import (
     cameras,
     compared,
@@ -15,26 +19,40 @@ from photogram.film.certificate_tables import (
     parameters,
     terms,
 )
+from photogram.io import json
 from photogram.network.cameras import Camera
+from photogram.show.cells import page_table
+from photogram.show.judgement import judged, tests_section
 from photogram.show.lines import fact_lines, field, table_lines
 from photogram.show.lines import marks as marked
-from photogram.show.methods import report_of
-from photogram.show.sections import Section, composed, headline, verdict_sections
+from photogram.show.methods import document_of, page_of, report_of
+from photogram.show.page import Drawing, Facts, Page, Part, Section
+from photogram.show.pictures import new_figure
+from photogram.show.quantity import Quantity, records
+from photogram.show.sections import Section as Lines
+from photogram.show.sections import composed, headline, verdict_sections
+from photogram.show.style import FAINT, INK, MARKED, in_style
+from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal
 
-__all__ = ["certificate_report"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["certificate_document", "certificate_page", "certificate_report"]
 
 
 @report_of.register(Certificate)
 def certificate_report(certificate: Certificate) -> str:
     """Return the report of a certificate."""
-    sections: list[Section] = [
+    own = cameras(certificate)
+    made = [(f"Camera {each.model}", _columns(parameters(each), *_PARAMETERS)) for each in own]
+    sections: list[Lines] = [
         *verdict_sections(certificate.verdict),
         ("Certificate", fact_lines(facts(certificate))),
         ("Distances beside coordinates", _compared(certificate)),
         ("Explained by a single change", _explained(certificate)),
         *_marks(certificate),
         *_lens(certificate),
-        *((f"Camera {each.model}", _camera(each)) for each in cameras(certificate)),
+        *made,
     ]
     return composed(headline("certificate", certificate.name), sections)
 
@@ -63,28 +81,21 @@ def _explained(certificate: Certificate) -> list[str]:
     return lines
 
 
-def _marks(certificate: Certificate) -> list[Section]:
+def _marks(certificate: Certificate) -> list[Lines]:
     if not (certificate.places or certificate.distances):
         return []
     found = certificate.fiducials()
-    names, xy, sd = marks(found)
-    lines = table_lines(
-        [
-            *field(names, 8, head="mark"),
-            *field(xy, 13, ".4f"),
-            *field(sd, 11, ".1f", "sd {name} {unit}"),
-        ]
-    )
-    sections: list[Section] = [("Marks", lines)]
+    lines = _columns(marks(found), (8, "", "mark"), (13, ".4f"), (11, ".1f", "sd {name} {unit}"))
+    sections: list[Lines] = [("Marks", lines)]
     if found.adjusted is not None:
-        names, value, sd_, residual, redundancy, w, error = observed(
+        names, value, sd, residual, redundancy, w, error = observed(
             found.adjusted, limit_of(len(found.adjusted.rows))
         )
         lines = table_lines(
             [
                 *field(names, 32, head="observed"),
                 *field(value, 12, ".3f", "value"),
-                *field(sd_, 9, ".2f", "sd"),
+                *field(sd, 9, ".2f", "sd"),
                 *field(residual, 10, ".2f", "residual"),
                 *field(redundancy, 11, ".3f", "redundancy", gap=" "),
                 *field(w, 9, ".2f", "w"),
@@ -97,48 +108,182 @@ def _marks(certificate: Certificate) -> list[Section]:
     return sections
 
 
-def _lens(certificate: Certificate) -> list[Section]:
+def _columns(table: list[Quantity], *columns: tuple[Any, ...]) -> list[str]:
+    """Return the first quantities of a table as text: width, form, head and gap of each as of `field`."""
+    pairs = zip(table, columns, strict=False)
+    return table_lines([each for quantity, column in pairs for each in field(quantity, *column)])
+
+
+_DISTORTION = (
+    *((12, ".2f", "angle {unit}"), (12, ".3f", "radius {unit}"), (16, ".1f", "distortion {unit}")),
+    *((14, ".2f", "residual {unit}"), (11, ".3f", "redundancy", " "), (8, ".2f", "w")),
+)
+_TERMS = (
+    *((6, ".0f", "terms"), (12, ".3f", "omega"), (5, ".0f", "f"), (10, ".3g", "p"), (10, ".2f", "gain")),
+    (0, "", "{name} {unit}", "  "),
+)
+_RADII = ((12, ".1f", "radius {unit}"), (16, ".2f", "distortion {unit}"), (9, ".2f", "sd {unit}"))
+_PARAMETERS = ((8,), (20, ".10g", "value"), (14, ".4g", "sd"), (0, "", "{name} {unit}", "  "))
+
+
+def _lens(certificate: Certificate) -> list[Lines]:
     if certificate.radial is None:
         return []
     own = certificate.curve()
-    angle, radius, given, residual, redundancy, w = distortion(certificate, own)
-    table = [
-        *field(angle, 12, ".2f", "angle {unit}"),
-        *field(radius, 12, ".3f", "radius {unit}"),
-        *field(given, 16, ".1f", "distortion {unit}"),
-        *field(residual, 14, ".2f", "residual {unit}"),
-        *field(redundancy, 11, ".3f", "redundancy", gap=" "),
-        *field(w, 8, ".2f", "w"),
-    ]
-    count, omega, freedom, p, gain, said, *_ = terms(certificate.curves(), own.terms)
-    fits = [
-        *field(count, 6, ".0f", "terms"),
-        *field(omega, 12, ".3f", "omega"),
-        *field(freedom, 5, ".0f", "f"),
-        *field(p, 10, ".3g", "p"),
-        *field(gain, 10, ".2f", "gain"),
-        *field(said, 0, gap="  "),
-    ]
-    at, value, sd = curve(own)
-    along = [
-        *field(at, 12, ".1f", "radius {unit}"),
-        *field(value, 16, ".2f", "distortion {unit}"),
-        *field(sd, 9, ".2f", "sd {unit}"),
-    ]
     return [
-        ("Radial distortion", table_lines(table)),
-        ("Odd terms beside k0", table_lines(fits)),
-        ("Curve, the last radius beyond the table", table_lines(along)),
+        ("Radial distortion", _columns(distortion(certificate, own), *_DISTORTION)),
+        ("Odd terms beside k0", _columns(terms(certificate.curves(), own.terms), *_TERMS)),
+        ("Curve, the last radius beyond the table", _columns(curve(own), *_RADII)),
     ]
 
 
-def _camera(camera: Camera) -> list[str]:
-    names, value, sd, unit = parameters(camera)
-    return table_lines(
-        [
-            *field(names, 8),
-            *field(value, 20, ".10g", "value"),
-            *field(sd, 14, ".4g", "sd"),
-            *field(unit, 0, gap="  "),
-        ]
+@document_of.register(Certificate)
+def certificate_document(certificate: Certificate) -> bytes:
+    """Return everything as JSON."""
+    document: dict[str, Any] = {
+        "program": f"photogram {_photocore.__version__}",
+        "kind": "certificate",
+        "camera": certificate.name,
+        "type": certificate.camera_type or None,
+        "date": certificate.day.isoformat() if certificate.day else None,
+        "verdict": certificate.verdict.document(),
+        "remarks": certificate.told(),
+        "distances": records(compared(certificate)),
+        "marks": None,
+        "lens": None,
+        "cameras": [_camera_members(each) for each in cameras(certificate)],
+    }
+    if certificate.places or certificate.distances:
+        document["marks"] = _mark_members(certificate)
+    if certificate.radial is not None:
+        own = certificate.curve()
+        document["lens"] = {
+            "focal_length_mm": own.focal_length,
+            "sd_focal_length_mm": own.sd_focal_length,
+            "table": records(distortion(certificate, own)),
+            "terms": own.terms,
+            "fits": records(terms(certificate.curves(), own.terms)),
+            "curve": records(curve(own)),
+            "brown_apart_mm": certificate.lens("brown").apart,
+            "printed_coefficients_apart_mm": certificate.printed_coefficients(),
+        }
+    return json.to_json(document)
+
+
+def limit_of(count: int) -> float:
+    """Return the |w| beyond which one of so many is named."""
+    return critical_normal(bonferroni(LEVEL, max(count, 1)))
+
+
+def _mark_members(certificate: Certificate) -> dict[str, Any]:
+    found = certificate.fiducials()
+    own: dict[str, Any] = {
+        "places": records(marks(found)),
+        "covariance_mm2": {
+            "order": [f"{name}.{axis}" for name in found.names for axis in "xy"],
+            "matrix": found.covariance,
+        },
+        "adjustment": None,
+    }
+    if found.adjusted is not None:
+        test = found.adjusted.test
+        own["adjustment"] = {
+            "free_movements": found.adjusted.free,
+            "degrees_of_freedom": found.adjusted.degrees_of_freedom,
+            "omega": test.weighted_sum_of_squares if test else None,
+            "probability": test.probability_above if test else None,
+            "observed": records(observed(found.adjusted, limit_of(len(found.adjusted.rows)))),
+        }
+    return own
+
+
+def _camera_members(camera: Camera) -> dict[str, Any]:
+    assert camera.covariance is not None
+    names, matrix = camera.covariance
+    return {
+        "model": camera.model,
+        "unit": camera.unit,
+        "parameters": dict(camera.parameters),
+        "covariance": {"order": [*names], "matrix": np.asarray(matrix)},
+    }
+
+
+@page_of.register(Certificate)
+def certificate_page(certificate: Certificate) -> Page:
+    """Return the report of a certificate for the browser."""
+    named = facts(certificate)
+    sections = [
+        Section(
+            "distances",
+            "Distances beside coordinates",
+            [page_table("Distances", compared(certificate))] if certificate.check() else [],
+            _COMPARED,
+        ),
+        Section("marks", "Marks", _mark_parts(certificate)),
+        Section("lens", "Lens", _lens_parts(certificate)),
+        Section(
+            "camera", "Camera", [page_table(each.model, parameters(each)) for each in cameras(certificate)]
+        ),
+        tests_section(certificate.verdict),
+        Section("certificate", "Certificate", [Facts("Certificate", named)]),
+    ]
+    return Page(
+        what="Certificate of a camera",
+        title=certificate.name,
+        judgements=[judged(certificate.verdict)],
+        advice=certificate.verdict.next,
+        highlights=named[1:4],
+        sections=sections,
     )
+
+
+_COMPARED = (
+    "Beyond 0.010 mm a distance and its coordinates contradict each other. Single changes of a typed figure"
+    " that would explain it are guesses: no figure was changed."
+)
+
+
+def _mark_parts(certificate: Certificate) -> list[Part]:
+    if not (certificate.places or certificate.distances):
+        return []
+    found = certificate.fiducials()
+    parts: list[Part] = [page_table("Places of the marks", marks(found))]
+    if found.adjusted is not None:
+        table = observed(found.adjusted, limit_of(len(found.adjusted.rows)))
+        parts.append(page_table("Adjustment of distances", table))
+    return parts
+
+
+def _lens_parts(certificate: Certificate) -> list[Part]:
+    if certificate.radial is None:
+        return []
+    own = certificate.curve()
+    return [
+        Drawing("picture-distortion", "Radial distortion", _CURVE, lambda: _drawn(certificate)),
+        page_table("Table of radial distortion", distortion(certificate, own)),
+        page_table("Odd terms beside k0", terms(certificate.curves(), own.terms)),
+        page_table("Curve, the last radius beyond the table", curve(own)),
+    ]
+
+
+_CURVE = (
+    "Readings with their standard deviation, the fitted curve with its own; beyond the table it is dashed."
+)
+
+
+@in_style
+def _drawn(certificate: Certificate) -> Figure:
+    assert certificate.radial is not None
+    own, um = certificate.curve(), 1e3
+    edge = float(own.radius.max())
+    figure = new_figure(6.4, 3.6)
+    panel = figure.subplots()
+    for radius, line in ((np.linspace(0, edge, 200), "-"), (np.linspace(edge, 1.1 * edge, 40), "--")):
+        value, sd = um * own.at(radius), um * own.sd_at(radius)
+        panel.fill_between(radius, value - sd, value + sd, color=FAINT, alpha=0.4, linewidth=0)
+        panel.plot(radius, value, line, color=INK, linewidth=1.2)
+    given = certificate.radial
+    panel.errorbar(own.radius, um * given.distortion, um * given.sd, fmt="o", color=MARKED, markersize=4)
+    panel.set_xlabel("radius, mm")
+    panel.set_ylabel("distortion, µm")
+    return figure

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.film.certificate import CalibratedMarks, Certificate
 from photogram.film.distances import AdjustedMarks
 from photogram.film.lens_table import Curve
 from photogram.network.cameras import Camera
 from photogram.show.page import Fact, significant
-from photogram.show.quantity import Axis, Quantity, of_each
+from photogram.show.quantity import Axis, Kind, Quantity, of_each
 
 __all__ = ["cameras", "compared", "curve", "distortion", "facts", "marks", "observed", "parameters", "terms"]
 
@@ -39,32 +39,26 @@ def compared(certificate: Certificate) -> list[Quantity]:
     beyond = np.array([each.beyond for each in found], dtype=bool)
     said = ["; ".join(map(str, each.explanations)) or ("nothing" if each.beyond else "") for each in found]
     explanations = [[vars(one) for one in each.explanations] for each in found]
+    given, computed, apart = (
+        np.array([getattr(each, name) for each in found])
+        for name in ("distance", "from_coordinates", "difference")
+    )
     return [
         of_each(found, "name", kind="name", member="distance", head="Distance"),
-        of_each(found, "distance", MM, "value", member="distance_mm", head="Given", decimals=3),
-        of_each(
-            found,
-            "from_coordinates",
-            MM,
-            "value",
-            member="from_coordinates_mm",
-            head="From coordinates",
-            decimals=4,
-        ),
-        of_each(
-            found,
-            "difference",
-            MM,
-            "deviation",
-            member="difference_mm",
-            head="Difference",
-            decimals=1,
-            marked=beyond,
-        ),
+        _mm(given, "value", "distance", "Given", 3),
+        _mm(computed, "value", "from_coordinates", "From coordinates", 4),
+        _mm(apart, "deviation", "difference", "Difference", 1, marked=beyond),
         of_each(found, "beyond", member="beyond"),
         Quantity(said, kind="name", head="Single changes that explain it"),
         Quantity(explanations, member="explanations"),
     ]
+
+
+def _mm(
+    values: Floats, kind: Kind, member: str, head: str, decimals: int, marked: Bools | None = None
+) -> Quantity:
+    """Return lengths, which people read in mm, or as small ones in um."""
+    return Quantity(values, MM, kind, member=f"{member}_mm", head=head, decimals=decimals, marked=marked)
 
 
 def observed(found: AdjustedMarks, limit: float) -> list[Quantity]:
@@ -87,19 +81,12 @@ def observed(found: AdjustedMarks, limit: float) -> list[Quantity]:
 def distortion(certificate: Certificate, found: Curve) -> list[Quantity]:
     """Return the table of distortion with the residuals of the chosen curve."""
     assert certificate.radial is not None
-    angle = (Axis.turned("", "deg"),)
+    table, angle = certificate.radial, (Axis.turned("", "deg"),)
     return [
-        Quantity(certificate.radial.angle, angle, "value", member="angle_rad", head="Angle", decimals=2),
-        Quantity(found.radius, MM, "value", member="radius_mm", head="Radius", decimals=3),
-        Quantity(
-            certificate.radial.distortion,
-            MM,
-            "deviation",
-            member="distortion_mm",
-            head="Distortion",
-            decimals=1,
-        ),
-        Quantity(found.residuals, MM, "deviation", member="residual_mm", head="Residual", decimals=2),
+        Quantity(table.angle, angle, "value", member="angle_rad", head="Angle", decimals=2),
+        _mm(found.radius, "value", "radius", "Radius", 3),
+        _mm(table.distortion, "deviation", "distortion", "Distortion", 1),
+        _mm(found.residuals, "deviation", "residual", "Residual", 2),
         Quantity(found.redundancy, member="redundancy", head="Redundancy", decimals=3),
         Quantity(found.standardized, member="w", head="w", decimals=2),
     ]
@@ -110,9 +97,9 @@ def curve(found: Curve) -> list[Quantity]:
     radius = np.linspace(0.0, float(found.radius.max()), RADII + 1)[1:]
     radius = np.append(radius, radius[-1] + radius[0])
     return [
-        Quantity(radius, MM, "value", member="radius_mm", head="Radius", decimals=1),
-        Quantity(found.at(radius), MM, "deviation", member="distortion_mm", head="Distortion", decimals=2),
-        Quantity(found.sd_at(radius), MM, "deviation", member="sd_mm", head="sd", decimals=2),
+        _mm(radius, "value", "radius", "Radius", 1),
+        _mm(found.at(radius), "deviation", "distortion", "Distortion", 2),
+        _mm(found.sd_at(radius), "deviation", "sd", "sd", 2),
     ]
 
 
@@ -120,14 +107,13 @@ def terms(curves: tuple[Curve, ...], taken: int) -> list[Quantity]:
     """Return how well one odd term, two, three fit; `taken` is the number that was chosen."""
     omega = [each.omega for each in curves]
     p = [each.test.probability_above if each.test else None for each in curves]
+    freedom = [len(each.radius) - each.terms - 1 for each in curves]
     said = ["chosen" if each.terms == taken else "" for each in curves]
     gain = np.array([math.nan, *-np.diff(omega)])
     return [
         of_each(curves, "terms", head="Odd terms"),
         Quantity(omega, member="omega", head="Omega", decimals=3),
-        Quantity(
-            [len(each.radius) - each.terms - 1 for each in curves], member="degrees_of_freedom", head="f"
-        ),
+        Quantity(freedom, member="degrees_of_freedom", head="f"),
         Quantity(p, member="probability", head="p", figures=2),
         Quantity(gain, member="gain", head="Gain", decimals=2),
         Quantity(said, kind="name", head="Taken"),
@@ -174,9 +160,3 @@ def facts(certificate: Certificate) -> list[Fact]:
         apart = certificate.lens("brown").apart
         found.append(Fact("Conversion to brown", significant(1e3 * apart, 2), "um", "differs by at most"))
     return found
-
-
-def matrix_of(camera: Camera) -> tuple[list[str], Floats]:
-    """Return the names and the covariance matrix of a camera's parameters."""
-    assert camera.covariance is not None
-    return [*camera.covariance[0]], np.asarray(camera.covariance[1])

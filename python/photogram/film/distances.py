@@ -1,4 +1,4 @@
-"""Places of fiducial marks from distances between them, by least squares in the plane.
+"""Places of fiducial marks from distances between them, by least squares in the plane, and their frame.
 
 Observations are distances s = |q_j - q_i|, and where a report says so the angle in which lines through
 opposite marks cross, and the place where they do. Where these determine the figure it is free: of all places
@@ -17,12 +17,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.errors import AdjustmentError
+from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["AdjustedMarks", "Crossing", "MarkDistance", "RightAngle", "adjust_distances"]
+__all__ = ["AdjustedMarks", "Crossing", "MarkDistance", "RightAngle", "adjust_distances", "with_datum"]
 
 STEPS = 50
 CLOSE = 1e-13
@@ -289,3 +289,43 @@ def _design(names: Sequence[str], design: Floats, sd: Floats) -> list[_Row]:
         for row, name in enumerate(names)
         for axis in (0, 1)
     ]
+
+
+SINGULAR = 1e-9
+"""Least part of the largest eigenvalue of a covariance that is not zero."""
+HELD = 1e-2
+"""Standard deviation of the frame in parts of the least of the figure."""
+
+
+def with_datum(xy: Floats, covariance: Floats) -> tuple[Floats, int]:
+    """Return a covariance of marks that is positive definite, and how many movements it holds.
+
+    A figure from distances has no covariance of shifts and rotation, G: C G = 0. Its frame is that of its
+    marks, and C + s^2 G G' with s small says this with weights. Films take shift and rotation by t and theta,
+    images by the principal point and kappa: nothing that can be estimated depends on s, but for the principal
+    point, to whose variance s^2/n is added.
+
+    Places are (n, 2) mm, their covariance (2n, 2n) mm^2, x and y of a mark behind each other. InputError: a
+    covariance that is singular otherwise.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    free = values < SINGULAR * values[-1]
+    count = int(free.sum())
+    if not count:
+        return covariance, 0
+    movements = _movements(xy)
+    outside = vectors[:, free] - movements @ (movements.T @ vectors[:, free])
+    if count > 3 or np.abs(outside).max() > np.sqrt(SINGULAR):
+        raise InputError(
+            "the covariance of its marks is singular, and not as that of distances is: by shifts and rotation"
+        )
+    own = vectors[:, free]
+    return covariance + HELD**2 * values[~free].min() * (own @ own.T), count
+
+
+def _movements(xy: Floats) -> Floats:
+    """Return (2n, 3) an orthonormal basis of shifts and the rotation of n marks."""
+    shift = np.tile(np.eye(2), (len(xy), 1))
+    about = xy - xy.mean(axis=0)
+    turn = np.column_stack([-about[:, 1], about[:, 0]]).reshape(-1, 1)
+    return np.linalg.qr(np.hstack([shift, turn]))[0]

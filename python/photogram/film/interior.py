@@ -119,14 +119,8 @@ def is_mirrored(places: ArrayLike, true: ArrayLike) -> bool | None:
 def conformal(places: ArrayLike, true: ArrayLike, *, mirrored: bool) -> tuple[float, float, float, float]:
     """Return t1, t2, theta, m of a conformal fit in closed form, of complex numbers: p = t + b q.
 
-    Of mirrored films q is -conj(q); b = (1 + m) exp(i theta).
-
-    Parameters
-    ----------
-    places, true
-        (n, 2) places in the camera's frame and true places on the scanner, mm; two at least.
-    mirrored
-        Whether the film is.
+    Of mirrored films q is -conj(q); b = (1 + m) exp(i theta). Places in the camera's frame and true places on
+    the scanner are (n, 2) mm, two at least.
     """
     q, p = (np.asarray(each, dtype=float) @ [1, 1j] for each in (places, true))
     if mirrored:

@@ -22,12 +22,8 @@ _YEAR = 365.25
 def valid_certificate(certificates: Sequence[Certificate], day: date | None) -> Certificate:
     """Return the certificate of a camera that is valid on a day: the last before, else the first after.
 
-    Raises
-    ------
-    InputError
-        Several certificates, and no day of the flight; one of them without a date.
-    ContradictionError
-        Two certificates of one date.
+    InputError: several certificates, and no day of the flight; one of them without a date.
+    ContradictionError: two certificates of one date.
     """
     if len(certificates) == 1:
         return certificates[0]

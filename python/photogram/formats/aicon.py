@@ -13,13 +13,14 @@ blanks, a line for each thing, `#` before comments; millimetres and radians.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.cards import Card, cards, one_file
+from photogram.formats.cards import Card, cards, has_suffix, one_file
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Project, Size, assembled
 from photogram.lazy_dataclasses import dataclass, field
@@ -33,12 +34,6 @@ __all__ = ["FORMAT", "TITLE"]
 TITLE = "AICON block"
 IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
 _NOT_ORIENTED = 1
-
-
-def _recognises(path: Path) -> bool:
-    if path.is_dir():
-        return any(each.suffix.lower() == IMAGES for each in path.iterdir())
-    return path.suffix.lower() == IMAGES
 
 
 @dataclass
@@ -240,4 +235,4 @@ def _project(path: Path, found: _Found, wishes: Wishes) -> Project:
     )
 
 
-FORMAT = Format(name="aicon", title=TITLE, recognises=_recognises, read=read)
+FORMAT = Format(name="aicon", title=TITLE, recognises=partial(has_suffix, IMAGES), read=read)

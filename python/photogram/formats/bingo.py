@@ -15,13 +15,15 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
-from photogram.formats.reduced_coordinates import Reduced, project_of, with_fitting_rotations
-from photogram.formats.reduced_coordinates_writing import (
+from photogram.formats.reduced_coordinates import (
+    Reduced,
     ReducedImages,
     by_photo,
     given_control,
     lost_of_reduced,
+    project_of,
     reduced_images,
+    with_fitting_rotations,
 )
 from photogram.io.csv_text import csv_text
 from photogram.messages import Message, quoted

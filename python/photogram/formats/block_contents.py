@@ -1,16 +1,33 @@
-"""What writers ask of a block: photos with a pose, control with correlations, what has no place."""
+"""What writers ask of a block: photos with a pose, correlated control, what moves, what has no place."""
 
 from __future__ import annotations
+
+from collections import Counter
 
 import numpy as np
 
 from photogram.arguments.types import Bools
 from photogram.errors import InputError
+from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.trajectories_written import shared_trajectories
+from photogram.formats.project import Project
+from photogram.messages import counted
 from photogram.network.block import Block
 from photogram.network.films import Scan
 from photogram.network.observations import Control, Position
+from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 
-__all__ = ["check_films", "correlated_control", "lost_observations", "posed"]
+__all__ = [
+    "check_images",
+    "correlated_control",
+    "lost_motions",
+    "lost_observations",
+    "motions",
+    "posed",
+]
+
+MOST_TOLD = 12
+"""Trajectories that are told one by one."""
 
 
 def posed(block: Block) -> Bools:
@@ -41,13 +58,13 @@ def lost_observations(block: Block, gnss: str) -> list[str]:
     return found
 
 
-def check_films(block: Block, title: str) -> None:
-    """Refuse to write images that are readings of scanned films: a file would have them for images.
+def check_images(block: Block, title: str) -> None:
+    """Refuse to write what a file would have for images in the frame of a camera, and is something else.
 
     Raises
     ------
     InputError
-        Scanned films, or plates.
+        Readings of scanned films or plates; samples and lines of line scanners.
     """
     scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
     if scanned:
@@ -55,3 +72,78 @@ def check_films(block: Block, title: str) -> None:
             f"{title}: the images of the photo {scanned[0]} are readings of a scanned film, which are not"
             " written; `photogram adjust` writes refined.csv, images in mm in the frame of the camera"
         )
+    lines = [each.photo for each in block.timed if each.lines is not None]
+    if lines:
+        raise InputError(f"{title}: the photo {lines[0]} is of a line scanner, and takes no pictures")
+
+
+def motions(project: Project) -> list[str]:
+    """Return what of a project is on trajectories, a line each; nothing where nothing is."""
+    block = project.block
+    shared = shared_trajectories(block)
+    if not block.timed and not shared:
+        return []
+    found = []
+    if block.timed:
+        kinds = {
+            "with a rolling shutter": sum(each.shutter is not None for each in block.timed),
+            "of a line scanner": sum(each.lines is not None for each in block.timed),
+            "with a motion of their own": sum(each.trajectory is None for each in block.timed),
+        }
+        told = ", ".join(f"{count} {what}" for what, count in kinds.items() if count)
+        found.append(
+            ": ".join([f"{counted(len(block.timed), 'photo')} on trajectories", *([told] if told else [])])
+        )
+    found += [_told(each, block) for each in shared[:MOST_TOLD]]
+    if len(shared) > MOST_TOLD:
+        found.append(f"and {len(shared) - MOST_TOLD} more trajectories")
+    settings = project.details.get("settings")
+    if isinstance(settings, Settings) and settings.times:
+        found.append(f"times: {settings.times}")
+    return found
+
+
+def _told(trajectory: Trajectory, block: Block) -> str:
+    """Return what a trajectory is, and what is on it."""
+    table = trajectory.table
+    photos = sum(each.trajectory is trajectory for each in block.timed)
+    kinds = Counter(
+        each.label
+        for each in block.observations
+        if each.moment is not None and each.moment.trajectory is trajectory
+    )
+    on = [counted(photos, "photo")] if photos else []
+    on += [f"{counted(count, 'observation')} of the kind {kind}" for kind, count in kinds.items()]
+    first, last = table.span
+    bases = [
+        f"{what}: {_basis(basis, own)}"
+        for what, basis, own in zip(
+            ("position", "rotation"),
+            (trajectory.position, trajectory.rotation),
+            trajectory.coefficients,
+            strict=True,
+        )
+    ]
+    records = f"{counted(len(table.times), 'record')} of positions, {len(table.attitude_times)} of attitudes"
+    return f"{trajectory.name}: {records}, {first!r} to {last!r} s; {'; '.join(bases)}; {', '.join(on)}"
+
+
+def _basis(basis: Basis | None, coefficients: tuple[Coefficient, ...]) -> str:
+    """Return what corrections are, and what is known of their coefficients."""
+    if basis is None:
+        return "as given"
+    kind = "polynomial" if isinstance(basis, Polynomial) else "spline"
+    held = all(each.is_held for each in coefficients)
+    known = ", known" if held else ""
+    return f"{kind} of degree {basis.degree}, {counted(len(coefficients), 'coefficient')}{known}"
+
+
+def lost_motions(block: Block) -> list[str]:
+    """Return what a format without trajectories has no place for, in sentences."""
+    found = []
+    if block.timed:
+        found.append(f"trajectories: {counted(len(block.timed), 'photo')} with the poses that they are about")
+    records = sum(each.moment is not None for each in block.observations)
+    if records:
+        found.append(counted(records, "observation") + " of trajectories")
+    return found

@@ -14,7 +14,7 @@ from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import quoted
 
-__all__ = ["END", "Card", "angle_unit", "cards", "names_beside", "one_file", "to_radians"]
+__all__ = ["END", "Card", "angle_unit", "cards", "has_suffix", "names_beside", "one_file", "to_radians"]
 
 END = "-99"
 """What ends a photo, or a file."""
@@ -29,13 +29,7 @@ class Card:
         self.words = (place.text or "").split()
 
     def number(self, index: int, what: str) -> float:
-        """Return a word as a number.
-
-        Raises
-        ------
-        InputError
-            There is none, or it is no number.
-        """
+        """Return a word as a number."""
         if index >= len(self.words):
             raise self.place.error(f"ends before {what}")
         return self.place.number(self.words[index], what)
@@ -82,6 +76,11 @@ def names_beside(path: Path) -> dict[str, str]:
             raise table.error(row, f"the number {quoted(number)} is there twice, or has no name")
         found[number] = name
     return found
+
+
+def has_suffix(suffix: str, path: Path) -> bool:
+    """Whether a file has an ending, in any case, or a folder a file that has it."""
+    return any(each.suffix.lower() == suffix for each in (path.iterdir() if path.is_dir() else (path,)))
 
 
 def one_file(path: Path, suffix: str) -> Path | None:

@@ -105,26 +105,15 @@ _ROLES: Mapping[str, Mapping[str, str]] = {
     # Control to some and check to others: what it is not beside the other one.
     "?": {"en": "cp", "fr": "controle, point de controle, pc", "es/pt/it": "controllo, punto de control"},
 }
-UNITS: Mapping[str, float] = {
-    "m": 1.0,
-    "meter": 1.0,
-    "metre": 1.0,
-    "meters": 1.0,
-    "metres": 1.0,
-    "km": 1000.0,
-    "cm": 0.01,
-    "mm": 0.001,
-    "ft": 0.3048,
-    "feet": 0.3048,
-    "foot": 0.3048,
-    "ift": 0.3048,
-    "us-ft": 1200 / 3937,
-    "usft": 1200 / 3937,
-    "ftus": 1200 / 3937,
-    "sft": 1200 / 3937,
-    "us survey ft": 1200 / 3937,
-    "us survey feet": 1200 / 3937,
+_METRES: Mapping[float, str] = {
+    1.0: "m, meter, metre, meters, metres",
+    1000.0: "km",
+    0.01: "cm",
+    0.001: "mm",
+    0.3048: "ft, feet, foot, ift",
+    1200 / 3937: "us-ft, usft, ftus, sft, us survey ft, us survey feet",
 }
+UNITS: Mapping[str, float] = {word: size for size, words in _METRES.items() for word in words.split(", ")}
 """Units of length in headings, in metres."""
 ANGULAR: Mapping[str, str] = {"longitude": "x", "latitude": "y"}
 _SMALL = (
@@ -169,27 +158,12 @@ def _meaning(words: list[str]) -> str | None:
 
 
 _GLUED = re.compile(r"(?:sigma|sd|std|s|m|rms)(xyz|xy|[xyzenh])")
-_TOGETHER = {
-    "xyz": "sd",
-    "x y z": "sd",
-    "xy": "sd_xy",
-    "x y": "sd_xy",
-    "3d": "sd",
-    "2d": "sd_xy",
-    "horizontal": "sd_xy",
-    "hz": "sd_xy",
-    "horz": "sd_xy",
-    "planimetric": "sd_xy",
-    "lage": "sd_xy",
-    "lagegenauigkeit": "sd_xy",
-    "planimetrique": "sd_xy",
-    "vertical": "sd_z",
-    "vert": "sd_z",
-    "hohengenauigkeit": "sd_z",
-    "hoehengenauigkeit": "sd_z",
-    "hrms": "sd_xy",
-    "vrms": "sd_z",
+_OF_SEVERAL = {
+    "sd": "xyz, x y z, 3d",
+    "sd_xy": "xy, x y, 2d, horizontal, hz, horz, planimetric, lage, lagegenauigkeit, planimetrique, hrms",
+    "sd_z": "vertical, vert, hohengenauigkeit, hoehengenauigkeit, vrms",
 }
+_TOGETHER = {word: column for column, words in _OF_SEVERAL.items() for word in words.split(", ")}
 
 
 def column_of(heading: str) -> str | None:

@@ -39,35 +39,13 @@ __all__ = [
 
 ROLES = ("control", "check", "off")
 OURS = (
-    "point",
-    "photo",
-    "x",
-    "y",
-    "z",
-    "sd",
-    "sd_x",
-    "sd_y",
-    "sd_z",
-    "cov_xy",
-    "cov_xz",
-    "cov_yz",
-    "use",
-    "time",
-    "group",
+    *("point", "photo", "x", "y", "z", "sd", "sd_x", "sd_y", "sd_z"),
+    *("cov_xy", "cov_xz", "cov_yz", "use", "time", "group"),
 )
 """Columns that a user may name."""
 STRICT = ("control", "gnss")
 """Tables of which no number may go unread."""
-SHORT: Mapping[str, str] = {
-    "p": "point",
-    "n": "y",
-    "e": "x",
-    "z": "z",
-    "d": "d",
-    "x": "x",
-    "y": "y",
-    "h": "z",
-}
+SHORT = {"p": "point", "n": "y", "e": "x", "z": "z", "d": "d", "x": "x", "y": "y", "h": "z"}
 """Letters of orders of columns, as PNEZD."""
 _PLAIN_ROLES = frozenset({"use", "used", "usage", "role", "rolle", "verwendung", "ruolo", "papel", "uso"})
 """Headings of roles and nothing else; a type or a status may be of something else."""
@@ -253,7 +231,7 @@ def settled(
     if name == "control":
         table = _with_roles(table, columns, messages)
     ready = dict(table.ready)
-    for column, own in zip(table.columns, table.own or table.columns, strict=True):
+    for column, own in table.headings:
         heading = columns.headings.get(column, own)
         factor = -1.0 if heading.startswith("-") and heading.lower() != own else 1.0
         unit = unit_of(heading) or unit_of(own)
@@ -262,12 +240,11 @@ def settled(
         if column in ("x", "y") and is_angular(own):
             letters = "NS" if column == "x" else "EW"
             ready[column] = table.numbers(column, read=partial(_on_axis, letters))
+        factor = abs(factor) if column.startswith("sd") else factor
         if column == "sd_xy":
-            ready["sd_x"] = ready["sd_y"] = table.numbers(column, infinite=True) * abs(factor)
+            ready["sd_x"] = ready["sd_y"] = table.numbers(column, infinite=True) * factor
         elif factor != 1.0 and column in _LENGTHS:
-            ready[column] = table.numbers(column, infinite=column.startswith("sd")) * (
-                abs(factor) if column.startswith("sd") else factor
-            )
+            ready[column] = table.numbers(column, infinite=column.startswith("sd")) * factor
     wide = tuple(each for each in ("sd_x", "sd_y") if each in ready and each not in table.columns)
     check_unread(table, columns, known, name, messages)
     return replace(
@@ -285,7 +262,7 @@ def is_geographic(table: ColumnTable) -> bool:
 
 def heading_of(table: ColumnTable, column: str) -> str:
     """Return what a table calls one of our columns."""
-    return dict(zip(table.columns, table.own, strict=True)).get(column) or column if table.own else column
+    return dict(table.headings).get(column) or column
 
 
 def _on_axis(other: str, text: str) -> float:
@@ -297,9 +274,7 @@ def _on_axis(other: str, text: str) -> float:
 def _with_points(table: ColumnTable, names: Collection[str], messages: list[Message]) -> ColumnTable:
     """Take the column with the names that have images, where several could have the names."""
     found = [
-        column
-        for column, own in zip(table.columns, table.own or table.columns, strict=True)
-        if column in ("point", NAMELESS) or column_of(own) == "point"
+        column for column, own in table.headings if column in ("point", NAMELESS) or column_of(own) == "point"
     ]
     if not found or found == ["point"]:
         return table
@@ -308,19 +283,18 @@ def _with_points(table: ColumnTable, names: Collection[str], messages: list[Mess
     best = max(found, key=lambda column: (hits[column], column == first))
     if best == "point":
         return table
+    headings = dict(table.headings)
     if "point" in table:
-        heading = dict(zip(table.columns, table.own, strict=True))[best] or "without a heading"
+        heading = headings[best] or "without a heading"
         messages.append(
             Message(f"names of points are those of the column {heading}, which have images", table.path)
         )
-    return table.renamed(
-        {"point": dict(zip(table.columns, table.own, strict=True)).get("point", ""), best: "point"}
-    )
+    return table.renamed({"point": headings.get("point", ""), best: "point"})
 
 
 def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -> ColumnTable:
     """Return a table whose column `use` says control, check and off, whatever says it there."""
-    headings = dict(zip(table.columns, table.own or table.columns, strict=True))
+    headings = dict(table.headings)
     words = {
         column: [_role(cell, columns) for cell in table.texts(column)]
         for column in _role_columns(table, columns)
@@ -349,17 +323,14 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
                 f"the column {headings[column]} says who is check and who is control: {counts}", table.path
             )
         )
-    table = table.renamed({column: ROLE})
-    return replace(
-        table, cells={**table.cells, ROLE: uses}, ready={k: v for k, v in table.ready.items() if k != ROLE}
-    )
+    return table.renamed({column: ROLE}).with_texts(ROLE, uses)
 
 
 def _role_columns(table: ColumnTable, columns: Columns) -> list[str]:
     """Return columns of roles: by their names, else those of texts that are the words for check points."""
     found = [
         column
-        for column, own in zip(table.columns, table.own or table.columns, strict=True)
+        for column, own in table.headings
         if column not in columns.ignored and (column == ROLE or column_of(own) in (ROLE, *_FLAGS))
     ]
     if found:
@@ -440,7 +411,7 @@ def _unread(table: ColumnTable, known: Collection[str]) -> list[tuple[str, str]]
     """Return columns that nobody reads, by their names here and in the file."""
     return [
         (column, own or column)
-        for column, own in zip(table.columns, table.own or table.columns, strict=True)
+        for column, own in table.headings
         if column and column not in known and column not in ("sd_xy", NAMELESS)
     ]
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from photogram.formats.project import Project
 from photogram.io.delimited import ColumnTable
 from photogram.io.files import read_lines
+from photogram.io.json import read_json
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place
-from photogram.io.tree import read_json
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
@@ -19,6 +20,7 @@ __all__ = ["ControlList", "read_control_list", "system_of"]
 WGS84 = "EPSG:4979"
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 DIFFER = 1e-6
+_IMAGES = ("photo", "point", "column", "row")
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ def _of_text(path: Path) -> ControlList:
     points: dict[str, tuple[str, str, str]] = {}
     places: dict[str, int] = {}
     by_position: dict[tuple[str, str, str], str] = {}
-    images: dict[str, list[str]] = {"photo": [], "point": [], "column": [], "row": []}
+    images: list[tuple[str, ...]] = []
     records: list[int] = []
     for place in rest:
         words = (place.text or "").split()
@@ -106,13 +108,15 @@ def _of_text(path: Path) -> ControlList:
             raise place.error(f"the point {name} has another position in record {places[name]}")
         places.setdefault(name, place.record or 0)
         # Pixels count from the middle of the first pixel.
-        values = (words[5], name, repr(finite_number(words[3]) + 0.5), repr(finite_number(words[4]) + 0.5))
-        for column, value in zip(images, values, strict=True):
-            images[column].append(value)
+        corner = (repr(finite_number(word) + 0.5) for word in words[3:5])
+        images.append((words[5], name, *corner))
         records.append(place.record or 0)
     if not points:
         raise head.error("is followed by no points")
-    return _lists(path, head, points, places, images, records, crs, [])
+    control = _table(
+        head, ("point", *"xyz"), [(name, *own) for name, own in points.items()], [*places.values()]
+    )
+    return ControlList(control, _table(head, _IMAGES, images, records), crs, [])
 
 
 def _apart(one: tuple[str, str, str], other: tuple[str, str, str]) -> bool:
@@ -131,7 +135,7 @@ def _of_json(path: Path, project: Project) -> ControlList:
         )
     }
     points: dict[str, tuple[str, str, str]] = {}
-    images: dict[str, list[str]] = {"photo": [], "point": [], "column": [], "row": []}
+    images: list[tuple[str, ...]] = []
     messages = []
     for each in read_json(path)["points"]:
         name = each["id"].text()
@@ -149,32 +153,20 @@ def _of_json(path: Path, project: Project) -> ControlList:
                 continue
             x, y = own["projection"].numbers(2).tolist()
             scale = max(size)
-            values = (shot, name, repr(size[0] / 2 + scale * x), repr(size[1] / 2 + scale * y))
-            for column, value in zip(images, values, strict=True):
-                images[column].append(value)
+            images.append((shot, name, repr(size[0] / 2 + scale * x), repr(size[1] / 2 + scale * y)))
     head = Place(path)
     if not points:
         raise head.error("has no points with a position")
-    return _lists(
-        path, head, points, dict.fromkeys(points, 1), images, [1] * len(images["photo"]), WGS84, messages
+    control = _table(
+        head, ("point", *"xyz"), [(name, *own) for name, own in points.items()], [1] * len(points)
     )
+    return ControlList(control, _table(head, _IMAGES, images, [1] * len(images)), WGS84, messages)
 
 
-def _lists(
-    path: Path,
-    head: Place,
-    points: dict[str, tuple[str, str, str]],
-    places: dict[str, int],
-    images: dict[str, list[str]],
-    records: list[int],
-    crs: str,
-    messages: list[Message],
-) -> ControlList:
-    cells = {
-        "point": list(points),
-        **{axis: [own[k] for own in points.values()] for k, axis in enumerate("xyz")},
-    }
-    control = ColumnTable(path, head, tuple(cells), len(points), cells, [places[name] for name in points])
-    return ControlList(
-        control, ColumnTable(path, head, tuple(images), len(records), images, records), crs, messages
-    )
+def _table(
+    head: Place, columns: Sequence[str], rows: Sequence[tuple[str, ...]], records: Sequence[int]
+) -> ColumnTable:
+    """Return rows of cells as the table of a file."""
+    assert head.file is not None
+    cells = {name: [row[k] for row in rows] for k, name in enumerate(columns)}
+    return ColumnTable(head.file, head, tuple(columns), len(rows), cells, records)

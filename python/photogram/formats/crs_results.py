@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.crs import axes_of, has_place, is_on, to_system
@@ -19,13 +20,16 @@ from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid, lengths_of_units
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
+from photogram.show.page import Column, Row, Section, Table, decimals_of
 
-__all__ = ["Placed", "check_place", "placed", "placed_files"]
+__all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
 DEGREE = 180.0 / np.pi
 """Of a radian."""
+MOST = 500
+"""Points that are listed; the tables have all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +166,11 @@ def placed(result: Result, crs: str = "") -> Placed:
     places = result.photo_positions, result.point_positions[rows]
     frame = check_place(block, crs)
     (photos, photo_turns), (points, point_turns) = (_carried(block, crs, frame, xyz) for xyz in places)
-    names, units = axes_of(crs) if crs else _own_axes(block)
+    names, units = ("x", "y", "z"), (block.linear_unit,) * 3
+    if crs:
+        names, units = axes_of(crs)
+    elif block.geographic:
+        names, units = ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
     turned = [
         turns @ own @ turns.transpose(0, 2, 1)
         for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
@@ -228,12 +236,6 @@ def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats,
     return degrees, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
 
 
-def _own_axes(block: Block) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
-    if block.geographic:
-        return ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
-    return ("x", "y", "z"), (block.linear_unit,) * 3
-
-
 def _positions(names: Sequence[str], xyz: Floats, covariances: Floats) -> dict[str, Any]:
     sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     pairs = [(i, j) for i in range(3) for j in range(i + 1)]
@@ -263,3 +265,32 @@ def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
 
 def _turned(turns: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.einsum("nij,nj->ni", turns, vectors))
+
+
+def placed_section(found: Placed) -> Section:
+    """Return adjusted control and check points in the system of a client, with standard deviations.
+
+    Standard deviations are along east, north and up of the system, in metres.
+    """
+    names, kinds = found.result.block.point_ids, found.result.point_kinds
+    own = [k for k, row in enumerate(found.rows.tolist()) if kinds[row] != "pass"]
+    own.sort(key=lambda k: natural_order(names[int(found.rows[k])]))
+    sd = np.sqrt(np.diagonal(found.point_covariances, axis1=1, axis2=2))
+    decimals = decimals_of(sd)
+    columns = [
+        Column("Point", text=True),
+        Column("Kind", text=True),
+        *(
+            Column(name.capitalize(), unit, 8 if unit == "deg" else decimals)
+            for name, unit in zip(found.names, found.units, strict=True)
+        ),
+        *(Column(f"sd {axis}", "m", decimals) for axis in ("east", "north", "up")),
+    ]
+    rows: list[Row] = []
+    for k in own[:MOST]:
+        row = int(found.rows[k])
+        rows.append([names[row], str(kinds[row]), *found.points[k].tolist(), *sd[k].tolist()])
+    left = len(own) - len(rows)
+    note = "Tables of all photos and points are in `in_crs`" + (f"; {left} more there." if left else ".")
+    title = f"Control and check points in {found.crs}"
+    return Section("in-crs", title, [Table(title, columns, rows, note)] if rows else [])

@@ -1,4 +1,7 @@
-"""Image coordinates of files and of cameras: pixels from the corner, or what a model counts in."""
+"""Image coordinates of files and of cameras: pixels from the corner, or what a model counts in.
+
+What needs the size of the pictures of a camera, and does not know it, is an :class:`photogram.InputError`.
+"""
 
 from __future__ import annotations
 
@@ -8,21 +11,26 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
 
-__all__ = ["from_corner", "in_corner", "known_size", "sizes_of", "to_corner"]
+__all__ = [
+    "from_corner",
+    "from_tables",
+    "in_corner",
+    "in_unit",
+    "known_size",
+    "sizes_of",
+    "to_corner",
+    "to_tables",
+]
 
 
 def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
     """Return (m, 2) image coordinates of a camera in pixels from columns and rows from the upper-left corner.
 
     Models that count y upwards count from the middle of the picture.
-
-    Raises
-    ------
-    InputError
-        Such a camera whose pictures have no known size.
     """
     if camera.image_y == "down":
         return corner
@@ -32,13 +40,7 @@ def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
 
 
 def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
-    """Return (m, 2) columns and rows from the upper-left corner, of image coordinates of a camera in pixels.
-
-    Raises
-    ------
-    InputError
-        A camera that counts from the middle of its pictures, whose size is not known.
-    """
+    """Return (m, 2) columns and rows from the upper-left corner, of image coordinates in pixels."""
     if camera.image_y == "down":
         return xy
     width, height = known_size(camera, size)
@@ -46,13 +48,7 @@ def in_corner(camera: Camera, size: Size | None, xy: Floats) -> Floats:
 
 
 def to_corner(project: Project) -> Floats:
-    """Return (m, 2) columns and rows from the upper-left corner, pixels.
-
-    Raises
-    ------
-    InputError
-        Images in millimetres, a camera whose pictures have no known size.
-    """
+    """Return (m, 2) columns and rows from the upper-left corner, pixels; images in millimetres have none."""
     block = project.block
     if block.image_unit != "px" or block.photo_cameras is None:
         raise InputError("images are in millimetres: they have no columns and rows")
@@ -65,24 +61,38 @@ def to_corner(project: Project) -> Floats:
 
 
 def known_size(camera: Camera, size: Size | None) -> Size:
-    """Return the size of the pictures of a camera.
-
-    Raises
-    ------
-    InputError
-        It is not known.
-    """
+    """Return the size of the pictures of a camera."""
     if size is None:
         raise InputError(f"the size of the pictures of the camera {camera.title} is not known")
     return size
 
 
 def sizes_of(project: Project) -> Sequence[Size]:
-    """Return width and height of the pictures of each camera.
-
-    Raises
-    ------
-    InputError
-        One that is not known.
-    """
+    """Return width and height of the pictures of each camera."""
     return [known_size(each, size) for each, size in zip(project.block.cameras, project.sizes, strict=True)]
+
+
+def in_unit(settings: Settings, xy: Floats, *, pixels: bool) -> Floats:
+    """Return (m, 2) image coordinates in the unit of cameras; pixels count from the corner of the first.
+
+    `pixels` says that they are pixels: columns and rows, or samples and lines of scanners.
+    """
+    found = xy * 1e-3 if settings.image == "um" and not pixels else xy
+    return found + 0.5 if pixels and settings.pixel_origin == "center" else found
+
+
+def from_tables(settings: Settings, camera: Camera, size: Size | None, xy: Floats) -> Floats:
+    """Return (m, 2) image coordinates along the axes of a camera, from those that tables have in its unit."""
+    if settings.image == "px" and settings.image_y == "down":
+        return from_corner(camera, size, xy)
+    if settings.image == "px" and camera.image_y == "down":
+        width, height = known_size(camera, size)
+        return np.column_stack([width / 2 + xy[:, 0], height / 2 - xy[:, 1]])
+    return xy if camera.image_y == settings.image_y else xy * [1.0, -1.0]
+
+
+def to_tables(image_y: str, camera: Camera, size: Size | None, xy: Floats) -> Floats:
+    """Return (m, 2) image coordinates as tables have them whose `[axes] image_y` this is."""
+    if camera.unit == "px" and image_y == "down":
+        return in_corner(camera, size, xy)
+    return xy if camera.image_y == image_y else xy * [1.0, -1.0]

@@ -46,7 +46,8 @@ class OnDisk:
         outcome, variance = self.outcome, self.outcome.variance_of_unit_weight
         observations, weighted, unknowns = outcome.counts
         camera, ground, plates, others = outcome.sums_of_squares
-        photos, points, images = (sum(each) for each in _sizes(self.manifest))
+        manifest = self.manifest
+        photos, points, images = map(sum, (manifest.photos, manifest.points, manifest.images))
         lines = [
             f"{outcome.status} after {len(outcome.iterations)} iterations",
             f"{photos:,} photos, {points:,} points, {images:,} image points in {len(self.folders)} nodes",
@@ -63,10 +64,6 @@ class OnDisk:
             for each in outcome.iterations
         ]
         return lines
-
-
-def _sizes(manifest: Manifest) -> tuple[list[int], list[int], list[int]]:
-    return manifest.photos, manifest.points, manifest.images
 
 
 def _as_said(project: Project) -> Loss | None:

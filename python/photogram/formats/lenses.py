@@ -10,20 +10,13 @@ from photogram.network.cameras import Camera
 
 __all__ = ["Lens", "lens_of"]
 
+_TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
 """Models that count from the middle of the picture, y up."""
-_FAMILY = _MIDDLE | frozenset(
-    {
-        "radial",
-        "simple_radial",
-        "simple_pinhole",
-        "pinhole",
-        "opencv",
-        "full_opencv",
-        "opencv_pinhole",
-        "agisoft_frame",
-    }
-)
+_FAMILY = _MIDDLE | {
+    *("radial", "simple_radial", "simple_pinhole", "pinhole"),
+    *("opencv", "full_opencv", "opencv_pinhole", "agisoft_frame"),
+}
 
 
 @dataclass(frozen=True)
@@ -56,12 +49,11 @@ class Lens:
     @property
     def terms(self) -> tuple[float, ...]:
         """k1, k2, p1, p2, k3, k4, k5, k6."""
-        return self.k1, self.k2, self.p1, self.p2, self.k3, self.k4, self.k5, self.k6
+        return tuple(getattr(self, name) for name in _TERMS)
 
     def is_plain(self, *names: str) -> bool:
         """Whether nothing but the named terms is there."""
-        all_terms = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
-        return not any(getattr(self, name) for name in all_terms if name not in names)
+        return not any(getattr(self, name) for name in _TERMS if name not in names)
 
 
 def lens_of(camera: Camera, size: Size | None) -> Lens | None:
@@ -74,26 +66,13 @@ def lens_of(camera: Camera, size: Size | None) -> Lens | None:
         return None
     if camera.model == "opencv_pinhole" and any(values[name] for name in ("s1", "s2", "s3", "s4")):
         return None
-    terms = {
-        name: values[name] for name in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2") if name in values
-    }
+    terms = {name: values[name] for name in _TERMS if name in values}
     if camera.model == "agisoft_frame":
         if values["b2"] or values["k4"]:
             return None
-        terms = {
-            "k1": values["k1"],
-            "k2": values["k2"],
-            "k3": values["k3"],
-            "p1": values["p2"],
-            "p2": values["p1"],
-        }
-        return Lens(
-            values["f"] + values["b1"],
-            values["f"],
-            values["w"] / 2 + values["cx"],
-            values["h"] / 2 + values["cy"],
-            **terms,
-        )
+        terms |= {"p1": values["p2"], "p2": values["p1"]}
+        fx, middle = values["f"] + values["b1"], (values["w"] / 2, values["h"] / 2)
+        return Lens(fx, values["f"], middle[0] + values["cx"], middle[1] + values["cy"], **terms)
     if camera.model in _MIDDLE:
         return None if size is None else _about_middle(camera, size, terms)
     if "k" in values:

@@ -1,18 +1,20 @@
-"""Names of points beside formats that number them: `names.csv` with the columns `point` and `name`."""
+"""Names of points beside formats that number them (`names.csv`: `point` and `name`), and their colours."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
+from photogram.arguments.types import Indices
+from photogram.formats.plain.statement_tables import asked_by_other_names
 from photogram.formats.plain.tables import indices_of
 from photogram.formats.project import Project
-from photogram.formats.statement_request import asked_by_other_names
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.messages import Message
 
-__all__ = ["NAMES", "names_file", "numbered", "renamed", "with_names"]
+__all__ = ["NAMES", "Colours", "names_file", "numbered", "renamed", "with_names"]
 
 NAMES = "names.csv"
 LARGEST = 2**53
@@ -81,3 +83,31 @@ def names_file(numbers: Mapping[str, int]) -> dict[str, bytes]:
     if all(str(number) == name for name, number in numbers.items()):
         return {}
     return {NAMES: csv_text({"point": list(numbers.values()), "name": list(numbers)})}
+
+
+class Colours(Mapping[str, Sequence[int]]):
+    """Red, green and blue of points.
+
+    Parameters
+    ----------
+    names
+        Of the points.
+    values
+        (n, 3) from 0 to 255.
+    """
+
+    def __init__(self, names: Sequence[str], values: Indices) -> None:
+        self._names, self._values = names, values
+
+    @cached_property
+    def _found(self) -> dict[str, list[int]]:
+        return dict(zip(self._names, self._values.tolist(), strict=True))
+
+    def __getitem__(self, name: str) -> Sequence[int]:
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.formats.cards import END, Card, angle_unit, cards, names_beside, one_file, to_radians
+from photogram.formats.cards import (
+    END,
+    Card,
+    angle_unit,
+    cards,
+    has_suffix,
+    names_beside,
+    one_file,
+    to_radians,
+)
 from photogram.formats.format import Format, Wishes
 from photogram.formats.names import numbered
 from photogram.formats.project import Project
-from photogram.formats.reduced_coordinates import Reduced, project_of, with_fitting_rotations
-from photogram.formats.reduced_coordinates_writing import (
+from photogram.formats.reduced_coordinates import (
+    Reduced,
     ReducedImages,
     by_photo,
     given_control,
     lost_of_reduced,
+    project_of,
     reduced_images,
+    with_fitting_rotations,
 )
 from photogram.formats.rotations import is_rotation
 from photogram.io.csv_text import csv_text
@@ -32,12 +44,6 @@ IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
 MICROMETRES = 1e-3
 DIGITS = 6
 """Of principal distances in millimetres: files have three of the micrometre."""
-
-
-def _recognises(path: Path) -> bool:
-    if path.is_dir():
-        return any(each.suffix.lower() == IMAGES for each in path.iterdir())
-    return path.suffix.lower() == IMAGES
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -199,7 +205,7 @@ def _oriented(project: Project, reduced: ReducedImages, numbers: Mapping[str, in
 FORMAT = Format(
     name="patb",
     title=TITLE,
-    recognises=_recognises,
+    recognises=partial(has_suffix, IMAGES),
     read=read,
     write=write,
     files=(f"block{IMAGES}", f"*{IMAGES}"),

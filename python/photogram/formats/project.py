@@ -72,20 +72,15 @@ class Repeated:
 
 
 @dataclass(frozen=True, eq=False)
-class Unused:
+class Unused(Repeated):
     """Images of a board that were left out (`use` = `off`), which stay with the project.
 
     Attributes
     ----------
-    photos, points
-        Their k names.
-    xy, sd
-        (k, 2) image coordinates and their standard deviations, in the unit of the block.
+    sd
+        (k, 2) standard deviations of image coordinates, in the unit of the block.
     """
 
-    photos: tuple[str, ...] = ()
-    points: tuple[str, ...] = ()
-    xy: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     sd: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 

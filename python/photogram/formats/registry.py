@@ -2,27 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 
 from photogram.errors import InputError, PhotogramError
-from photogram.formats.block_contents import check_films
-from photogram.formats.cameras_alone import FORMATS_OF_CAMERAS
-from photogram.formats.format import Format, Wishes
-from photogram.formats.millimetres import in_pixels, nominal_pixels
-from photogram.formats.motion_summary import check_held, lost_motions
+from photogram.formats.block_contents import check_images, lost_motions
+from photogram.formats.format import Format, Wishes, later
+from photogram.formats.format_coordinates import (
+    in_pixels,
+    in_topocentric,
+    nominal_pixels,
+    topocentric_remarks,
+)
+from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
-from photogram.formats.statement_request import parts_of_asked
-from photogram.formats.topocentric import in_topocentric, topocentric_remarks
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
 from photogram.messages import counted, listed
 from photogram.results.result import Result
 
-__all__ = ["FORMATS", "adjusting", "cannot_hold", "read", "recognised", "target", "to_files"]
+__all__ = [
+    "FORMATS",
+    "FORMATS_OF_CAMERAS",
+    "adjusting",
+    "cannot_hold",
+    "read",
+    "recognised",
+    "target",
+    "to_files",
+]
 
 FORMATS: dict[str, Format] = {
     name: import_module(f"photogram.formats.{name}").FORMAT
@@ -47,6 +60,42 @@ FORMATS: dict[str, Format] = {
     )
 }
 """By name, in the order in which help lists them."""
+
+
+def _written(name: str, project: Project) -> Mapping[str, bytes]:
+    from photogram.formats.targets.cameras import rig_of_project
+    from photogram.targets.output.formats import CAMERA_FORMATS
+
+    return CAMERA_FORMATS[name](rig_of_project(project))
+
+
+def _unread(path: Path, wishes: Wishes) -> Project:
+    """Refuse to read what has cameras alone."""
+    del wishes
+    raise InputError("has cameras alone, and no photos", file=path)
+
+
+FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
+    {
+        name: Format(
+            name=name,
+            title=title,
+            recognises=lambda _: False,
+            read=_unread,
+            write=partial(_written, name),
+            cannot_hold=later("photogram.formats.targets.cameras", "lost_beside_cameras"),
+            pixels=True,
+            geographic=True,
+        )
+        for name, title in (
+            ("opencv_yaml", "YAML of OpenCV"),
+            ("ros_camera_info", "camera_info of ROS"),
+            ("kalibr_camchain", "camchain.yaml of Kalibr"),
+            ("mrcal", "a .cameramodel of mrcal"),
+        )
+    }
+)
+"""By name, as `photogram.targets.camera_files` has them."""
 _TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
 SD = ("images", "control", "check", "gnss")
 """What of any format may have standard deviations that its files do not say."""
@@ -80,17 +129,14 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
         # The reader says best what is missing.
         return among[0], path
     if found:
-        raise InputError(f"may be read as {_told(found, path)}: say which", file=path)
+        several = ", ".join(
+            f"{each.title} (--format {each.name}{'' if where == path else f', {where.name}'})"
+            for each, where in found
+        )
+        raise InputError(f"may be read as {several}: say which", file=path)
     what = "folder holds" if path.is_dir() else "file is"
     titles = listed([f"{each.title} ({each.name})" for each in FORMATS.values()], len(FORMATS))
     raise InputError(f"the {what} none of the formats that are known: {titles}{_beside(path)}", file=path)
-
-
-def _told(found: Sequence[tuple[Format, Path]], path: Path) -> str:
-    return ", ".join(
-        f"{each.title} (--format {each.name}{'' if where == path else f', {where.name}'})"
-        for each, where in found
-    )
 
 
 def _beside(path: Path) -> str:
@@ -158,8 +204,7 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
         writable = ", ".join(name for name, each in _TO_WRITE.items() if each.write)
         raise InputError(f"{chosen.title} is only read; what can be written: {writable}")
     if chosen.name != "plain":
-        check_films(project.block, chosen.title)
-        check_held(project.block, chosen.title)
+        check_images(project.block, chosen.title)
     return chosen.write(_fitting(project, chosen))
 
 
@@ -260,8 +305,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     """
     chosen = _named(file_format, _TO_WRITE)
     if chosen.name != "plain":
-        check_films(project.block, chosen.title)
-        check_held(project.block, chosen.title)
+        check_images(project.block, chosen.title)
     beside = [counted(len(project.features), "feature")] if project.features else []
     beside += parts_of_asked(project.statement) + lost_motions(project.block)
     return [

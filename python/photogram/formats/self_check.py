@@ -9,6 +9,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project
+from photogram.formats.rotations import Y_DOWN
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -172,10 +173,9 @@ def _mirrored(axis: int) -> Callable[[_Sample], _Sample]:
     return change
 
 
-_FLIP = np.diag([1.0, -1.0, -1.0])
 _OTHERS: dict[str, Callable[[_Sample], _Sample]] = {
     "y (rows) counted the other way": _mirrored(1),
     "x (columns) counted the other way": _mirrored(0),
     "rotations transposed": lambda sample: replace(sample, matrices=sample.matrices.transpose(0, 2, 1)),
-    "photos that look the other way": lambda sample: replace(sample, matrices=_FLIP @ sample.matrices),
+    "photos that look the other way": lambda sample: replace(sample, matrices=Y_DOWN @ sample.matrices),
 }

@@ -18,12 +18,12 @@ from photogram.formats.intersection import intersected
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import WITH_SD, Settings
+from photogram.formats.plain.statement_tables import with_cover
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
-from photogram.formats.statement_request import with_cover
-from photogram.io.delimited import ColumnTable, Names
+from photogram.io.delimited import ColumnTable
 from photogram.messages import Message, listed
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
@@ -302,9 +302,7 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
         given.messages.append(
             Message(f"measurements on other photos are left out: {listed(lost, 3)}", table.path)
         )
-    known = _some_rows(table, rows)
-    ready = {column: each for column, each in known.ready.items() if column != "photo"}
-    return replace(known, cells={**known.cells, "photo": [names[row] for row in rows]}, ready=ready)
+    return table.some(rows).with_texts("photo", [names[row] for row in rows])
 
 
 def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
@@ -325,17 +323,7 @@ def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
         for row, pair in enumerate(pairs)
         if pair not in known or np.abs(there[known[pair]] - given[row]).max() > SAME
     ]
-    return _some_rows(table, rows)
-
-
-def _some_rows(table: ColumnTable, rows: Sequence[int]) -> ColumnTable:
-    cells = {column: [each[row] for row in rows] for column, each in table.cells.items()}
-    ready = {
-        column: Names(each.names, each.rows[rows]) if isinstance(each, Names) else each[rows]
-        for column, each in table.ready.items()
-    }
-    records = [table.records[row] for row in rows]
-    return replace(table, cells=cells, ready=ready, count=len(rows), records=records)
+    return table.some(rows)
 
 
 def with_control(

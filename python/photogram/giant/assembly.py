@@ -1,32 +1,110 @@
-"""From the five files to a block: the rules of the GIANT guide that hold between files."""
+"""From the five files to a block: the rules of the GIANT guide that hold between files, and remarks."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.giant.common import Common
+from photogram.giant.contents import Contents
 from photogram.giant.frames import ATTITUDE_SD, Frame
+from photogram.giant.ground import GroundPoint
 from photogram.giant.images import IMAGE_SD, ImageFrame
 from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
 from photogram.giant.records import error_at, message_at
-from photogram.giant.remarks import plain_name, remarks
-from photogram.messages import Message
+from photogram.messages import Message, listed
+from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
 from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
 from photogram.network.structuring import structure
-
-if TYPE_CHECKING:
-    from photogram.giant.common import Common
-    from photogram.giant.contents import Contents
-    from photogram.giant.ground import GroundPoint
+from photogram.network.ties import FEWEST_TIES, ties
 
 __all__ = ["assemble", "job_refraction"]
+
+
+EARTH_RADIUS = 6.371e6
+"""Metres."""
+FALSE_ORIGIN = 1e5
+"""Map projections count from an origin farther off than this; local systems seldom do."""
+UPRIGHT = 0.97
+"""Vertical component of the axis of a near-vertical photo, at least."""
+
+
+def remarks(block: Block, frames: list[Frame]) -> list[Message]:
+    """Return remarks on stations without enough rays, names that are alike, and coordinates of a map."""
+    messages = []
+    for frame, count in zip(frames, ties(block).tolist(), strict=True):
+        loose = not (all(frame.position_sd) and all(frame.attitude_sd))
+        if count < FEWEST_TIES and loose:
+            text = (
+                f"the frame {frame.name} has {count} points that other frames or control tie: its station"
+                " rests on its weights, which are the weak defaults"
+            )
+            messages.append(message_at(frame.record, text))
+    return messages + _alike(block) + _map_projection(block)
+
+
+def plain_name(name: str) -> str:
+    """Return a name without blanks and case."""
+    return "".join(name.split()).casefold()
+
+
+def _alike(block: Block) -> list[Message]:
+    """Name the photos and points whose names differ by case or blanks inside only.
+
+    The program compared names exactly (2A4), so they are different ones; few users mean that.
+    """
+    messages = []
+    for what, names in (("photos", block.photo_ids), ("points", block.point_ids)):
+        plain = [*map(plain_name, names)]
+        if len(set(plain)) == len(names):
+            continue
+        groups: dict[str, list[str]] = {}
+        for alike, name in zip(plain, names, strict=True):
+            groups.setdefault(alike, []).append(name)
+        pairs = [" and ".join(map(repr, group)) for group in groups.values() if len(group) > 1]
+        if pairs:
+            messages.append(
+                Message(
+                    f"{what} whose names differ by case or blanks only are different {what}: {listed(pairs)}"
+                )
+            )
+    return messages
+
+
+def _map_projection(block: Block) -> list[Message]:
+    """Tell State Plane or UTM coordinates by their size; the earth is curved, a map is not.
+
+    A level surface drops by d^2/2R at the distance d. Seen from the height H that moves the image of a point,
+    at the radius r, by H r^3 / 2 R c^2.
+    """
+    if block.geographic:
+        return []
+    east, north, height = np.median(np.abs(block.photo_positions), axis=0).tolist()
+    vertical = np.abs(geometry.rotation_matrix(block.photo_attitudes)[:, 2, 2])
+    if max(east, north) < max(FALSE_ORIGIN, 20 * height) or np.median(vertical) < UPRIGHT:
+        return []
+    known = block.point_positions[:, 2]
+    ground = float(np.median(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
+    distances = block.known_distances("GIANT files")[block.image_photos]
+    radii = np.hypot(block.image_xy[:, 0], block.image_xy[:, 1])
+    shifts = abs(height - ground) * radii**3 / (2 * EARTH_RADIUS * distances**2)
+    shift = float(np.quantile(shifts, 0.95))
+    if shift < np.median(block.image_sd):
+        return []
+    return [
+        Message(
+            "the coordinates look like those of a map projection (State Plane, UTM): the earth's curvature"
+            f" is not modelled, which moves images by up to {1000 * shift:.0f} um (heights in metres);"
+            " geographic coordinates (COMMON column 1) or a local tangent system have no such error"
+        )
+    ]
 
 
 LONGEST_METRES = 1e7
@@ -38,10 +116,8 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
 
     Photos stand in the order of FRAMES, points in the order of their first image.
 
-    Raises
-    ------
-    InputError
-        A frame without images, a camera that is not defined, no frame at all, or a limit that is exceeded.
+    Raises InputError: a frame without images, a camera that is not defined, no frame at all, or a limit that
+    is exceeded.
     """
     limits = limits or Limits()
     common, messages = project.common, list[Message]()
@@ -78,7 +154,7 @@ def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, li
         photo_attitude_sd=_or_default([frame.attitude_sd for frame in frames], ATTITUDE_SD),
         point_sd=sd,
         point_check_sd=check_sd,
-        spheroid=_spheroid(common),
+        spheroid=Spheroid(common.semi_major, common.semi_minor) if common.geographic else None,
         photo_to_ground=common.photo_to_ground,
         title=common.title,
         linear_unit=_linear_unit(common),
@@ -95,16 +171,10 @@ def job_refraction(
     water: Water | Literal["none"] | None = None,
     index: float | None = None,
 ) -> Refraction | None:
-    """Return the refraction of a job: the guide's models where COMMON has the switch, or those named here.
+    """Return the refraction of a job: models of the guide where COMMON has the switch, or those named here.
 
-    Parameters
-    ----------
-    common
-        Switches and water level (metres).
-    air, water
-        Models applied whether or not COMMON asks for them, or `none` though it does; None: as COMMON says.
-    index
-        Refractive index of the water; None for the default of :class:`photogram.Refraction`.
+    `none` leaves a model out though COMMON asks for it, None is as COMMON says; the index is that of the
+    water.
     """
     asked = air or ("giant" if common.air_refraction else "none")
     in_air = None if asked == "none" else asked
@@ -167,10 +237,10 @@ def _principal_distances(project: Contents, images: list[ImageFrame]) -> Floats:
 
 def _first_images(
     images: list[ImageFrame],
-    image_photos: NDArray[np.int64],
-    image_points: NDArray[np.int64],
+    image_photos: Indices,
+    image_points: Indices,
     messages: list[Message],
-) -> NDArray[np.int64]:
+) -> Indices:
     """Return the rows of the first image of every point on every photo, in their order."""
     pairs = image_photos * (image_points.max() + 1) + image_points
     order = np.argsort(pairs, kind="stable")
@@ -251,7 +321,3 @@ def _longitudes(positions: Floats, geographic: bool) -> Floats:
 def _linear_unit(common: Common) -> str:
     """Tell feet from metres by the axes of the spheroid, which fix the linear unit of the job."""
     return "ft" if common.geographic and common.semi_major > LONGEST_METRES else "m"
-
-
-def _spheroid(common: Common) -> Spheroid | None:
-    return Spheroid(common.semi_major, common.semi_minor) if common.geographic else None

@@ -33,10 +33,8 @@ class Camera:
 def parse_cameras(source: Source) -> list[Camera]:
     """Read CAMERAS.
 
-    Raises
-    ------
-    InputError
-        A field that is no number, a principal distance of zero, or a name that stands there twice.
+    Raises InputError: a field that is no number, a principal distance of zero, or a name that stands there
+    twice.
     """
     cameras: list[Camera] = []
     spellings: dict[str, Record] = {}
@@ -55,10 +53,7 @@ def parse_cameras(source: Source) -> list[Camera]:
 def camera_records(cameras: Iterable[Camera]) -> list[str]:
     """Write CAMERAS.
 
-    Raises
-    ------
-    ValueError
-        A name or a principal distance does not fit its field.
+    Raises ValueError: a name or a principal distance does not fit its field.
     """
     return [
         f"{format_name(camera.name)}  {format_principal_distance(camera.principal_distance)}"

@@ -131,23 +131,10 @@ class Columns:
 
 
 def real_fields(values: ArrayLike, width: int, decimals: int) -> Table:
-    """Write numbers for Fw.d fields, each as :func:`photogram.giant.fields.format_real` does.
+    """Write numbers (n, k) for Fw.d fields, each as :func:`photogram.giant.fields.format_real` does.
 
-    Parameters
-    ----------
-    values
-        (n, k) numbers.
-    width, decimals
-        Of the field, at most 12 columns.
-
-    Returns
-    -------
-    (n, k width) characters.
-
-    Raises
-    ------
-    ValueError
-        A number that is infinite or too large for the field.
+    Returns (n, k width) characters of at most 12 a field. Raises ValueError: a number that is infinite or too
+    large for the field.
     """
     return _in_runs(values, width, lambda run: _reals(run, width, decimals))
 
@@ -164,23 +151,9 @@ def _reals(values: Floats, width: int, decimals: int) -> Table:
 
 
 def angle_fields(values: ArrayLike, width: int) -> Table:
-    """Write radians as packed DMS fields, each as :func:`photogram.giant.fields.format_angle` does.
+    """Write radians (n, k) as packed DMS fields, each as :func:`photogram.giant.fields.format_angle` does.
 
-    Parameters
-    ----------
-    values
-        (n, k) angles in radians.
-    width
-        Of the field, at most 12 columns.
-
-    Returns
-    -------
-    (n, k width) characters.
-
-    Raises
-    ------
-    ValueError
-        An angle that is beyond 360 degrees.
+    Returns (n, k width) characters of at most 12 a field. Raises ValueError: an angle beyond 360 degrees.
     """
     return _in_runs(values, width, lambda run: _angles(run, width))
 
@@ -211,14 +184,9 @@ def _angles(values: Floats, width: int) -> Table:
 def position_fields(positions: ArrayLike, geographic: bool) -> Table:
     """Write (n, 3) coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height.
 
-    Returns
-    -------
-    (n, 36) characters.
+    Returns (n, 36) characters.
 
-    Raises
-    ------
-    ValueError
-        A number that does not fit its field.
+    Raises ValueError: a number that does not fit its field.
     """
     positions = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
     if not geographic:

@@ -129,10 +129,8 @@ class Common:
 def parse_common(source: Source) -> Common:
     """Read COMMON.
 
-    Raises
-    ------
-    InputError
-        Fewer than two records, a field that is no number, or a value that the guide's table does not have.
+    Raises InputError: fewer than two records, a field that is no number, or a value that the guide's table
+    does not have.
     """
     if len(source.lines) < 2:
         raise source.error("two records are needed: the title and the job definition")
@@ -192,10 +190,7 @@ def _digit(job: Record, column: int, largest: int) -> int:
 def common_records(common: Common) -> list[str]:
     """Write COMMON.
 
-    Raises
-    ------
-    ValueError
-        A value does not fit its field.
+    Raises ValueError: a value does not fit its field.
     """
     if len(common.title) > 80 or not common.title.isprintable():
         raise ValueError("the title must be one line of at most 80 characters")

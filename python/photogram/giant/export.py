@@ -5,15 +5,15 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.naming import natural_order
+from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.cameras import Camera
 from photogram.giant.common import Common
+from photogram.giant.contents import Contents
 from photogram.giant.fields import printed_order
 from photogram.giant.files import written
 from photogram.giant.frames import Frame, frame_records
@@ -22,9 +22,6 @@ from photogram.giant.images import ImageFrame
 from photogram.messages import Message
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
-
-if TYPE_CHECKING:
-    from photogram.giant.contents import Contents
 
 __all__ = ["adjusted_frames", "adjusted_ground", "adjusted_records", "block_files"]
 
@@ -169,15 +166,7 @@ def _triple(values: Floats) -> Triple:
 
 
 def adjusted_frames(project: Contents, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
-    """Return the stations for units 8 and 20: adjusted values with the standard deviations of the input.
-
-    Parameters
-    ----------
-    project, block
-        What was adjusted: `block` is `project.to_block()`.
-    positions, attitudes
-        (P, 3) adjusted values, in the units and the order of the block.
-    """
+    """Return the stations for units 8 and 20: adjusted values (P, 3) with the deviations of the input."""
     turned = _turns(attitudes)
     rows = {name: row for row, name in enumerate(block.photo_ids)}
     return [
@@ -193,20 +182,11 @@ def adjusted_frames(project: Contents, block: Block, positions: Floats, attitude
 def adjusted_ground(
     project: Contents, block: Block, positions: Floats, *, as_published: bool = False
 ) -> list[GroundPoint]:
-    """Return the points for unit 9: every point on two or more photographs.
+    """Return the points for unit 9: every point on two or more photographs; NaN positions were not used.
 
     Control keeps its standard deviations and type code. Pass points get the type code 7, so that the file can
-    be read as GROUND without turning them into control. They are sorted, P9 before P10, unless COMMON
-    (column 13) says not to.
-
-    Parameters
-    ----------
-    project, block
-        What was adjusted: `block` is `project.to_block()`.
-    positions
-        (n, 3) adjusted positions in the units and the order of the block; NaN for points that were not used.
-    as_published
-        Sort as the 1987 program did and the printout does: names right-justified.
+    be read as GROUND without turning them into control. They are sorted, P9 before P10, unless COMMON (column
+    13) says not to; `as_published` as the 1987 program did and the printout does: names right-justified.
     """
     control = {point.name: point for point in project.ground}
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
@@ -238,24 +218,11 @@ def adjusted_records(
     """Return the records of the output files by name (GIANT guide, section II.A).
 
     RESTART (unit 20) always, but for stations that diverged beyond its columns; FRAMES (unit 8) and GROUND
-    (unit 9) of an adjustment that converged, unless COMMON says not to save them.
+    (unit 9) of an adjustment that converged, unless COMMON says not to save them. Positions and attitudes (P,
+    3), (P, 3), (n, 3) are those of the last iteration, as in :func:`adjusted_frames` and
+    :func:`adjusted_ground`.
 
-    Parameters
-    ----------
-    project, block
-        What was adjusted: `block` is `project.to_block()`.
-    photo_positions, photo_attitudes, point_positions
-        (P, 3), (P, 3) and (n, 3) values of the last iteration, as in :func:`adjusted_frames` and
-        :func:`adjusted_ground`.
-    converged
-        Whether they are the solution.
-    as_published
-        Whether GROUND is sorted as in 1987; see :func:`adjusted_ground`.
-
-    Raises
-    ------
-    InputError
-        A value of an adjustment that converged does not fit its field.
+    Raises InputError: a value of an adjustment that converged does not fit its field.
     """
     geographic = project.common.geographic
     frames = adjusted_frames(project, block, photo_positions, photo_attitudes)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from decimal import Decimal
 
-from photogram.io.fields import parse_real
+from photogram.io.records import parse_real
 from photogram.show.angles import ARCSEC
 
 __all__ = [
@@ -56,17 +56,14 @@ def unpack_dms(packed: Decimal) -> tuple[int, int, int, Decimal]:
 def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
     """Read a packed DMS field.
 
+    Raises ValueError: the field is no number, or has more than 360 degrees, 60 minutes or 60 seconds: the
+    guide's fatal ILLEGAL DMS FIELD.
+
     Returns
     -------
     angle, doubtful
         Radians, and whether minutes or seconds are 60: the guide lets that pass, so it is worth a remark, not
         a stop.
-
-    Raises
-    ------
-    ValueError
-        The field is no number, or has more than 360 degrees, 60 minutes or 60 seconds: the guide's fatal
-        ILLEGAL DMS FIELD.
     """
     packed = parse_real(field, decimals)
     if abs(packed) > LARGEST_PACKED:
@@ -89,10 +86,7 @@ def format_real(value: float, width: int, decimals: int) -> str:
     of the format is used only where the explicit one would cost a digit. NaN, an unknown value, is a blank
     field.
 
-    Raises
-    ------
-    ValueError
-        The number is infinite, or too large for the field.
+    Raises ValueError: the number is infinite, or too large for the field.
     """
     if math.isnan(value):
         return " " * width
@@ -142,10 +136,7 @@ def format_angle(value: float, width: int) -> str:
     where the columns end. A negative angle that would lose the fourth decimal gets 360 degrees added, which
     spares the sign. NaN, an unknown value, is a blank field.
 
-    Raises
-    ------
-    ValueError
-        The angle is beyond 360 degrees, or too long for the field.
+    Raises ValueError: the angle is beyond 360 degrees, or too long for the field.
     """
     if math.isnan(value):
         return " " * width
@@ -175,11 +166,8 @@ def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
 def format_name(name: str) -> str:
     """Write a name of at most eight characters into its eight columns.
 
-    Raises
-    ------
-    ValueError
-        The name is too long, begins with the terminator `****`, or holds blanks at its ends or control
-        characters.
+    Raises ValueError: the name is too long, begins with the terminator `****`, or holds blanks at its ends or
+    control characters.
     """
     if len(name) > 8:
         raise ValueError(f"the name {name!r} has more than 8 characters")
@@ -199,10 +187,7 @@ def printed_order(name: str) -> tuple[int, str]:
 def format_principal_distance(value: float) -> str:
     """Write a principal distance (F10.3); zero, which stands for that of the camera, as blanks.
 
-    Raises
-    ------
-    ValueError
-        The value does not fit, or is so small that it would turn into zero.
+    Raises ValueError: the value does not fit, or is so small that it would turn into zero.
     """
     if value == 0:
         return " " * 10
@@ -219,10 +204,7 @@ def _significant(field: str) -> bool:
 def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
     """Write standard deviations, F10.3 or DMS; zero, which stands for the default, as blanks.
 
-    Raises
-    ------
-    ValueError
-        A value is negative, does not fit, or is so small that it would turn into zero.
+    Raises ValueError: a value is negative, does not fit, or is so small that it would turn into zero.
     """
     fields = []
     for value, angle in zip(values, angles, strict=True):

@@ -47,11 +47,8 @@ class Frame:
 def parse_frames(source: Source, geographic: bool) -> list[Frame]:
     """Read FRAMES; the order of the frames is kept, for it structures the normal equations.
 
-    Raises
-    ------
-    InputError
-        A field that is no number or no angle, a record without its partner, or a frame that stands there
-        twice.
+    Raises InputError: a field that is no number or no angle, a record without its partner, or a frame that
+    stands there twice.
     """
     records = source.records()
     positions = Columns([record.text for record in records[::2]])
@@ -89,10 +86,7 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
 def frame_records(frames: Iterable[Frame], geographic: bool) -> list[str]:
     """Write FRAMES.
 
-    Raises
-    ------
-    ValueError
-        A name or a number does not fit its field.
+    Raises ValueError: a name or a number does not fit its field.
     """
     frames = list(frames)
     rows = zip(

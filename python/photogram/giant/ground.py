@@ -53,10 +53,7 @@ class GroundPoint:
 def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
     """Read GROUND; of a point that stands there twice the first record counts, with a remark.
 
-    Raises
-    ------
-    InputError
-        A field that is no number or no angle, a type code above 7, or a point without a name.
+    Raises InputError: a field that is no number or no angle, a type code above 7, or a point without a name.
     """
     records = source.records()
     names = source.point_names([record.number for record in records])
@@ -92,10 +89,7 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
 def ground_records(points: Iterable[GroundPoint], geographic: bool) -> list[str]:
     """Write GROUND.
 
-    Raises
-    ------
-    ValueError
-        A name or a number does not fit its field.
+    Raises ValueError: a name or a number does not fit its field.
     """
     points = list(points)
     rows = zip(

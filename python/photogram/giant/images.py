@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.giant.columns import Columns, deviation_fields, real_fields, texts
 from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
@@ -46,7 +46,7 @@ class ImageFrame:
 
     name: str
     points: list[str]
-    xy: NDArray[np.float64]
+    xy: Floats
     principal_distance: float = 0.0
     sd: tuple[float, float] = (0.0, 0.0)
     camera: str = ""
@@ -64,10 +64,8 @@ def parse_images(source: Source) -> list[ImageFrame]:
     All point records are read at once, column by column; those that are not plain numbers are read again one
     by one.
 
-    Raises
-    ------
-    InputError
-        A field that is no number, a point without a name or coordinates, or a frame without its terminator.
+    Raises InputError: a field that is no number, a point without a name or coordinates, or a frame without
+    its terminator.
     """
     numbers = source.filled()
     ends = [row for row, number in enumerate(numbers) if source.lines[number - 1].startswith(TERMINATOR)]
@@ -110,7 +108,7 @@ def parse_images(source: Source) -> list[ImageFrame]:
     return frames
 
 
-def _coordinates(source: Source, numbers: list[int]) -> NDArray[np.float64]:
+def _coordinates(source: Source, numbers: list[int]) -> Floats:
     """Read columns 11-30 of all point records."""
     columns = Columns([source.lines[number - 1] for number in numbers], 11, 30)
     xy = np.column_stack([columns.real(11, 20), columns.real(21, 30)])
@@ -134,10 +132,7 @@ def _careful_coordinates(record: Record) -> tuple[float, float]:
 def image_records(frames: Iterable[ImageFrame]) -> list[str]:
     """Write IMAGES.
 
-    Raises
-    ------
-    ValueError
-        A name or a number does not fit its field.
+    Raises ValueError: a name or a number does not fit its field.
     """
     frames = list(frames)
     xy = texts(real_fields(np.concatenate([np.empty((0, 2)), *(frame.xy for frame in frames)]), 10, 3))

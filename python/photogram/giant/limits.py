@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools, Indices
 from photogram.errors import InputError
 from photogram.giant.records import error_at, message_at
 from photogram.lazy_dataclasses import dataclass, fields
@@ -92,10 +92,7 @@ class Limits:
 def check_files(project: Contents, limits: Limits) -> None:
     """Refuse more stations, control or cameras than the limits allow.
 
-    Raises
-    ------
-    InputError
-        In the words of the guide, with the first record that is too much.
+    Raises InputError: in the words of the guide, with the first record that is too much.
     """
     control = sum(1 + point.repeats for point in project.ground)
     _check("CAMERA STATIONS", project.frames, len(project.frames), limits.stations)
@@ -123,21 +120,10 @@ def _check(what: str, items: Sequence[Frame] | Sequence[GroundPoint], count: int
     raise error_at(record, text)
 
 
-def allowed_images(
-    image_points: NDArray[np.int64], names: list[str], limits: Limits, messages: list[Message]
-) -> NDArray[np.bool_]:
-    """Return which images the limit of photographs of a point leaves: the first ones, in the order given.
+def allowed_images(image_points: Indices, names: list[str], limits: Limits, messages: list[Message]) -> Bools:
+    """Return which images the limit of photographs of a point (N4) leaves: the first ones given.
 
-    Parameters
-    ----------
-    image_points
-        (m,) indices of points, photo by photo.
-    names
-        Of the points.
-    limits
-        N4 is `photos_per_point`.
-    messages
-        Gets the warning of the guide.
+    `image_points` (m,) are indices of points, photo by photo; `messages` gets the warning of the guide.
     """
     limit = limits.photos_per_point
     if limit is None:
@@ -168,10 +154,7 @@ def check_bandwidth(
     Intersection needs no normal equations of stations: then the point that would break the limit is remarked
     on only.
 
-    Raises
-    ------
-    InputError
-        In the words of the guide; stations have their numbers in FRAMES, from 1.
+    Raises InputError: in the words of the guide; stations have their numbers in FRAMES, from 1.
     """
     overflow = structure.overflow(limit)
     if overflow is None:

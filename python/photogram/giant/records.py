@@ -11,7 +11,7 @@ from typing import Self, TypeVar
 from photogram.errors import InputError
 from photogram.giant.fields import format_deviations, parse_angle, parse_name
 from photogram.io import records
-from photogram.io.fields import parse_integer, parse_real
+from photogram.io.records import parse_integer, parse_real
 from photogram.messages import Message
 
 __all__ = ["Record", "Source", "error_at", "message_at"]

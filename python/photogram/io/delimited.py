@@ -22,8 +22,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_text
-from photogram.io.marks import Marks, marks_of
-from photogram.io.numbers import finite_number
+from photogram.io.numbers import Marks, finite_number, marks_of
 from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -97,6 +96,11 @@ class ColumnTable:
     def __contains__(self, column: str) -> bool:
         return column in self.columns
 
+    @property
+    def headings(self) -> list[tuple[str, str]]:
+        """What each column is called here, and in the file, as far as it names them."""
+        return list(zip(self.columns, self.own or self.columns, strict=True))
+
     @cached_property
     def _lines(self) -> list[str]:
         return [] if self.path.suffix == ".parquet" else read_text(self.path).split("\n")
@@ -122,6 +126,21 @@ class ColumnTable:
         cells = {names.get(column, column): own for column, own in self.cells.items()}
         ready = {names.get(column, column): own for column, own in self.ready.items()}
         return replace(self, columns=columns, cells=cells, ready=ready)
+
+    def some(self, rows: Sequence[int]) -> ColumnTable:
+        """Return the table with some of its rows, in this order."""
+        cells = {column: [own[row] for row in rows] for column, own in self.cells.items()}
+        ready = {
+            column: Names(own.names, own.rows[rows]) if isinstance(own, Names) else own[rows]
+            for column, own in self.ready.items()
+        }
+        records = [self.records[row] for row in rows]
+        return replace(self, count=len(rows), cells=cells, ready=ready, records=records)
+
+    def with_texts(self, column: str, texts: Sequence[str]) -> ColumnTable:
+        """Return the table with other texts in a column."""
+        ready = {name: own for name, own in self.ready.items() if name != column}
+        return replace(self, cells={**self.cells, column: texts}, ready=ready)
 
     def require(self, *columns: str) -> None:
         """Refuse a table without these columns.
@@ -293,21 +312,21 @@ class ColumnTable:
             row, column = missing[0].tolist()
             raise self.error(row, f"column {columns[column]}: {why}")
 
-    def flags(self, column: str, default: bool = True) -> Bools:
-        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0).
+    def flags(self, column: str) -> Bools:
+        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true.
 
         Raises
         ------
         InputError
             Another word.
         """
-        values = np.full(self.count, default)
+        values = np.ones(self.count, dtype=bool)
         if column in self.columns:
             for row, cell in enumerate(self.texts(column)):
                 word = cell.lower()
                 if word and word not in TRUE | FALSE:
                     raise self.error(row, f"column {column}: {quoted(cell)} is neither true nor false")
-                values[row] = word in TRUE if word else default
+                values[row] = not word or word in TRUE
         return values
 
 

@@ -1,4 +1,4 @@
-"""Reading text files."""
+"""Reading text files; one that cannot be read is an :class:`~photogram.errors.InputError` that names it."""
 
 from __future__ import annotations
 
@@ -28,25 +28,13 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a file.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
-    """
+    """Read a file."""
     with reading(path):
         return path.read_bytes()
 
 
 def read_beginning(path: Path, size: int = HEAD) -> str:
-    """Read what a text file begins with, by which formats are told, as :func:`read_text` does: `size` bytes.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
-    """
+    """Read what a text file begins with, by which formats are told, as :func:`read_text` does."""
     with reading(path), path.open("rb") as file:
         text = _decoded(file.read(size), whole=False)
     return text.replace("\r\n", "\n").replace("\r", "\n")
@@ -56,11 +44,6 @@ def read_text(path: Path) -> str:
     """Read a text file: UTF-8, UTF-16, else that of Windows; any line ends become line feeds.
 
     The first sheet of an Excel workbook is text, too: a line a row, tabs between its cells.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
     """
     if path.suffix.lower() == ".xlsx":
         return sheet_text(path)
@@ -91,13 +74,7 @@ def _wide(data: bytes) -> str | None:
 
 
 def read_lines(path: Path) -> list[str]:
-    """Read the lines of a text file as :func:`read_text` does, without their ends.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
-    """
+    """Read the lines of a text file as :func:`read_text` does, without their ends."""
     lines = read_text(path).removesuffix("\x1a").split("\n")
     if lines[-1] == "":
         lines.pop()

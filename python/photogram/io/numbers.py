@@ -1,13 +1,15 @@
-"""Numbers in text files: one strict spelling for tables, settings and names of plates."""
+"""Numbers in text files: one strict spelling, and the marks by which tables divide decimals and thousands."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 
+from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
-__all__ = ["LARGEST_INTEGER", "finite_number", "is_whole_number", "whole_number"]
+__all__ = ["LARGEST_INTEGER", "Marks", "finite_number", "is_whole_number", "marks_of", "whole_number"]
 
 LARGEST_INTEGER = 2**63 - 1
 """The largest that an array of 64-bit integers holds."""
@@ -17,6 +19,10 @@ LONGEST = 1_000
 
 _WHOLE = re.compile(r"\+?[0-9]+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_GROUPS = re.compile(r"[+-]?\d{1,3}(?:(?P<mark>['’ \u00a0\u202f.,])\d{3})+(?!\d)")
+_SIMPLE = re.compile(r"[+-]?\d*\.?\d*(?:[eE][+-]?\d+)?")
+_MARKED = re.compile(r"[+-]?\d[\d'’ \u00a0\u202f.,]*(?:[eE][+-]?\d+)?")
+_BLANKS = re.compile(r"(?<=\d)['’ \u00a0\u202f](?=\d{3}(?!\d))")
 
 
 def is_whole_number(text: str) -> bool:
@@ -62,3 +68,75 @@ def finite_number(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{quoted(text)} is not a number")
     return value
+
+
+@dataclass(frozen=True)
+class Marks:
+    """How the numbers of a table are written.
+
+    Attributes
+    ----------
+    decimal
+        What divides decimals, `.` or `,`.
+    thousands
+        Whether a number shows that the other of both divides thousands.
+    """
+
+    decimal: str
+    thousands: bool
+
+    def plain(self, text: str) -> str:
+        """Return a number as it is spelled here: a decimal point, no marks of thousands.
+
+        Anything else comes back as it is, for whoever reads numbers to refuse.
+
+        Raises
+        ------
+        ValueError
+            A mark that divides decimals or thousands, and nothing in the table says which.
+        """
+        simple = _SIMPLE.fullmatch(text) is not None
+        if not _MARKED.fullmatch(text) or (simple and (self.decimal == "." or "." not in text)):
+            return text
+        own = _BLANKS.sub("", text)
+        other = "," if self.decimal == "." else "."
+        head, mark, tail = own.partition(self.decimal)
+        if other in head:
+            groups = _GROUPS.fullmatch(head)
+            if groups is None or groups["mark"] != other or not self.thousands:
+                raise ValueError(
+                    f"{quoted(text)}: {self.decimal!r} divides decimals elsewhere in the table, and nothing"
+                    f" says that {other!r} divides thousands"
+                )
+            head = head.replace(other, "")
+        return f"{head}.{tail}" if mark else head
+
+
+def marks_of(cells: Iterable[str], delimiter: str) -> Marks:
+    """Return how the numbers of a table are written, from all its cells that look like numbers.
+
+    The last of both marks in one number divides decimals; a mark that stands twice in one does not, and
+    neither does one before which or behind which digits are not in threes. Where nothing tells, a comma
+    divides decimals unless it divides cells.
+    """
+    decimals, thousands = set[str](), set[str]()
+    doubtful = ""
+    for cell in cells:
+        if not ("." in cell or "," in cell) or not _MARKED.fullmatch(cell):
+            continue
+        mark = cell[max(cell.rfind("."), cell.rfind(","))]
+        other = "," if mark == "." else "."
+        if other in cell:
+            decimals.add(mark)
+            thousands.add(other)
+        elif cell.count(mark) > 1:
+            thousands.add(mark)
+        elif _GROUPS.fullmatch(_BLANKS.sub("", cell)):
+            doubtful = doubtful if mark == "." else mark
+        else:
+            decimals.add(mark)
+    if thousands:
+        return Marks("," if "." in thousands else ".", True)
+    if decimals == {"."} or (not decimals and (not doubtful or delimiter == ",")):
+        return Marks(".", False)
+    return Marks("," if delimiter != "," else ".", False)

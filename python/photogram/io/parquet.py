@@ -66,6 +66,8 @@ class Column:
 class Sheet:
     """A table that was read: arrays of numbers and lists of names, and what the file says of itself.
 
+    A column that is not there, or holds something else than is asked for, is an :class:`InputError`.
+
     Attributes
     ----------
     path
@@ -86,38 +88,20 @@ class Sheet:
         return len(next(iter(self.columns.values()), ()))
 
     def column(self, name: str) -> Any:
-        """Return a column.
-
-        Raises
-        ------
-        InputError
-            It is not there.
-        """
+        """Return a column."""
         if name not in self.columns:
             raise InputError(f"the column {name} is missing", file=self.path)
         return self.columns[name]
 
     def names(self, name: str) -> Repeated:
-        """Return a column of names.
-
-        Raises
-        ------
-        InputError
-            It is not there, or holds something else.
-        """
+        """Return a column of names."""
         found = self.column(name)
         if not isinstance(found, Repeated):
             raise self._other(name, found)
         return found
 
     def numbers(self, name: str, columns: int = 0) -> Any:
-        """Return a column of numbers: (rows,), or (rows, columns) of lists; a negative count divides theirs.
-
-        Raises
-        ------
-        InputError
-            It is not there, or holds something else.
-        """
+        """Return a column of numbers: (rows,), or (rows, columns); a negative count divides their number."""
         found = self.column(name)
         kind = found.dtype.kind if isinstance(found, np.ndarray) else ""
         width = found.shape[1] if kind and found.ndim == 2 else 0
@@ -145,14 +129,11 @@ def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Call
     ModuleNotFoundError
         pyarrow is not installed.
     """
-    parquet = _module()
+    from pyarrow import parquet, types  # take long to import
+
     table = _table(columns, about)
     repeated = [each.name for each in columns if isinstance(each.values, Repeated)]
-    kinds = {
-        name: kind.value_type if _is_list(kind) else kind
-        for name, kind in zip(table.schema.names, table.schema.types, strict=True)
-    }
-    few = [name for name in repeated if _is_dictionary(kinds[name])]
+    few = [name for name in repeated if types.is_dictionary(table.schema.field(name).type)]
 
     def write(file: BinaryIO) -> None:
         # Of numbers of measurements hardly two are alike: a dictionary of them takes ten times as long.
@@ -179,11 +160,10 @@ def read_sheet(path: Path) -> Sheet:
     ModuleNotFoundError
         pyarrow is not installed.
     """
-    parquet = _module()
-    import pyarrow
+    import pyarrow.parquet
 
     try:
-        table = parquet.read_table(path, page_checksum_verification=True)
+        table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(f"cannot be read as Parquet: {error}", file=path) from None
     columns = {name: _values(path, name, table.column(name)) for name in table.column_names}
@@ -205,12 +185,6 @@ def unpacked(triangles: np.ndarray) -> np.ndarray:
     found[:, rows, columns] = triangles
     found[:, columns, rows] = triangles
     return found
-
-
-def _module() -> Any:
-    import pyarrow.parquet  # takes long to import
-
-    return pyarrow.parquet
 
 
 def _table(columns: Sequence[Column], about: Mapping[str, str]) -> pyarrow.Table:
@@ -249,7 +223,7 @@ def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
 
     whole = column.combine_chunks()
     kind = column.type
-    if _is_dictionary(kind):
+    if pyarrow.types.is_dictionary(kind):
         return Repeated(
             whole.dictionary.to_pylist(), whole.indices.to_numpy(zero_copy_only=False).astype(np.int64)
         )
@@ -261,18 +235,6 @@ def _values(path: Path, name: str, column: pyarrow.ChunkedArray) -> Any:
         )
     if whole.null_count:
         raise InputError(f"the column {name} has empty cells", file=path)
-    if _is_list(kind):
+    if pyarrow.types.is_fixed_size_list(kind):
         return whole.flatten().to_numpy(zero_copy_only=False).reshape(len(whole), kind.list_size)
     return whole.to_numpy(zero_copy_only=False)
-
-
-def _is_dictionary(kind: Any) -> bool:
-    import pyarrow
-
-    return bool(pyarrow.types.is_dictionary(kind))
-
-
-def _is_list(kind: Any) -> bool:
-    import pyarrow
-
-    return bool(pyarrow.types.is_fixed_size_list(kind))

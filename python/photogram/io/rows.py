@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from photogram.io.files import read_lines
-from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
+from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.messages import listed, quoted
 
@@ -28,37 +28,25 @@ LONGEST_RECORD = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One record: its cells by column, and where it stands."""
+    """One record: its cells by column, and where it stands; a cell that is no such value is refused."""
 
     cells: Mapping[str, str]
     place: Place
     commas: bool = False
     """Whether decimals may have commas: these do not stand between cells."""
 
-    def integer(self, column: str, default: int | None = None, *, highest: int = LARGEST_INTEGER) -> int:
-        """Return a whole number that is not negative; `default` where the cell or the column is missing.
-
-        Raises
-        ------
-        InputError
-            The cell is blank without a default, or no such number up to `highest`.
-        """
+    def integer(self, column: str, default: int | None = None) -> int:
+        """Return a whole number that is not negative; `default` where the cell or the column is missing."""
         text = self.cells.get(column, "")
         if not text and default is not None:
             return default
         try:
-            return whole_number(text, highest=highest)
+            return whole_number(text)
         except ValueError as error:
             raise self.place.error(f"{column} {error}") from None
 
     def number(self, column: str) -> float | None:
-        """Return a finite number; None where the cell is blank or the column is missing.
-
-        Raises
-        ------
-        InputError
-            The cell is no such number.
-        """
+        """Return a finite number; None where the cell is blank or the column is missing."""
         text = self.cells.get(column, "")
         if not text:
             return None
@@ -68,13 +56,7 @@ class Row:
             raise self.place.error(f"{column} {error}") from None
 
     def required(self, column: str) -> float:
-        """Return a finite number.
-
-        Raises
-        ------
-        InputError
-            The cell is blank, or no such number.
-        """
+        """Return a finite number."""
         value = self.number(column)
         if value is None:
             raise self.place.error(f"{column} is blank")

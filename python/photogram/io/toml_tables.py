@@ -20,6 +20,9 @@ _LONGEST = 60
 class Table:
     """One table of a TOML file.
 
+    What is missing and has no default, is of another kind or beyond its limits is an :class:`InputError` that
+    names file, table and key.
+
     Parameters
     ----------
     values
@@ -41,26 +44,14 @@ class Table:
         return InputError(f"[{self.name}] {key} {text}", file=self.file)
 
     def table(self, key: str) -> Table:
-        """Return a table within this one; an empty one where it is missing.
-
-        Raises
-        ------
-        InputError
-            It is something else.
-        """
+        """Return a table within this one; an empty one where it is missing."""
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             raise self.error(key, f"is {_shown(value)}, not a table")
         return Table(value, f"{self.name}.{key}", self.file)
 
     def only(self, known: Collection[str]) -> None:
-        """Refuse keys that are not known.
-
-        Raises
-        ------
-        InputError
-            There are some.
-        """
+        """Refuse keys that are not known."""
         unknown = sorted(set(self.values) - set(known))
         if unknown:
             raise InputError(f"[{self.name}] has no {listed(unknown)}", file=self.file)
@@ -68,13 +59,7 @@ class Table:
     def number(
         self, key: str, default: float | None = None, *, low: float = -math.inf, high: float = math.inf
     ) -> float:
-        """Return a finite number between two limits.
-
-        Raises
-        ------
-        InputError
-            It is missing and has no default, is of another kind, or beyond the limits.
-        """
+        """Return a finite number between two limits."""
         value = self._value(key, default)
         found = self._number(key, value)
         if not low <= found <= high:
@@ -82,32 +67,20 @@ class Table:
         return found
 
     def says(self, today: str, report: str) -> bool:
-        """Return whether the table has a value in the units of today; else it may have it in the report's.
-
-        Raises
-        ------
-        InputError
-            It has both.
-        """
+        """Return whether the table has a value in the units of today; else it may have it in the report's."""
         if today in self and report in self:
             raise self.error(today, f"says what {report} says: one of them is enough")
         return today in self
 
     def positive(self, key: str, default: float | None = None) -> float:
-        """Return a finite number above zero; errors are those of `number`."""
+        """Return a finite number above zero."""
         found = self.number(key, default)
         if not found > 0:
             raise self.error(key, f"is {found:g}; it must be positive")
         return found
 
     def count(self, key: str, default: int | None = None) -> int:
-        """Return a whole number that is not negative.
-
-        Raises
-        ------
-        InputError
-            It is missing and has no default, or is something else.
-        """
+        """Return a whole number that is not negative."""
         value = self._value(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or abs(value) >= 2**31:
             raise self.error(key, f"is {_shown(value)}, not a whole number")
@@ -116,72 +89,36 @@ class Table:
         return value
 
     def switch(self, key: str, default: bool | None = None) -> bool:
-        """Return true or false.
-
-        Raises
-        ------
-        InputError
-            It is missing and has no default, or is something else.
-        """
+        """Return true or false."""
         value = self._value(key, default)
         if not isinstance(value, bool):
             raise self.error(key, f"is {_shown(value)}, neither true nor false")
         return value
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return a string.
-
-        Raises
-        ------
-        InputError
-            It is missing and has no default, or is something else.
-        """
+        """Return a string."""
         value = self._value(key, default)
         if not isinstance(value, str):
             raise self.error(key, f"is {_shown(value)}, not text: put it in quotation marks")
         return value
 
     def word(self, key: str, default: str | None = None) -> str:
-        """Return a name or a number of something, which may be written as a whole number.
-
-        Raises
-        ------
-        InputError
-            It is missing and has no default, or is something else.
-        """
+        """Return a name or a number of something, which may be written as a whole number."""
         return self._word(key, self._value(key, default))
 
     def words(self, key: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
-        """Return names of things as `word` does.
-
-        Raises
-        ------
-        InputError
-            They are missing and have no default, or are something else.
-        """
+        """Return names of things as `word` does."""
         return tuple(self._word(key, value) for value in self.items(key, default))
 
     def path(self, key: str) -> Path:
-        """Return the path of another file, relative to this one.
-
-        Raises
-        ------
-        InputError
-            It is missing, or cannot be a path.
-        """
+        """Return the path of another file, relative to this one."""
         name = self.text(key)
         if not name or not name.isprintable():
             raise self.error(key, f"is {_shown(name)}, not the name of a file")
         return self.file.parent / name
 
     def numbers(self, key: str, count: int, default: list[float] | None = None) -> list[float]:
-        """Return so many finite numbers; infinite ones where they say that something is held.
-
-        Raises
-        ------
-        InputError
-            They are missing and have no default, or are something else.
-        """
+        """Return so many finite numbers; infinite ones where they say that something is held."""
         values = self.items(key, default)
         if len(values) != count:
             raise self.error(key, f"has {len(values)} values, not {count}")
@@ -191,26 +128,14 @@ class Table:
         ]
 
     def items(self, key: str, default: Collection[Any] | None = None) -> list[Any]:
-        """Return a list of anything.
-
-        Raises
-        ------
-        InputError
-            It is missing and has no default, or is something else.
-        """
+        """Return a list of anything."""
         value = self._value(key, default)
         if not isinstance(value, list | tuple):
             raise self.error(key, f"is {_shown(value)}, not a list")
         return list(value)
 
     def rows(self, key: str, kinds: tuple[type[str] | type[float], ...]) -> list[list[Any]]:
-        """Return a list of lists of names (`str`) and numbers (`float`); empty where it is missing.
-
-        Raises
-        ------
-        InputError
-            It is something else.
-        """
+        """Return a list of lists of names (`str`) and numbers (`float`); empty where it is missing."""
         found = []
         for row in self.items(key, []):
             if not isinstance(row, list) or len(row) != len(kinds):
@@ -247,7 +172,7 @@ class Table:
 
 
 class Document:
-    """A TOML file of tables.
+    """A TOML file of tables; one that is missing, or there more often than it may, is an :class:`InputError`.
 
     Parameters
     ----------
@@ -264,13 +189,7 @@ class Document:
         return name in self._tables
 
     def table(self, name: str) -> Table:
-        """Return a table that must be there, once.
-
-        Raises
-        ------
-        InputError
-            It is not.
-        """
+        """Return a table that must be there, once."""
         if name not in self._tables:
             raise InputError(f"the table {name} is missing", file=self.file)
         if len(self._tables[name]) != 1:
@@ -278,11 +197,11 @@ class Document:
         return self._tables[name][0]
 
     def optional(self, name: str) -> Table:
-        """Return a table, an empty one where it is not there; errors are those of `table`."""
+        """Return a table, an empty one where it is not there."""
         return self.table(name) if name in self._tables else Table({}, name, self.file)
 
     def changed(self, values: Mapping[str, Mapping[str, Any]]) -> Document:
-        """Return the document with other values of keys, by table; errors are those of `table`."""
+        """Return the document with other values of keys, by table."""
         tables = dict(self._tables)
         for name, others in values.items():
             if others:
@@ -290,13 +209,7 @@ class Document:
         return Document(tables, self.file)
 
     def tables(self, name: str) -> list[Table]:
-        """Return all tables of a name.
-
-        Raises
-        ------
-        InputError
-            There is none.
-        """
+        """Return all tables of a name."""
         if name not in self._tables:
             raise InputError(f"the table {name} is missing", file=self.file)
         return self._tables[name]

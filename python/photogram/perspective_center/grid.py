@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram.arguments.arrays import names, number, shaped
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.summary import Brief
@@ -98,7 +97,7 @@ class Grid(Brief):
     principal_distance: float
     initial: Floats | None = None
     tolerance: float = 0.001
-    readings: NDArray[np.int64] = field(default_factory=lambda: np.array(1))
+    readings: Indices = field(default_factory=lambda: np.array(1))
     reading_sd: Floats = field(default_factory=lambda: np.array(0.0))
     corrected: bool = False
     title: str = ""

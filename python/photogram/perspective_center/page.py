@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from photogram.perspective_center.batch import Run
 from photogram.perspective_center.plot import figure
+from photogram.perspective_center.report import cycles, points, size_of, unknowns
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.perspective_center.tables import cycles, points, size_of, unknowns
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section
 from photogram.show.methods import page_of
@@ -24,7 +24,7 @@ def run_page(run: Run) -> Page:
         Section("residuals", "Residuals and distortion", [_drawing(run)] if run.results else []),
         _layers("parameters", "Perspective centre and attitude", run, _parameters, _PARAMETERS),
         _layers("points", "Points", run, _points, _POINTS),
-        _layers("iterations", "Iterations", run, _iterations, ""),
+        _layers("iterations", "Iterations", run, lambda each: page_table(_name(each), cycles(each)), ""),
         remarks_section(run.messages),
     ]
     judgements = [judged(each.verdict, _name(each)) for each in run.results]
@@ -83,7 +83,3 @@ def _parameters(result: PerspectiveCenter) -> Table:
 def _points(result: PerspectiveCenter) -> Table:
     note = f"Beyond {result.limit:.2f} the test rejects." if math.isfinite(result.limit) else ""
     return page_table(_name(result), points(result), note)
-
-
-def _iterations(result: PerspectiveCenter) -> Table:
-    return page_table(_name(result), cycles(result))

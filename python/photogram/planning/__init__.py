@@ -1,9 +1,8 @@
 """Planning: what a network promises before it is flown, for several patterns of control side by side."""
 
-from photogram.planning.motion import MotionQuality
 from photogram.planning.networks import Plan, plan
 from photogram.planning.pattern import Pattern
-from photogram.planning.statistics import ControlQuality, PhotoQuality, PointQuality
+from photogram.planning.statistics import ControlQuality, MotionQuality, PhotoQuality, PointQuality
 
 __all__ = ["ControlQuality", "MotionQuality", "Pattern", "PhotoQuality", "Plan", "PointQuality", "plan"]
 

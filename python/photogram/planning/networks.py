@@ -16,8 +16,8 @@ from photogram.io import json
 from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
-from photogram.planning.motion import with_known_readout
 from photogram.planning.pattern import Pattern
+from photogram.planning.statistics import with_known_readout
 from photogram.planning.text import report, what_next
 from photogram.show.methods import Paged
 from photogram.statistics.reliability import TESTABLE, noncentrality

@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 from photogram.planning.networks import Plan
 from photogram.planning.pattern import Pattern
 from photogram.planning.plot import figure
-from photogram.planning.statistics import PointQuality
-from photogram.planning.text import motion_shown, remarks, what_next
+from photogram.planning.text import axis_figures, counts, motion_shown, on_the_ground, remarks, what_next
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import page_of
@@ -37,8 +36,9 @@ NOTICED = 1.05
 def plan_page(made: Plan) -> Page:
     """Return the report of a plan for the browser."""
     patterns = made.patterns
+    drawn = [_drawing(patterns)] if any(pattern.new_points.any() for pattern in patterns) else []
     sections = [
-        Section("network", "Plan of the network", [_drawing(patterns)] if _has_points(patterns) else []),
+        Section("network", "Plan of the network", drawn),
         _comparison(patterns),
         Section("size", "How much", [_size(patterns)]),
         _layers("points", "New points", patterns, _points, _POINTS),
@@ -59,18 +59,12 @@ def plan_page(made: Plan) -> Page:
 
 _POINTS = (
     "Standard deviations that the network promises, a priori: nothing has been measured. Detectable is"
-    " the smallest"
-    " error of an image coordinate that the test finds (level 0.001, power 0.80); its effect is what it"
-    " moves at most"
-    " while it stays in."
+    " the smallest error of an image coordinate that the test finds (level 0.001, power 0.80); its effect is"
+    " what it moves at most while it stays in."
 )
 _CONTROL = (
     "How the network checks its control: an error below what is detectable goes into the result unseen."
 )
-
-
-def _has_points(patterns: Sequence[Pattern]) -> bool:
-    return any(pattern.new_points.any() for pattern in patterns)
 
 
 def _drawing(patterns: Sequence[Pattern]) -> Drawing:
@@ -83,24 +77,22 @@ def _drawing(patterns: Sequence[Pattern]) -> Drawing:
 
 def _judgement(patterns: Sequence[Pattern]) -> Judgement:
     """Say which pattern is better, by the rms in height of new points."""
-    mark = "Prediction"
+    return Judgement("Prediction", _better(patterns))
+
+
+def _better(patterns: Sequence[Pattern]) -> str:
     if not all(pattern.new_points.any() for pattern in patterns):
-        return Judgement(mark, "There are no new points to be judged")
+        return "There are no new points to be judged"
     unit = patterns[0].block.linear_unit
     heights = {pattern.name: pattern.points[-1].rms_sd[2] for pattern in patterns}
     best, worst = min(heights, key=heights.__getitem__), max(heights, key=heights.__getitem__)
     if len(patterns) == 1:
-        return Judgement(
-            mark, f"Heights of new points will have an rms of {significant(heights[best], 3)} {unit}"
-        )
+        return f"Heights of new points will have an rms of {significant(heights[best], 3)} {unit}"
     if heights[worst] <= NOTICED * heights[best]:
-        return Judgement(
-            mark, f"The patterns are alike: heights with an rms of {significant(heights[best], 3)} {unit}"
-        )
-    return Judgement(
-        mark,
+        return f"The patterns are alike: heights with an rms of {significant(heights[best], 3)} {unit}"
+    return (
         f"“{best}” gives heights {heights[worst] / heights[best]:.2f} times better than “{worst}”:"
-        f" rms {significant(heights[best], 3)} against {significant(heights[worst], 3)} {unit}",
+        f" rms {significant(heights[best], 3)} against {significant(heights[worst], 3)} {unit}"
     )
 
 
@@ -112,28 +104,18 @@ def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
             x, y, z = pattern.points[-1].rms_sd
             plane = f"{pattern.axes[0]} {significant(x, 2)}, {pattern.axes[1]} {significant(y, 2)} {unit}"
             found.append(Fact(f"rms in {pattern.axes[2]}, {pattern.name}", significant(z, 2), unit, plane))
-    found.append(
-        Fact(
-            "An image error on the ground",
-            significant(patterns[0].unit, 2),
-            unit,
-            "standard deviation, mean of all",
-        )
-    )
-    return found
+    error = significant(patterns[0].unit, 2)
+    return [*found, Fact("An image error on the ground", error, unit, "standard deviation, mean of all")]
 
 
 def _comparison(patterns: Sequence[Pattern]) -> Section:
     if not all(pattern.new_points.any() for pattern in patterns):
         return Section("comparison", "Side by side", [])
     unit = patterns[0].block.linear_unit
-    every = [pattern.points[-1] for pattern in patterns]
     rows: list[Row] = []
-    for k, axis in enumerate(patterns[0].axes):
-        for kind in ("rms", "max"):
-            values = [(quality.rms_sd if kind == "rms" else quality.max_sd)[k] for quality in every]
-            ratio = max(values) / min(values) if min(values) > 0 else math.nan
-            rows.append([f"{'rms' if kind == 'rms' else 'largest'} {axis}", *values, ratio])
+    for kind, axis, values in axis_figures(patterns):
+        ratio = max(values) / min(values) if min(values) > 0 else math.nan
+        rows.append([f"{'rms' if kind == 'rms' else 'largest'} {axis}", *values, ratio])
     columns = [
         Column("Standard deviation", text=True),
         *(Column(pattern.name, unit, figures=3) for pattern in patterns),
@@ -144,16 +126,11 @@ def _comparison(patterns: Sequence[Pattern]) -> Section:
 
 def _size(patterns: Sequence[Pattern]) -> Table:
     unit = patterns[0].block.linear_unit
-    cells: list[tuple[str, Callable[[Pattern], str | float]]] = [
-        ("Photos", lambda p: len(p.block.photo_ids)),
-        ("New points", lambda p: int(p.new_points.sum())),
-        ("Control points", lambda p: int((p.result.used_points & ~p.new_points).sum())),
-        ("Points left out", lambda p: len(p.result.dropped)),
-        ("Image points", lambda p: int(p.result.used_images.sum())),
-        (f"1 mm in the photo on the ground, {unit}", lambda p: significant(p.scale)),
-        (f"sd of image coordinates on the ground, {unit}", lambda p: significant(p.unit, 3)),
-    ]
-    rows: list[Row] = [[name, *(cell(pattern) for pattern in patterns)] for name, cell in cells]
+    of_each = [counts(pattern) for pattern in patterns]
+    rows: list[Row] = [[name.capitalize(), *(own[name] for own in of_each)] for name in of_each[0]]
+    scale, error = on_the_ground(unit)
+    rows.append([scale, *(significant(pattern.scale) for pattern in patterns)])
+    rows.append([error, *(significant(pattern.unit, 3) for pattern in patterns)])
     return Table("How much", [Column("", text=True), *(Column(pattern.name) for pattern in patterns)], rows)
 
 
@@ -183,20 +160,12 @@ def _points(pattern: Pattern) -> Table | None:
         Column("Detectable", "µm", decimals=1),
         Column("Effect", "sd", decimals=1),
     ]  # fmt: skip
-    return Table(pattern.name, columns, [_point_row(quality) for quality in shown])
-
-
-def _point_row(quality: PointQuality) -> Row:
-    figures = [value for pair in zip(quality.rms_sd, quality.max_sd, strict=True) for value in pair]
-    return [
-        quality.group,
-        quality.points,
-        *figures,
-        quality.redundancy,
-        100 * quality.unchecked,
-        1000 * quality.detectable,
-        quality.effect,
-    ]
+    rows: list[Row] = []
+    for each in shown:
+        sd = [value for pair in zip(each.rms_sd, each.max_sd, strict=True) for value in pair]
+        tests = [each.redundancy, 100 * each.unchecked, 1000 * each.detectable, each.effect]
+        rows.append([each.group, each.points, *sd, *tests])
+    return Table(pattern.name, columns, rows)
 
 
 def _photos(pattern: Pattern) -> Table:

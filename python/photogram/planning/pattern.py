@@ -13,13 +13,14 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
-from photogram.planning.locations import locations
-from photogram.planning.motion import MotionQuality, motion_quality
 from photogram.planning.statistics import (
     ControlQuality,
+    MotionQuality,
     PhotoQuality,
     PointQuality,
     control_quality,
+    locations,
+    motion_quality,
     photo_quality,
     point_quality,
 )
@@ -59,10 +60,7 @@ class Pattern:
     @cached_property
     def point_sd(self) -> Floats:
         """(n, 3) expected standard deviations along `axes`, linear unit; NaN for points left out."""
-        lengths: Floats = self.result.point_sd * geometry.lengths_of_units(
-            self.result.point_positions, self.block.spheroid
-        )
-        return lengths
+        return self.result.point_sd * self._point_units
 
     @cached_property
     def photo_sd(self) -> Floats:
@@ -74,16 +72,12 @@ class Pattern:
     @cached_property
     def control_sd(self) -> Floats:
         """(n, 3) a priori standard deviations of control, linear unit; infinite where not held."""
-        lengths: Floats = self.block.point_sd * geometry.lengths_of_units(
-            self.result.point_positions, self.block.spheroid
-        )
-        return lengths
+        return self.block.point_sd * self._point_units
 
     @property
     def new_points(self) -> NDArray[np.bool_]:
         """(n,) which points are to be determined: those that take part and are not control."""
-        new: NDArray[np.bool_] = self.result.used_points & (self.result.point_kinds != "control")
-        return new
+        return np.asarray(self.result.used_points & (self.result.point_kinds != "control"))
 
     @cached_property
     def point_plan(self) -> Floats:
@@ -97,7 +91,7 @@ class Pattern:
 
     @cached_property
     def point_locations(self) -> NDArray[np.str_]:
-        """(n,) `corner`, `edge` or `interior`, as :func:`photogram.planning.locations.locations` has them."""
+        """(n,) `corner`, `edge` or `interior`, as :func:`~photogram.planning.statistics.locations` has it."""
         stations = [self.photo_plan]
         if on_shared(self.block).any():
             # A strip of a scanner is as long as its trajectory.
@@ -136,8 +130,7 @@ class Pattern:
         """What `rms_sd` of all new points would be, were the readout times known; None where they are."""
         if self.known is None or not self.new_points.any():
             return None
-        lengths = geometry.lengths_of_units(self.result.point_positions, self.block.spheroid)
-        sd = (self.known.point_sd * lengths)[self.new_points]
+        sd = (self.known.point_sd * self._point_units)[self.new_points]
         x, y, z = np.sqrt((sd**2).mean(axis=0)).tolist()
         return x, y, z
 
@@ -147,11 +140,15 @@ class Pattern:
         return control_quality(self.result, self.control_sd, self.axes)
 
     @cached_property
+    def _point_units(self) -> Floats:
+        """(n, 3) how long a unit of the coordinates of points is, linear unit."""
+        return geometry.lengths_of_units(self.result.point_positions, self.block.spheroid)
+
+    @cached_property
     def _scales(self) -> Floats:
         photos = self.block.image_photos[self.result.used_images]
         depths = image_depths(self.block)[self.result.used_images]
-        scales: Floats = depths / self.block.camera_scales()[photos]
-        return scales
+        return np.asarray(depths / self.block.camera_scales()[photos])
 
     def _plan(self, positions: Floats) -> Floats:
         spheroid = self.block.spheroid
@@ -168,5 +165,4 @@ class Pattern:
         stations = geometry.geographic_to_geocentric(self.result.photo_positions, spheroid)
         centre = stations.mean(axis=0)
         frame = geometry.local_frames(geometry.geocentric_to_geographic(centre[np.newaxis], spheroid))[0]
-        plan: Floats = (xyz - centre) @ frame[:2].T
-        return plan
+        return np.asarray((xyz - centre) @ frame[:2].T)

@@ -1,27 +1,164 @@
-"""The figures of a plan: standard deviations and reliability of groups of points, photos and control."""
+"""The figures of a plan: what groups of points, photos, control and motions promise.
+
+Points are grouped by their place in the block, not by their distance to control: it is the same for every
+pattern of control, so that the rows of two patterns hold the same points, and it is how the accuracy of
+blocks is usually tabulated: weak at the border, where rays are few and come from one side, uniform inside.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Bools, Floats
-from photogram.lazy_dataclasses import dataclass
-from photogram.planning.locations import LOCATIONS
-from photogram.planning.motion import photo_redundancy
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.network.block import Block
+from photogram.network.hull import hull
+from photogram.network.trajectories import Readout
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
 __all__ = [
     "ControlQuality",
+    "MotionQuality",
     "PhotoQuality",
     "PointQuality",
     "control_quality",
+    "locations",
+    "motion_quality",
     "photo_quality",
     "point_quality",
+    "with_known_readout",
 ]
+
+LOCATIONS = ("corner", "edge", "interior")
+
+
+def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
+    """Return the location of each of (n, 2) points in plan, (n,): one of `LOCATIONS`.
+
+    The block is the smallest rectangle around its (P, 2) photo stations, P at least 1. A point in it lies in
+    the interior, one beyond a side of it at an edge, one beyond two sides in a corner. So a single strip has
+    flanks and ends, but hardly an interior.
+    """
+    axes = _axes(stations)
+    turned, extent = points @ axes.T, stations @ axes.T
+    beyond = (turned < extent.min(axis=0)) | (turned > extent.max(axis=0))
+    return np.asarray(np.array(LOCATIONS)[2 - beyond.sum(axis=1)])
+
+
+def _axes(points: Floats) -> Floats:
+    """Rows: the unit vectors along the sides of the smallest rectangle around points in plan.
+
+    One of its sides lies along a side of the convex hull (Freeman and Shapira, 1975).
+    """
+    corners = hull(points)
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(*sides.T)
+    if not (lengths > 0).any():
+        return np.eye(2)
+    c, s = (sides[lengths > 0] / lengths[lengths > 0, np.newaxis]).T
+    frames = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
+    extents = np.ptp(np.einsum("kij,nj->kin", frames, corners), axis=2)
+    return np.asarray(frames[np.argmin(extents.prod(axis=1))])
+
+
+PLACES = 25
+"""Times at which a trajectory is looked at, evenly between its first image and its last."""
+
+
+@dataclass(frozen=True)
+class MotionQuality:
+    """What is expected of a motion that all photos, or all trajectories, have.
+
+    Attributes
+    ----------
+    unknown
+        "readout time" with its name, "velocity", "rate" (of photos with motions of their own), "position of
+        trajectories" or "rotation of trajectories" (anywhere between their images).
+    unit
+        "s", the linear unit a second, "rad/s", the linear unit or "rad".
+    rms_sd, max_sd
+        Root mean square and largest of the expected standard deviations of its components.
+    """
+
+    unknown: str
+    unit: str
+    rms_sd: float
+    max_sd: float
+
+
+def motion_quality(result: Result) -> list[MotionQuality]:
+    """Return what a predicted block promises of motions; nothing where nothing moves."""
+    block = result.block
+    if not block.timed:
+        return []
+    found = [
+        MotionQuality(f"readout time, {each.name}", "s", float(each.sd[0]), float(each.sd[0]))
+        for each in result.unknowns
+        if isinstance(each.given, Readout) and not each.given.is_held
+    ]
+    own = [result.trajectories[each.photo] for each in block.timed if each.trajectory is None]
+    linear = block.linear_unit
+    if own:
+        found.append(_quality("velocity", f"{linear}/s", np.array([each.position_sd[1] for each in own])))
+        found.append(_quality("rate", "rad/s", np.array([each.rotation_sd[1] for each in own])))
+    if sds := [result.trajectories[name].poses(times).sd for name, times in _looked_at(block).items()]:
+        sd = np.concatenate(sds)
+        found.append(_quality("position of trajectories", linear, sd[:, :3]))
+        found.append(_quality("rotation of trajectories", "rad", sd[:, 3:]))
+    return found
+
+
+def _quality(unknown: str, unit: str, sd: Floats) -> MotionQuality:
+    return MotionQuality(unknown, unit, math.sqrt((sd**2).mean()), float(sd.max()))
+
+
+def _looked_at(block: Block) -> dict[str, Floats]:
+    """Return the times at which the trajectories that photos share are looked at, by their names."""
+    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    order = np.argsort(block.image_photos, kind="stable")
+    bounds = np.searchsorted(block.image_photos[order], np.arange(len(rows) + 1))
+    spans: dict[str, tuple[float, float]] = {}
+    for each in block.timed:
+        row = rows[each.photo]
+        own = order[bounds[row] : bounds[row + 1]]
+        if each.trajectory is None or not len(own):
+            continue
+        time, since, _ = each.images(block.image_xy[own])
+        scale = 1.0 if each.readout is None else float(each.readout.position[0])
+        times = time + scale * since
+        first, last = spans.get(each.trajectory.name, (math.inf, -math.inf))
+        spans[each.trajectory.name] = min(first, float(times.min())), max(last, float(times.max()))
+    return {name: np.linspace(*span, PLACES) for name, span in spans.items()}
+
+
+def photo_redundancy(result: Result) -> Floats:
+    """(P, 6) redundancy numbers of what is given of positions and attitudes, of photos that move too."""
+    moving = {each.photo for each in result.block.timed if each.trajectory is None}
+    found = result.photo_redundancy.copy()
+    for row, name in enumerate(result.block.photo_ids):
+        if name in moving:
+            own = result.trajectories[name]
+            found[row] = [*own.position_redundancy[0], *own.rotation_redundancy[0]]
+    return found
+
+
+def with_known_readout(block: Block) -> Block | None:
+    """Return a block whose readout times are known; None where all of them are."""
+    known: dict[int, Readout] = {}
+    timed = []
+    for each in block.timed:
+        own = each.readout
+        if each.shutter is not None and own is not None and not own.is_held:
+            readout = known.setdefault(id(own), Readout(own.name, own.value, 0.0))
+            each = replace(each, shutter=replace(each.shutter, readout=readout))
+        timed.append(each)
+    return block.replace(timed=timed) if known else None
+
 
 Triple = tuple[float, float, float]
 
@@ -124,16 +261,8 @@ def point_quality(
 ) -> list[PointQuality]:
     """Return the quality of new points by number of rays, by location, and of all; groups without points too.
 
-    Parameters
-    ----------
-    result
-        The predicted block.
-    point_sd
-        (n, 3) standard deviations, linear unit.
-    locations
-        (n,) one of `LOCATIONS` each.
-    new
-        (n,) the points to be judged.
+    Standard deviations are (n, 3) in the linear unit, locations (n,) of `LOCATIONS`; `new` (n,) are the
+    points to be judged.
     """
     rays = result.point_rays
     groups = [("rays", name, (rays >= low) & (rays <= high)) for name, low, high in _CLASSES]
@@ -151,8 +280,8 @@ def _group(result: Result, point_sd: Floats, grouping: str, group: str, chosen: 
         grouping=grouping,
         group=group,
         points=int(chosen.sum()),
-        rms_sd=_triple([_rms(column) for column in point_sd[chosen].T]),
-        max_sd=_triple([_largest(column) for column in point_sd[chosen].T]),
+        rms_sd=cast("Triple", tuple(_rms(column) for column in point_sd[chosen].T)),
+        max_sd=cast("Triple", tuple(_largest(column) for column in point_sd[chosen].T)),
         redundancy=_mean(redundancy),
         unchecked=1 - _mean(checked.astype(np.float64)),
         detectable=_median(detectable[checked]),
@@ -194,11 +323,6 @@ def control_quality(result: Result, control_sd: Floats, axes: tuple[str, str, st
             )
         )
     return qualities
-
-
-def _triple(values: list[float]) -> Triple:
-    x, y, z = values
-    return x, y, z
 
 
 def _rms(values: Floats) -> float:

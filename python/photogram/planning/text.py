@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import compress
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from photogram.show.sections import composed, headline
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
 
-__all__ = ["motion_shown", "remarks", "report", "what_next"]
+__all__ = ["axis_figures", "counts", "motion_shown", "on_the_ground", "remarks", "report", "what_next"]
 
 _NOTICED = 1.005
 """Ratio of standard deviations that two decimals show."""
@@ -52,18 +52,36 @@ def report(patterns: Sequence[Pattern]) -> str:
 def _network(patterns: Sequence[Pattern]) -> list[str]:
     linear = patterns[0].block.linear_unit
     decimals = _decimals(patterns)
-    rows: list[tuple[str, Callable[[Pattern], str]]] = [
-        ("photos", lambda p: f"{len(p.block.photo_ids)}"),
-        ("new points", lambda p: f"{p.new_points.sum()}"),
-        ("control points", lambda p: f"{(p.result.used_points & ~p.new_points).sum()}"),
-        ("points left out", lambda p: f"{len(p.result.dropped)}"),
-        ("image points", lambda p: f"{p.result.used_images.sum()}"),
-        (f"1 mm in the photo on the ground, {linear}", lambda p: _fixed(p.scale, decimals)),
-        (f"sd of image coordinates on the ground, {linear}", lambda p: _fixed(p.unit, decimals)),
-    ]
-    blocks = [[pattern.name, *(cell(pattern) for _, cell in rows)] for pattern in patterns]
-    labels = ["", *(name for name, _ in rows)]
+    blocks = []
+    for pattern in patterns:
+        lengths = (_fixed(pattern.scale, decimals), _fixed(pattern.unit, decimals))
+        blocks.append([pattern.name, *map(str, counts(pattern).values()), *lengths])
+    labels = ["", *counts(patterns[0]), *on_the_ground(linear)]
     return [*_labelled(labels, [_column(block) for block in blocks]), *remarks(patterns)]
+
+
+def counts(pattern: Pattern) -> dict[str, int]:
+    """Return how much of everything a pattern has, by names."""
+    return {
+        "photos": len(pattern.block.photo_ids),
+        "new points": int(pattern.new_points.sum()),
+        "control points": int((pattern.result.used_points & ~pattern.new_points).sum()),
+        "points left out": len(pattern.result.dropped),
+        "image points": int(pattern.result.used_images.sum()),
+    }
+
+
+def on_the_ground(linear: str) -> tuple[str, str]:
+    """Return what the scale and the unit of a pattern are called, in a linear unit."""
+    return f"1 mm in the photo on the ground, {linear}", f"sd of image coordinates on the ground, {linear}"
+
+
+def axis_figures(patterns: Sequence[Pattern]) -> Iterator[tuple[str, str, list[float]]]:
+    """Yield kind (rms, max), axis and expected standard deviations of all new points in each pattern."""
+    every = [pattern.points[-1] for pattern in patterns]
+    for k, axis in enumerate(patterns[0].axes):
+        yield "rms", axis, [quality.rms_sd[k] for quality in every]
+        yield "max", axis, [quality.max_sd[k] for quality in every]
 
 
 def what_next(patterns: Sequence[Pattern]) -> list[str]:
@@ -169,20 +187,28 @@ def _side_by_side(patterns: Sequence[Pattern], columns: Callable[[Pattern], list
     return _labelled(list(compress(labels, shown)), blocks)
 
 
+def _in_blocks(
+    patterns: Sequence[Pattern], labels: list[str], rows: Callable[[Pattern], list[list[str]]]
+) -> list[str]:
+    """Lay out rows of each pattern beside its labels, the heads of which are empty."""
+    return _labelled(labels, [_aligned(pattern.name, rows(pattern)) for pattern in patterns])
+
+
 def _photos(patterns: Sequence[Pattern]) -> list[str]:
     decimals = _decimals(patterns)
     linear = patterns[0].block.linear_unit
     weighted = any(math.isfinite(quality.redundancy) for p in patterns for quality in p.photos)
-    blocks = []
-    for pattern in patterns:
-        rows = [["rms", "max", *(["redundancy"] if weighted else [])]]
+
+    def rows(pattern: Pattern) -> list[list[str]]:
+        found = [["rms", "max", "redundancy"]]
         for k, quality in enumerate(pattern.photos):
             factor, digits = (1.0, decimals) if k < 3 else (1.0 / ARCSEC, 2)
-            rows.append([_fixed(factor * sd, digits) for sd in (quality.rms_sd, quality.max_sd)])
-            rows[-1] += [_fixed(quality.redundancy, 3)] if weighted else []
-        blocks.append(_aligned(pattern.name, rows))
+            sd = [_fixed(factor * sd, digits) for sd in (quality.rms_sd, quality.max_sd)]
+            found.append([*sd, _fixed(quality.redundancy, 3)])
+        return found if weighted else [row[:2] for row in found]
+
     names = [f"{q.unknown}, {linear if k < 3 else 'arcsec'}" for k, q in enumerate(patterns[0].photos)]
-    return _labelled(["", "", *names], blocks)
+    return _in_blocks(patterns, ["", "", *names], rows)
 
 
 def motion_shown(unit: str) -> tuple[float, str]:
@@ -194,56 +220,46 @@ def _motion(patterns: Sequence[Pattern]) -> list[str]:
     units = {each.unknown: each.unit for pattern in patterns for each in pattern.motion}
     if not units:
         return []
-    blocks = []
-    for pattern in patterns:
-        own = {each.unknown: each for each in pattern.motion}
-        rows = [["rms", "max"]]
-        for name, unit in units.items():
-            factor, _ = motion_shown(unit)
-            values = (own[name].rms_sd, own[name].max_sd) if name in own else (math.nan, math.nan)
-            rows.append([_fixed(sd / factor, 3) for sd in values])
-        blocks.append(_aligned(pattern.name, rows))
+
+    def rows(pattern: Pattern) -> list[list[str]]:
+        own = {each.unknown: (each.rms_sd, each.max_sd) for each in pattern.motion}
+        values = [own.get(name, (math.nan, math.nan)) for name in units]
+        factors = [motion_shown(unit)[0] for unit in units.values()]
+        figures = zip(values, factors, strict=True)
+        return [["rms", "max"], *([_fixed(sd / factor, 3) for sd in pair] for pair, factor in figures)]
+
     names = [f"{name}, {motion_shown(unit)[1]}" for name, unit in units.items()]
-    return _labelled(["", "", *names], blocks)
+    return _in_blocks(patterns, ["", "", *names], rows)
 
 
 def _known(patterns: Sequence[Pattern]) -> list[str]:
     """Say what points would be, were the readout time known."""
-    decimals = _decimals(patterns)
-    linear = patterns[0].block.linear_unit
     if all(pattern.known_rms_sd is None for pattern in patterns):
         return []
-    blocks = []
-    for pattern in patterns:
+    decimals = _decimals(patterns)
+
+    def rows(pattern: Pattern) -> list[list[str]]:
         known = pattern.known_rms_sd or (math.nan,) * 3
-        rows = [["rms", "times better"]]
-        for sd, times in zip(known, _times_better(pattern) if pattern.known else known, strict=True):
-            rows.append([_fixed(sd, decimals), _fixed(times, 2)])
-        blocks.append(_aligned(pattern.name, rows))
-    return _labelled(["", "", *(f"{axis}, {linear}" for axis in patterns[0].axes)], blocks)
+        pairs = zip(known, _times_better(pattern) if pattern.known else known, strict=True)
+        return [["rms", "times better"], *([_fixed(sd, decimals), _fixed(times, 2)] for sd, times in pairs)]
+
+    names = [f"{axis}, {patterns[0].block.linear_unit}" for axis in patterns[0].axes]
+    return _in_blocks(patterns, ["", "", *names], rows)
 
 
 def _control(patterns: Sequence[Pattern]) -> list[str]:
-    decimals = _decimals(patterns)
-    linear = patterns[0].block.linear_unit
     if not any(quality.held for pattern in patterns for quality in pattern.control):
         return []
-    blocks = []
-    for pattern in patterns:
-        rows = [["held", "sd", "redundancy", "detectable", "effect"], ["", linear, "mean", linear, "sd"]]
-        rows += [
-            [
-                f"{quality.held}",
-                _fixed(quality.sd, decimals),
-                _fixed(quality.redundancy, 3),
-                _fixed(quality.detectable, decimals),
-                _fixed(quality.effect, 1),
-            ]
-            for quality in pattern.control
-        ]
-        blocks.append(_aligned(pattern.name, rows))
-    names = [quality.component for quality in patterns[0].control]
-    return _labelled(["", "", "", *names], blocks)
+    decimals = _decimals(patterns)
+    linear = patterns[0].block.linear_unit
+
+    def rows(pattern: Pattern) -> list[list[str]]:
+        heads = [["held", "sd", "redundancy", "detectable", "effect"], ["", linear, "mean", linear, "sd"]]
+        digits = (0, decimals, 3, decimals, 1)
+        values = ((q.held, q.sd, q.redundancy, q.detectable, q.effect) for q in pattern.control)
+        return [*heads, *(list(map(_fixed, row, digits)) for row in values)]
+
+    return _in_blocks(patterns, ["", "", "", *(q.component for q in patterns[0].control)], rows)
 
 
 def _comparison(patterns: Sequence[Pattern]) -> list[str]:
@@ -251,22 +267,16 @@ def _comparison(patterns: Sequence[Pattern]) -> list[str]:
     if len(patterns) < 2 or not all(pattern.new_points.any() for pattern in patterns):
         return []
     decimals = _decimals(patterns)
-    every = [pattern.points[-1] for pattern in patterns]
     blocks = [[pattern.name] for pattern in patterns]
     labels, verdicts = [""], [""]
-    for k, axis in enumerate(patterns[0].axes):
-        for kind in ("rms", "max"):
-            values = [(quality.rms_sd if kind == "rms" else quality.max_sd)[k] for quality in every]
-            best, worst = min(values), max(values)
-            better, than = (patterns[values.index(value)].name for value in (best, worst))
-            labels.append(f"{kind} {axis}, {patterns[0].block.linear_unit}")
-            verdicts.append(
-                f"{better} is {worst / best:.2f} times better than {than}"
-                if worst > _NOTICED * best
-                else "no difference"
-            )
-            for block, value in zip(blocks, values, strict=True):
-                block.append(_fixed(value, decimals))
+    for kind, axis, values in axis_figures(patterns):
+        best, worst = min(values), max(values)
+        better, than = (patterns[values.index(value)].name for value in (best, worst))
+        labels.append(f"{kind} {axis}, {patterns[0].block.linear_unit}")
+        said = f"{better} is {worst / best:.2f} times better than {than}"
+        verdicts.append(said if worst > _NOTICED * best else "no difference")
+        for block, value in zip(blocks, values, strict=True):
+            block.append(_fixed(value, decimals))
     return _labelled(labels, [*(_column(block) for block in blocks), verdicts])
 
 

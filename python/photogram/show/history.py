@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.show.cells import page_table, unit_written
-from photogram.show.lines import field, table_lines
-from photogram.show.page import Drawing, Part, Section, Table, decimals_of
+from photogram.show.judgement import judged, tests_section
+from photogram.show.lines import Field, field, table_lines
+from photogram.show.page import Drawing, Fact, Page, Part, Section, Table, decimals_of
 from photogram.show.pictures import new_figure
 from photogram.show.quantity import Axis, Quantity, component, members, of_each, records
+from photogram.show.quantity import Table as Quantities
 from photogram.show.style import FAINT, INK, MARKED, in_style
 
 if TYPE_CHECKING:
@@ -19,11 +21,14 @@ if TYPE_CHECKING:
 
     from photogram.arguments.types import Floats
     from photogram.statistics.history import History
+    from photogram.statistics.verdict import Verdict
 
 __all__ = [
     "charts_section",
     "control_charts",
     "history_document",
+    "history_page",
+    "history_text",
     "series",
     "series_lines",
     "series_table",
@@ -77,6 +82,45 @@ def series_lines(history: History) -> list[str]:
             *field(steps, 8, ".2f", "step t"),
             *field(found, 0, head="found", gap="  "),
         ]
+    )
+
+
+def history_text(calibrations: Sequence[Field], histories: Mapping[str, History]) -> list[str]:
+    """Return calibrations as lines of text, and what changed in some things, by what stands above each."""
+    lines = table_lines(calibrations)
+    for whose, own in histories.items():
+        lines += ["", whose, *series_lines(own)]
+    return lines
+
+
+def history_page(
+    what: str,
+    calibrations: Quantities,
+    histories: Mapping[str, History],
+    verdict: Verdict,
+    highlights: Sequence[Fact],
+    *,
+    intro: str = "",
+    more: Sequence[Section] = (),
+) -> Page:
+    """Return the page of calibrations in the order of their days, with what changed and `more` sections."""
+    days = next(each.values for each in calibrations if each.member == "day")
+    named = histories.items()
+    sections = [
+        charts_section(histories),
+        Section("changes", "What changed", [series_table(own, name) for name, own in named], intro),
+        Section("calibrations", "Calibrations", [page_table("Calibrations", calibrations)]),
+        *more,
+        Section("values", "All values", [values_table(own, name) for name, own in named]),
+        tests_section(verdict),
+    ]
+    return Page(
+        what=what,
+        title=f"{len(days)} calibrations, {days[0]} to {days[-1]}",
+        judgements=[judged(verdict)],
+        advice=verdict.next,
+        highlights=highlights,
+        sections=sections,
     )
 
 

@@ -19,13 +19,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.statistics.distributions import LEVEL, critical_student
 
-__all__ = [
-    "coverage_factor",
-    "effective_freedom",
-    "joint_freedom",
-    "rmse_interval",
-    "welch_satterthwaite",
-]
+__all__ = ["coverage_factor", "effective_freedom", "joint_freedom", "rmse_interval", "welch_satterthwaite"]
 
 ROUNDING = 1e-9
 """Of a number of degrees of freedom that is whole but for rounding, and of traces, in their size."""

@@ -159,11 +159,7 @@ def parts_tests(
 
 
 def _probabilities(
-    statistic: Floats,
-    dimension: NDArray[np.int64],
-    omega: ArrayLike,
-    freedom: ArrayLike,
-    known: bool,
+    statistic: Floats, dimension: NDArray[np.int64], omega: ArrayLike, freedom: ArrayLike, known: bool
 ) -> tuple[Floats, Floats]:
     fisher = np.full(statistic.shape, math.nan)
     tested = dimension > 0

@@ -29,13 +29,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted
-from photogram.statistics.distributions import (
-    LEVEL,
-    bonferroni,
-    critical_student,
-    log_chi_square,
-    log_fisher,
-)
+from photogram.statistics.distributions import LEVEL, bonferroni, critical_student, log_chi_square, log_fisher
 from photogram.statistics.findings import Systematic
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
@@ -325,13 +319,7 @@ def _log10_p(t: float, freedom: float) -> float:
 
 
 def _series(
-    x: Floats,
-    covariance: Floats,
-    hypotheses: _Hypotheses,
-    name: str,
-    unit: str,
-    freedom: float,
-    level: float,
+    x: Floats, covariance: Floats, hypotheses: _Hypotheses, name: str, unit: str, freedom: float, level: float
 ) -> Series:
     """Test one quantity, accept what is found, the most certain first, and fit all of it together."""
     k = len(x)

@@ -12,12 +12,10 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.stellar import report_iteration, strict
-from photogram.stellar.combination import combine
-from photogram.stellar.counts import degrees_of_freedom
-from photogram.stellar.movement import movement, pairs_to_combine
+from photogram.stellar.movement import combine, movement, pairs_to_combine
 from photogram.stellar.outliers import culprits, harm, outliers
 from photogram.stellar.parameters import GROUPS, INDEX
-from photogram.stellar.problem import Problem
+from photogram.stellar.problem import Problem, degrees_of_freedom
 from photogram.stellar.result import PreRun, Result, Stage
 from photogram.stellar.state import Solved
 

@@ -19,8 +19,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.stellar.inertial import equatorial_axes
-from photogram.stellar.places import Earth, sidereal_time, to_date
+from photogram.stellar.places import Earth, equatorial_axes, sidereal_time, to_date
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 
@@ -80,25 +79,12 @@ def locate(
     fields: tuple[float, float],
     earth: Earth | None = None,
 ) -> list[Located]:
-    """Find where exposures look.
+    """Find where exposures look, whose images stand with the brightest first; attitudes do not count.
 
-    Parameters
-    ----------
-    exposures
-        With their images, the brightest first; attitudes do not count.
-    site, earth
-        Where they were taken, and how the Earth was turned.
-    frame
-        Width and height, pixels.
-    fields
-        Smallest and largest horizontal field of view that the camera may have, radians.
+    The frame is in pixels; fields are the smallest and largest horizontal field of view that the camera may
+    have, radians.
 
-    Raises
-    ------
-    InputError
-        Fields of view that cannot be.
-    ModuleNotFoundError
-        The package tetra3rs is not installed.
+    Raises InputError: fields of view that cannot be. ModuleNotFoundError: tetra3rs is not installed.
     """
     low, high = (math.degrees(field) for field in fields)
     if not 0.5 <= low <= high <= 100:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +15,19 @@ from photogram.errors import InputError
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
-from photogram.stellar.camera_files import read_any, read_camera, read_document, weight_of
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.plate_model import plate_camera
-from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
-from photogram.stellar.transformation import transformed_angles
-
-if TYPE_CHECKING:
-    from photogram.stellar.problem import Problem
-    from photogram.stellar.result import Result
+from photogram.stellar.pointing import transformed_angles
+from photogram.stellar.problem import Problem
+from photogram.stellar.result import Result
+from photogram.stellar.sky_cameras import (
+    BrownCamera,
+    SkyCamera,
+    read_any,
+    read_camera,
+    read_document,
+    weight_of,
+)
 
 __all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document", "camera_from"]
 

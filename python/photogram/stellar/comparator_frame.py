@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
-
-if TYPE_CHECKING:
-    from photogram.stellar.result import Result
+from photogram.stellar.result import Result
 
 __all__ = ["ComparatorFrame", "comparator_frame"]
 
@@ -37,7 +34,7 @@ class ComparatorFrame:
     scale_x: float
     scale_y: float
     epsilon: float
-    covariance: NDArray[np.float64]
+    covariance: Floats
 
     @property
     def mean_errors(self) -> tuple[float, float, float]:

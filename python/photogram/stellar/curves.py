@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
+from photogram.stellar.result import Result
 from photogram.stellar.sky import TAU, refraction
-
-if TYPE_CHECKING:
-    from photogram.stellar.result import Result
 
 __all__ = [
     "DistortionCurves",
@@ -149,7 +145,7 @@ class Histogram:
     """
 
     edges: Floats
-    counts: NDArray[np.int64]
+    counts: Indices
     expected: Floats
     mean: float
     sd: float

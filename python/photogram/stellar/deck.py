@@ -1,8 +1,4 @@
-"""The card deck of the 1967 program (NOAA TR NOS 55, figure 21; section 7 of its specification).
-
-Where the columns of a card cannot be read in the report, what is done here is said in `docs/stellar-
-camera.md`.
-"""
+"""Cards of 80 columns: fields as numbers, and the cards of a deck one after the other."""
 
 from __future__ import annotations
 
@@ -12,16 +8,65 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.records import Record, Source, parse_integer, parse_real
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
-from photogram.stellar.cards import Card, Cards
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, NAMES
-from photogram.stellar.problem import Axis, Problem, default_parameters
-from photogram.stellar.rejection import rejected
+from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
 from photogram.stellar.sky import Air, Site
 
 __all__ = ["read_deck"]
+
+
+class Card(Record):
+    """A card: fields are taken by their first and last column, counted from 1."""
+
+    def name(self, first: int, last: int) -> str:
+        """Return a field as text."""
+        return self.columns(first, last).strip()
+
+    def real(self, first: int, last: int, decimals: int = 8) -> float:
+        """Return an Ew.d or Fw.d field; blank is zero."""
+        try:
+            return float(parse_real(self.columns(first, last), decimals))
+        except ValueError as error:
+            raise self.error(f"columns {first}-{last}: {error}") from None
+
+    def integer(self, first: int, last: int) -> int:
+        """Return an Iw field; blank is zero."""
+        try:
+            return parse_integer(self.columns(first, last))
+        except ValueError as error:
+            raise self.error(f"columns {first}-{last}: {error}") from None
+
+    def reals(self, first: int, width: int, count: int, decimals: int = 8) -> list[float]:
+        """Return consecutive fields of equal width."""
+        starts = range(first, first + width * count, width)
+        return [self.real(start, start + width - 1, decimals) for start in starts]
+
+
+class Cards:
+    """The cards of a file, a card a line, taken one after the other."""
+
+    def __init__(self, file: Path) -> None:
+        self._source, self._taken = Source.read(file), 0
+
+    def take(self, what: str) -> Card:
+        """Return the next card, which holds what is named.
+
+        Raises InputError: the deck is at its end.
+        """
+        if self._taken >= len(self._source.lines):
+            message = f"the deck ends where {what} is expected"
+            raise InputError(message, file=self._source.path, record=self._taken + 1)
+        self._taken += 1
+        return Card(self._source, self._taken)
+
+    @property
+    def at_end(self) -> bool:
+        """Whether nothing but blank cards is left."""
+        return not any(number > self._taken for number in self._source.filled())
 
 
 _DEGREE = np.pi / 180.0

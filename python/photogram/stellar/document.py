@@ -21,8 +21,8 @@ from photogram.stellar.curves import (
 )
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.result import Ellipse, Result, Stage
-from photogram.stellar.transformation import transformed_angles
 
 __all__ = ["to_json"]
 
@@ -55,7 +55,9 @@ def _document(result: Result) -> dict[str, Any]:
         "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
         "significance": result.significance(),
         "movement": [asdict(point) for point in result.movement],
-        "fictitious_points": _fictitious(result) if result.movement else [],
+        "fictitious_points": [asdict(point) for point in fictitious_points(result)]
+        if result.movement
+        else [],
         "pre_run": _pre_run(result),
         "histogram": {axis: asdict(histogram(values)) for axis, values in residual_classes(result).items()}
         if options.histogram
@@ -213,10 +215,6 @@ def _means(result: Result) -> list[dict[str, Any]]:
         }
         for star, xy, v, (radial, along) in star_means(result)
     ]
-
-
-def _fictitious(result: Result) -> list[dict[str, Any]]:
-    return [asdict(point) for point in fictitious_points(result)]
 
 
 def _pre_run(result: Result) -> dict[str, Any] | None:

@@ -103,10 +103,7 @@ LENSES: dict[str, Lens] = {
 def lens_named(name: str) -> Lens:
     """Return a lens.
 
-    Raises
-    ------
-    InputError
-        There is none of the name.
+    Raises InputError: there is none of the name.
     """
     if name not in LENSES:
         raise InputError(f"there is no lens {name!r}; lenses are {', '.join(LENSES)}")

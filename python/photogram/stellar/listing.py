@@ -10,7 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar import tables
-from photogram.stellar.lens_tests import LEVEL, equal
+from photogram.stellar.lens_choice import LEVEL, equal
 from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.result import SIGNIFICANT, Result, Stage
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
@@ -275,7 +274,7 @@ def _apply(transform: Floats, points: Floats) -> Floats:
     return np.asarray(points @ transform[:2] + transform[2], float)
 
 
-def _fitted(measured: Floats, chosen: NDArray[np.bool_], predicted: Floats, degree: int) -> Floats:
+def _fitted(measured: Floats, chosen: Bools, predicted: Floats, degree: int) -> Floats:
     """Move all images by the polynomials that fit the matched ones; tilt is quadratic, distortion cubic."""
     x, y = (measured / np.abs(measured).max(initial=1.0)).T
     powers = [(i, k - i) for k in range(degree + 1) for i in range(k + 1)]

@@ -15,14 +15,13 @@ from photogram.messages import Message, listed
 from photogram.show.angles import ARCSEC
 from photogram.statistics.verdict import LARGEST_FACTOR
 from photogram.stellar.blind import ATTITUDE, FIELD, locate
-from photogram.stellar.lens_choice import LensFit, as_lens, compared_lenses
-from photogram.stellar.lens_tests import LensTest, test_scale, test_terms
+from photogram.stellar.comparison import stood_still
+from photogram.stellar.lens_choice import LensFit, LensTest, as_lens, compared_lenses, test_scale, test_terms
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.night_result import SIGNIFICANT, CalibratedNight, Night
 from photogram.stellar.night_run import Run, adjusted
 from photogram.stellar.places import Earth
 from photogram.stellar.sky_cameras import SkyCamera
-from photogram.stellar.still import stood_still
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
 

@@ -15,16 +15,14 @@ from photogram.show.methods import Judged, Paged
 from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.inertial import InertialAttitude, inertial_attitude
-from photogram.stellar.lens_choice import LensFit
-from photogram.stellar.lens_tests import LensTest
+from photogram.stellar.comparison import Standstill
+from photogram.stellar.lens_choice import LensFit, LensTest
 from photogram.stellar.lenses import lens_named
 from photogram.stellar.matching import STRETCH
-from photogram.stellar.places import Earth
+from photogram.stellar.places import Earth, InertialAttitude, inertial_attitude
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import SkyCamera
-from photogram.stellar.still import Standstill
 
 __all__ = ["SIGNIFICANT", "CalibratedNight", "Night"]
 

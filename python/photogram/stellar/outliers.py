@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,11 +13,9 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 from photogram.stellar.parameters import INDEX, NAMES
-
-if TYPE_CHECKING:
-    from photogram.stellar.problem import Problem
-    from photogram.stellar.result import Result
-    from photogram.stellar.state import Solved
+from photogram.stellar.problem import Problem
+from photogram.stellar.result import Result
+from photogram.stellar.state import Solved
 
 __all__ = ["Tests", "culprits", "harm", "outliers", "studentized"]
 

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
 from photogram.io.toml_tables import Document, Table, read_document
@@ -23,8 +22,7 @@ from photogram.stellar.landmarks import HOUR, landmark
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.places import sidereal_time
-from photogram.stellar.problem import Axis, Problem, default_parameters
-from photogram.stellar.rejection import rejected
+from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
 from photogram.stellar.sky import Site
 from photogram.stellar.tomlfile import effects, pole_arcsec, site
 
@@ -75,15 +73,13 @@ _TABLES = {
 def read_plain(path: Path) -> Problem:
     """Read a calibration in plain form.
 
+    Raises InputError: a file that cannot be read, and what cannot be used, with the file, and the record of a
+    CSV file.
+
     Parameters
     ----------
     path
         The TOML file; it names the CSV files of stars and images, relative to itself.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, and what cannot be used, with the file, and the record of a CSV file.
     """
     document = read_document(path, _TABLES)
     try:
@@ -155,7 +151,7 @@ def _problem(document: Document) -> Problem:
     return rejected(problem, set(reject.words("stars", ())), set(reject.words("points", ())))
 
 
-def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, NDArray[np.bool_]]:
+def _camera(table: Table, prior: PlateCamera | None) -> tuple[Floats, Bools]:
     """Read initial values: angles in grads, all else in the units of the parameters."""
     fixed = np.zeros(len(NAMES), bool)
     for name in table.words("fixed", ()):

@@ -27,21 +27,11 @@ def plate_camera(
 ) -> Camera:
     """Return a camera of star plates as blocks take it: `plate`, in mm.
 
-    The model has the parameters of the calibration, so that values and covariance only change their units.
-
-    Parameters
-    ----------
-    values, covariance
-        (13,) and (13, 13) of epsilon, xp, yp, cx, cy, dx, dy, K1 to K5, phi_T; radians, metres. Variances of
-        zero are those of what was held.
-    name
-        For reports.
-    weighted
-        Whether what was calibrated is observed, with its full covariance; otherwise it is known.
-    common_scale
-        Whether cx is the principal distance of both axes.
-    distortion_first
-        Principal distance (metres) of the form with scale after distortion; 0 for scale before distortion.
+    The model has the parameters of the calibration, (13,) epsilon, xp, yp, cx, cy, dx, dy, K1 to K5, phi_T in
+    radians and metres, so that values and covariance (13, 13) only change their units; variances of zero are
+    those of what was held. Unless `weighted` what was calibrated is known, not observed. With a common scale
+    cx is the principal distance of both axes; `distortion_first` is that (metres) of the form with scale
+    after distortion, 0 for scale before distortion.
     """
     scale = np.array([_METRE ** _power(UNITS[each]) for each in _INTERIOR])
     values, covariance = values * scale, covariance * np.outer(scale, scale)

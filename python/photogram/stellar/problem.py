@@ -1,12 +1,14 @@
-"""A calibration as it is known beforehand: stars, images, parameters and their weights."""
+"""A calibration as it is known beforehand: stars, images, weights, counts, what is rejected."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Set
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
+from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import listed
 from photogram.show.summary import Brief
@@ -14,7 +16,16 @@ from photogram.stellar.options import Options
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.sky import TAU, Site
 
-__all__ = ["Axis", "Problem", "default_parameters"]
+__all__ = [
+    "Axis",
+    "Counts",
+    "Problem",
+    "default_parameters",
+    "degrees_of_freedom",
+    "failure",
+    "rejected",
+    "singular",
+]
 
 
 def default_parameters(principal_distance: float) -> Floats:
@@ -239,3 +250,117 @@ def _refuse_indefinite(names: list[str], weights: Floats) -> None:
 
 def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:
     return tuple(name for name, kept in zip(names, keep, strict=True) if kept)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What an adjustment counts.
+
+    Attributes
+    ----------
+    plate_observations, star_observations, parameter_observations
+        Plate coordinates with those of the axis; catalogue coordinates that have weight; parameters that have
+        weight.
+    parameter_unknowns, star_unknowns
+        What is estimated.
+    constraints
+        Of a combined solution.
+    """
+
+    plate_observations: int
+    star_observations: int
+    parameter_observations: int
+    parameter_unknowns: int
+    star_unknowns: int
+    constraints: int = 0
+
+    @property
+    def observations(self) -> int:
+        """All together."""
+        return self.plate_observations + self.star_observations + self.parameter_observations
+
+    @property
+    def unknowns(self) -> int:
+        """All together."""
+        return self.parameter_unknowns + self.star_unknowns
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Observations and constraints minus unknowns."""
+        return self.observations + self.constraints - self.unknowns
+
+    @property
+    def usable(self) -> int:
+        """Degrees of freedom, 1 where the solution is unique."""
+        return self.degrees_of_freedom or 1
+
+
+def degrees_of_freedom(problem: Problem, free: Bools) -> Counts:
+    """Count observations and unknowns where the given parameters are estimated.
+
+    Raises
+    ------
+    AdjustmentError
+        There are fewer observations than unknowns (error 3).
+    """
+    free_stars = int((~problem.held).sum())
+    counts = Counts(
+        plate_observations=2 * len(problem.image_points) + 2 * (problem.axis is not None),
+        star_observations=2 * int((problem.known & ~problem.held).sum()),
+        parameter_observations=int((problem.weighted & free).sum()),
+        parameter_unknowns=int(free.sum()),
+        star_unknowns=2 * free_stars,
+    )
+    if counts.degrees_of_freedom < 0:
+        raise AdjustmentError(
+            f"ERROR 3: not enough observations: {counts.observations} for {counts.unknowns} unknowns"
+        )
+    return counts
+
+
+def rejected(problem: Problem, stars: Set[str], points: Set[str]) -> Problem:
+    """Return a problem without the named stars and plate points; a star that loses all its images goes, too.
+
+    Raises
+    ------
+    InputError
+        A number that is not there.
+    """
+    missing = sorted(set(stars) - set(problem.star_ids)) + sorted(set(points) - set(problem.image_points))
+    if missing:
+        raise InputError(f"rejected but not there: {', '.join(missing)}")
+    if not stars and not points:
+        return problem
+    left = problem.without(
+        np.array([star in stars for star in problem.star_ids]),
+        np.array([point in points for point in problem.image_points]),
+    )
+    lost = sorted(set(problem.star_ids) - set(left.star_ids) - set(stars))
+    labels = dict(problem.labels)
+    for name, values in (("rejected stars", sorted(stars)), ("rejected points", sorted(points))):
+        if values:
+            labels[name] = ", ".join(values)
+    if lost:
+        labels["stars eliminated, all images rejected"] = ", ".join(lost)
+    return replace(left, labels=labels)
+
+
+def singular(parameters: Iterable[int]) -> AdjustmentError:
+    """Return error 4 of the report, with the names of the parameters."""
+    names = ", ".join(NAMES[i] for i in parameters)
+    return AdjustmentError(
+        f"ERROR 4: no inverse for the reduced normal equations: the stars do not determine {names}"
+    )
+
+
+def failure(problem: Problem, error: _photocore.StellarError) -> AdjustmentError:
+    """Say which stars or parameters of a problem an error of the core tells of."""
+    kind, message, indices = error.args
+    if kind == "undetermined":
+        return singular(indices)
+    stars = [problem.star_ids[i] for i in indices]
+    if kind == "undetermined stars":
+        return AdjustmentError(f"ERROR 2: no inverse for the submatrix of star {', '.join(stars)}")
+    if kind == "not finite":
+        return AdjustmentError(f"below the horizon or behind the camera: star {listed(stars)}")
+    return AdjustmentError(message)

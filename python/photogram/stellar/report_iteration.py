@@ -15,9 +15,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError
-from photogram.stellar.counts import degrees_of_freedom
-from photogram.stellar.failures import failure, singular
-from photogram.stellar.problem import Problem
+from photogram.stellar.problem import Problem, degrees_of_freedom, failure, singular
 from photogram.stellar.state import Level, Solved
 
 __all__ = ["DIVERGED", "SETTLED", "iterate", "residual_cycle", "stop_reason"]
@@ -33,14 +31,8 @@ _MOST = 100
 def stop_reason(levels: Sequence[float], tolerance: float, limit: int) -> str | None:
     """Apply the three stop rules to the levels of discrepancies so far; None to go on.
 
-    Parameters
-    ----------
-    levels
-        Of every pass, before its correction.
-    tolerance
-        Largest difference of two successive levels at which the iteration has settled.
-    limit
-        Iterations at the most; 0 for none.
+    Levels are of every pass, before its correction; the tolerance is the largest difference of two successive
+    ones at which the iteration has settled; a limit of 0 is none.
     """
     if not np.isfinite(levels[-1]):
         return DIVERGED
@@ -67,27 +59,11 @@ def _tolerances(problem: Problem) -> dict[str, Any]:
 def iterate(
     problem: Problem, initial: Floats, free: Bools, *, solution: str, limit: int, once: bool = False
 ) -> Solved:
-    """Iterate to the report's solution.
+    """Iterate from initial parameters (26,) to the report's solution, in those that are free.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    initial
-        (26,) initial parameters.
-    free
-        (26,) which of them to estimate.
-    solution
-        `minimum`, `maximum` or `refraction`.
-    limit
-        Iterations at the most; 0 for none.
-    once
-        Correct once without a test, as the report does for refraction.
+    A limit of 0 is none; `once` corrects once without a test, as the report does for refraction.
 
-    Raises
-    ------
-    AdjustmentError
-        A star or the parameters are not determined (errors 2 and 4).
+    Raises AdjustmentError: a star or the parameters are not determined (errors 2 and 4).
     """
     parameters, dof = initial.copy(), degrees_of_freedom(problem, free).usable
     known = problem.known[problem.image_stars]
@@ -146,21 +122,10 @@ def residual_cycle(
     """Compute star corrections, residuals and their tests at final parameters (the report's v-cycle).
 
     Refraction is that of the corrected places; the report's listing keeps that of the catalogue's, which is
-    two millionths of the mean error of unit weight.
+    two millionths of the mean error of unit weight. The cofactors (26, 26) are those of the parameters,
+    `rest` is how the solution was found.
 
-    Parameters
-    ----------
-    problem, parameters, free
-        As for `iterate`.
-    cofactors
-        (26, 26) of the parameters.
-    rest
-        The other attributes of the solution: how it was found.
-
-    Raises
-    ------
-    AdjustmentError
-        A star is not determined by its images (error 2), or has none at these parameters.
+    Raises AdjustmentError: a star is not determined by its images (error 2), or has none at these parameters.
     """
     tolerances = _tolerances(problem)
     core = problem.core(parameters, problem.places_at(parameters, free), ~free)

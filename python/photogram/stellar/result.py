@@ -7,23 +7,71 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.show.methods import Judged, Paged
 from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.stellar.counts import Counts
-from photogram.stellar.movement_result import Movement
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.plate_model import plate_camera
-from photogram.stellar.problem import Problem
+from photogram.stellar.problem import Counts, Problem
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["Direction", "Ellipse", "PreRun", "Result", "Stage", "ellipse"]
+__all__ = ["Ellipse", "FictitiousPoint", "Movement", "PreRun", "Result", "Stage", "ellipse"]
+
+
+@dataclass(frozen=True)
+class Movement:
+    """A fictitious point under two attitudes.
+
+    Attributes
+    ----------
+    first, second
+        The groups.
+    xy
+        x = y of the point, metres.
+    angle, mean_error
+        Angle between its two directions and its mean error, radians.
+    differences
+        Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
+        distance), elevation; radians.
+    """
+
+    first: str
+    second: str
+    xy: float
+    angle: float
+    mean_error: float
+    differences: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FictitiousPoint:
+    """A plate point as a direction under one attitude.
+
+    Attributes
+    ----------
+    group
+        Of the attitude.
+    xy
+        x = y of the point, metres.
+    place
+        Apparent right ascension and declination, radians.
+    azimuth, elevation
+        Observed (refracted) ones: azimuth from south, positive west; radians.
+    covariance
+        (2, 2) of the place from the orientation, radians squared.
+    """
+
+    group: str
+    xy: float
+    place: tuple[float, float]
+    azimuth: float
+    elevation: float
+    covariance: Floats
 
 
 CORRELATED = 0.95
@@ -307,7 +355,7 @@ class Result(Judged, Paged, Brief):
             for star, first, end in zip(unknown, firsts, ends, strict=True)
         ]
 
-    def _direction(self, star: int, images: NDArray[np.int64], of_images: Floats) -> Direction:
+    def _direction(self, star: int, images: Indices, of_images: Floats) -> Direction:
         problem, solved = self.problem, self.solved
         place, unit = solved.places[star], self.mean_error
         residuals, weights = solved.residuals[images], problem.image_weights[images]

@@ -11,21 +11,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import available_memory
 from photogram.messages import listed
-from photogram.stellar.camera_files import weight_of
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
+from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.problem import weight_root
 from photogram.stellar.sky import Site
-from photogram.stellar.sky_cameras import COMMON, BrownCamera, SkyCamera
-from photogram.stellar.transformation import transformed_angles
+from photogram.stellar.sky_cameras import COMMON, BrownCamera, SkyCamera, weight_of
 
 __all__ = [
     "BrownCamera",
@@ -324,7 +322,7 @@ class _Images:
         shifts[:, 0] = np.remainder(shifts[:, 0] + np.pi, 2 * np.pi) - np.pi
         self.shifts = shifts
         errors = catalogue.take(self.catalogue).mean_errors(epoch(exposures[0].utc))
-        self.weighted: NDArray[np.bool_] = (errors.min(axis=1) > 0) & weigh
+        self.weighted: Bools = (errors.min(axis=1) > 0) & weigh
         # The axes of date differ from those of the catalogue by minutes of arc: nothing to an error ellipse.
         errors[:, 0] /= np.cos(self.places[:, 1])
         self.weights = np.zeros((len(errors), 2, 2))
@@ -338,7 +336,7 @@ def _core(
     exposures: Sequence[Exposure],
     camera: SkyCamera,
     site: Site,
-    free: NDArray[np.bool_],
+    free: Bools,
     prior: SkyCamera | None,
     pixel_sd: float,
 ) -> _photocore.StellarProblem:

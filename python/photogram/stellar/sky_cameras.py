@@ -1,25 +1,92 @@
-"""Calibrated cameras of digital exposures with their covariance, of any lens, in pixels."""
+"""Calibrated cameras of digital exposures with their covariance, of any lens, in pixels, and their files."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+import orjson
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io import json
+from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.stellar.camera_files import read_camera, read_document
 from photogram.stellar.lenses import LENSES, Lens, lens_named
 from photogram.stellar.sky import TAU
 
-__all__ = ["COMMON", "BrownCamera", "SkyCamera"]
+__all__ = ["COMMON", "BrownCamera", "SkyCamera", "read_any", "read_camera", "read_document", "weight_of"]
+
+
+def weight_of(covariance: Floats) -> Floats:
+    """Return the weight matrix of a covariance whose rows differ by orders of magnitude.
+
+    Raises InputError: the covariance is not positive definite.
+    """
+    sd = np.sqrt(np.diag(covariance))
+    try:
+        lower = np.linalg.cholesky(covariance / np.outer(sd, sd))
+    except np.linalg.LinAlgError:
+        raise InputError("the covariance of the camera is not positive definite") from None
+    root = np.linalg.solve(lower, np.diag(1.0 / sd))
+    return np.asarray(root.T @ root, float)
+
+
+def read_any(path: Path) -> dict[str, Any]:
+    """Read a JSON document.
+
+    Raises InputError: the file cannot be read, or holds something else.
+    """
+    try:
+        document = orjson.loads(read_bytes(path))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"is not a camera: {error}", file=path) from None
+    if not isinstance(document, dict):
+        raise InputError("is not a camera: no JSON object", file=path)
+    return document
+
+
+def read_document(path: Path, kinds: Sequence[str]) -> dict[str, Any]:
+    """Read a JSON document of one of some kinds.
+
+    Raises InputError: the file cannot be read, or is another document.
+    """
+    document = read_any(path)
+    if "kind" not in document:
+        raise InputError("is not a camera: 'kind'", file=path)
+    if document["kind"] not in kinds:
+        raise InputError(f"is a {document['kind']}, not a {' or a '.join(kinds)}", file=path)
+    return document
+
+
+def read_camera(path: Path, document: dict[str, Any], names: Sequence[str]) -> tuple[Floats, Floats]:
+    """Return the parameters of a document and their covariance: zero for what is not in its order.
+
+    Raises InputError: a parameter that is missing, what is not a number, a negative variance.
+    """
+    names = list(names)
+    try:
+        values = [document["parameters"][name] for name in names]
+        order = [names.index(name) for name in document["covariance"]["order"]]
+        matrix = np.array(document["covariance"]["matrix"], float).reshape(len(order), len(order))
+        found = np.array([v["value"] if isinstance(v, dict) else v for v in values], float)
+        # A null becomes NaN.
+        if not (np.isfinite(found).all() and np.isfinite(matrix).all() and (np.diag(matrix) >= 0).all()):
+            raise InputError("is not a camera: what is not a number, or a negative variance", file=path)
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"is not a camera: {error}", file=path) from None
+    covariance = np.zeros((len(names), len(names)))
+    covariance[np.ix_(order, order)] = matrix
+    return found, covariance
 
 
 COMMON = 17
@@ -114,7 +181,7 @@ class SkyCamera:
         return common
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Bools:
         """(k,) which parameters have a mean error."""
         return np.asarray(np.diag(self.covariance) > 0)
 

@@ -10,9 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
-from photogram.stellar.counts import degrees_of_freedom
-from photogram.stellar.failures import failure
-from photogram.stellar.problem import Problem
+from photogram.stellar.problem import Problem, degrees_of_freedom, failure
 from photogram.stellar.state import Level, Solved
 
 __all__ = ["iterate"]
@@ -49,10 +47,7 @@ def iterate(
     Where some combination of parameters hardly has an effect (the centre of a small distortion), corrections
     fall slowly or not at all: the iteration stops, too, when the sum of squares stands still.
 
-    Raises
-    ------
-    AdjustmentError
-        Stars or parameters are not determined, or the initial values give no image.
+    Raises AdjustmentError: stars or parameters are not determined, or the initial values give no image.
     """
     parameters, places = initial.copy(), problem.places_at(initial, free)
     dof = degrees_of_freedom(problem, free).usable

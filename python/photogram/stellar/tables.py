@@ -19,8 +19,8 @@ from photogram.stellar.curves import (
 )
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.result import Ellipse, Result, ellipse
-from photogram.stellar.transformation import transformed_angles
 
 __all__ = [
     "axis",

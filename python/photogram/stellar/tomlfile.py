@@ -78,9 +78,6 @@ def site(table: Table) -> Site:
 def pole_arcsec(table: Table, key: str) -> float:
     """Return a coordinate of the pole, never a second of arc from the mean one; zero where it is missing.
 
-    Raises
-    ------
-    InputError
-        It is something else.
+    Raises InputError: it is something else.
     """
     return table.number(key, 0.0, low=-2, high=2)

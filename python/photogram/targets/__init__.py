@@ -8,36 +8,30 @@ from photogram.arguments.annotations import check_arguments
 from photogram.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from photogram.targets.appraisal import appraise
-    from photogram.targets.appraisal_report import Worth, WorthOptions
+    from photogram.targets.appraisal import appraise, cross_validate
     from photogram.targets.board import Board
-    from photogram.targets.calibration import Calibration
+    from photogram.targets.calibration import Calibration, simulate_corners
     from photogram.targets.calibration_difference import CameraDifference
-    from photogram.targets.calibration_result import Calibrated
+    from photogram.targets.calibration_result import Calibrated, Worth, WorthOptions
     from photogram.targets.conversion import Conversion, convert_lens
     from photogram.targets.corners import Corners
-    from photogram.targets.cross_validated import cross_validate
     from photogram.targets.cross_validation import CrossValidation
-    from photogram.targets.differences import difference
-    from photogram.targets.first_calibration import FirstCalibration, first_values
-    from photogram.targets.grouping import residual_groups
+    from photogram.targets.first_calibration import FirstCalibration, first_values, nominal_camera
+    from photogram.targets.grouping import corner_components, residual_groups
     from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
     from photogram.targets.new_views import Candidate, NewView, Suggestions
-    from photogram.targets.nominal import nominal_camera
     from photogram.targets.output.formats import camera_files
     from photogram.targets.reading import read
-    from photogram.targets.simulation import simulate_corners
-    from photogram.targets.stereo import distance_uncertainty, triangulate
     from photogram.targets.suggestions import suggest_views
-    from photogram.targets.triangulation import Triangulated
+    from photogram.targets.triangulation import Triangulated, distance_uncertainty, triangulate
     from photogram.targets.uncertainty import (
+        difference,
         projection_uncertainty,
         uncertainty_against_distance,
         uncertainty_map,
     )
     from photogram.targets.view_plan import plan_views
     from photogram.targets.view_plan_result import PlannedView, ViewPlan
-    from photogram.targets.weighing import corner_components
 
 __all__ = [
     "Board",
@@ -78,21 +72,8 @@ __all__ = [
     "uncertainty_map",
 ]
 
-_MADE = {
-    "Calibrated",
-    "CameraDifference",
-    "Conversion",
-    "CrossValidation",
-    "FirstCalibration",
-    "NewView",
-    "PlannedView",
-    "Suggestions",
-    "Triangulated",
-    "UncertaintyCurve",
-    "UncertaintyMap",
-    "ViewPlan",
-    "Worth",
-}
+_GIVEN = {"Board", "Calibration", "Candidate", "Corners", "WorthOptions"}
+_MADE = {name for name in __all__ if name[0].isupper()} - _GIVEN
 """What functions make, and users do not."""
 
 _HOMES = {
@@ -105,33 +86,33 @@ _HOMES = {
     "Candidate": "new_views",
     "Conversion": "conversion",
     "convert_lens": "conversion",
-    "corner_components": "weighing",
+    "corner_components": "grouping",
     "Corners": "corners",
-    "cross_validate": "cross_validated",
+    "cross_validate": "appraisal",
     "CrossValidation": "cross_validation",
-    "difference": "differences",
-    "distance_uncertainty": "stereo",
+    "difference": "uncertainty",
+    "distance_uncertainty": "triangulation",
     "first_values": "first_calibration",
     "FirstCalibration": "first_calibration",
     "NewView": "new_views",
-    "nominal_camera": "nominal",
+    "nominal_camera": "first_calibration",
     "plan_views": "view_plan",
     "PlannedView": "view_plan_result",
     "projection_uncertainty": "uncertainty",
     "read": "reading",
     "residual_groups": "grouping",
-    "simulate_corners": "simulation",
+    "simulate_corners": "calibration",
     "suggest_views": "suggestions",
     "Suggestions": "new_views",
-    "triangulate": "stereo",
+    "triangulate": "triangulation",
     "Triangulated": "triangulation",
     "uncertainty_against_distance": "uncertainty",
     "uncertainty_map": "uncertainty",
     "UncertaintyCurve": "maps",
     "UncertaintyMap": "maps",
     "ViewPlan": "view_plan_result",
-    "Worth": "appraisal_report",
-    "WorthOptions": "appraisal_report",
+    "Worth": "calibration_result",
+    "WorthOptions": "calibration_result",
 }
 """The module of each name, loaded when it is first asked for: most blocks are no boards."""
 

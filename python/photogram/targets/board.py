@@ -225,8 +225,7 @@ class Board(Valued, Brief):
         x, y
             The deflections in the middle along the columns and along the rows; a and b go from 0 to 1 there.
         """
-        found: Floats = self.places + np.einsum("nki,k->ni", self.shifts(), [x, y])
-        return found
+        return np.asarray(self.places + np.einsum("nki,k->ni", self.shifts(), [x, y]))
 
     def shifts(self) -> Floats:
         """Return (n, 2, 3) how points move with a deflection of one along the columns, and along the rows."""

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, cast
+from types import UnionType
+from typing import Any
 
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
+from photogram.io.json import Tree
 from photogram.io.toml import TomlFile
-from photogram.io.tree import Tree
 from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import nearest
 from photogram.targets.board import Board
 
-__all__ = ["BOARD_FILE", "is_board", "picture_size", "read_board"]
+__all__ = ["is_board", "picture_size", "read_board"]
 
 BOARD_FILE = "board.toml"
 _WORDS = ("kind", "unit", "shape")
@@ -37,10 +37,7 @@ def is_board(path: Path) -> bool:
 def read_board(path: Path) -> Board:
     """Read a `board.toml`, or a target of Kalibr.
 
-    Raises
-    ------
-    InputError
-        Keys that there are not, values of another kind, what is no board: names file and line.
+    InputError: keys that there are not, values of another kind, what is no board: names file and line.
     """
     return _of_toml(path) if path.suffix.lower() == ".toml" else _of_kalibr(path)
 
@@ -48,10 +45,7 @@ def read_board(path: Path) -> Board:
 def picture_size(path: Path) -> tuple[int, int] | None:
     """Return width and height of the pictures that a `board.toml` was seen in, where it says them.
 
-    Raises
-    ------
-    InputError
-        Something else than two whole numbers.
+    InputError: something else than two whole numbers.
     """
     if path.suffix.lower() != ".toml" or "picture_size" not in (file := TomlFile(path)).content:
         return None
@@ -67,8 +61,8 @@ def _of_toml(path: Path) -> Board:
     for key in content:
         if key not in _KEYS:
             raise file.error(key, f"a board has no {key}{nearest(key, _KEYS)}")
-    given: dict[str, Any] = {key: _text(file, key) for key in _WORDS if key in content}
-    given |= {key: _count(file, key) for key in _COUNTS if key in content}
+    given: dict[str, Any] = {key: _value(file, key, str, _TEXT) for key in _WORDS if key in content}
+    given |= {key: _value(file, key, int, "a whole number") for key in _COUNTS if key in content}
     given |= {key: _number(file, key) for key in _LENGTHS if key in content}
     both = [key for key in ("spacing_x", "spacing_y") if key in content]
     if both and ("spacing" in content or len(both) == 1):
@@ -78,11 +72,8 @@ def _of_toml(path: Path) -> Board:
     elif "spacing" in content:
         given["spacing"] = _number(file, "spacing")
     if "points" in content:
-        given |= _points(file, path.parent / _text(file, "points"))
-    try:
-        return Board(**given)
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
+        given |= _points(file, path.parent / _value(file, "points", str, _TEXT))
+    return _made(given, path)
 
 
 def _points(file: TomlFile, path: Path) -> dict[str, Any]:
@@ -102,64 +93,52 @@ def _points(file: TomlFile, path: Path) -> dict[str, Any]:
     return found
 
 
-def _text(file: TomlFile, key: str) -> str:
-    value = file.content[key]
-    if not isinstance(value, str):
-        raise file.error(key, f"{key} is text between quotation marks")
-    return value
+_TEXT = "text between quotation marks"
 
 
-def _count(file: TomlFile, key: str) -> int:
+def _value(file: TomlFile, key: str, kind: type | UnionType, what: str) -> Any:
+    """Return a value of a kind, of which true and false are none."""
     value = file.content[key]
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise file.error(key, f"{key} is a whole number")
+    if isinstance(value, bool) or not isinstance(value, kind):
+        raise file.error(key, f"{key} is {what}")
     return value
 
 
 def _number(file: TomlFile, key: str) -> float:
-    value = file.content[key]
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise file.error(key, f"{key} is a number")
-    return float(value)
+    return float(_value(file, key, int | float, "a number"))
+
+
+_KALIBR = {"aprilgrid": "aprilgrid", "checkerboard": "chessboard", "circlegrid": "circles"}
+"""Kinds of boards by the names of Kalibr."""
 
 
 def _of_kalibr(path: Path) -> Board:
-    """Read a target of Kalibr: `aprilgrid`, `checkerboard` or `circlegrid`, in metres."""
+    """Read a target of Kalibr, in metres."""
     content = Tree(read_yaml_text(path), path)
     kind = content["target_type"].text()
     if kind not in _KALIBR:
         raise content["target_type"].error(f"{kind} is none of {', '.join(_KALIBR)}")
-    size = (
-        {"columns": content["targetCols"].whole(1), "rows": content["targetRows"].whole(1)}
-        if (kind != "aprilgrid")
-        else {"columns": content["tagCols"].whole(1), "rows": content["tagRows"].whole(1)}
-    )
+    what = "tag" if kind == "aprilgrid" else "target"
+    given: dict[str, Any] = {
+        "kind": _KALIBR[kind],
+        "columns": content[f"{what}Cols"].whole(1),
+        "rows": content[f"{what}Rows"].whole(1),
+    }
+    if kind == "aprilgrid":
+        given |= {"tag_size": content["tagSize"].number(), "tag_spacing": content["tagSpacing"].number()}
+    elif kind == "checkerboard":
+        given["spacing"] = content["colSpacingMeters"].number(), content["rowSpacingMeters"].number()
+    else:
+        skewed = content.get("asymmetricGrid", False).value
+        if not isinstance(skewed, bool):
+            raise content["asymmetricGrid"].error("is true or false")
+        given |= {"spacing": content["spacingMeters"].number()}
+        given |= {"kind": "asymmetric_circles"} if skewed else {}
+    return _made(given, path)
+
+
+def _made(given: dict[str, Any], path: Path) -> Board:
     try:
-        return _KALIBR[kind](content, size)
+        return Board(**given)
     except InputError as error:
-        raise (error if error.file else InputError(error.message, file=path)) from None
-
-
-def _aprilgrid(content: Tree, size: Mapping[str, int]) -> Board:
-    tag_size, tag_spacing = content["tagSize"].number(), content["tagSpacing"].number()
-    return Board(kind="aprilgrid", **cast("Any", size), tag_size=tag_size, tag_spacing=tag_spacing)
-
-
-def _checkerboard(content: Tree, size: Mapping[str, int]) -> Board:
-    spacing = content["colSpacingMeters"].number(), content["rowSpacingMeters"].number()
-    return Board(kind="chessboard", **cast("Any", size), spacing=spacing)
-
-
-def _circlegrid(content: Tree, size: Mapping[str, int]) -> Board:
-    skewed = content.get("asymmetricGrid", False).value
-    if not isinstance(skewed, bool):
-        raise content["asymmetricGrid"].error("is true or false")
-    kind = "asymmetric_circles" if skewed else "circles"
-    return Board(kind=cast("Any", kind), **cast("Any", size), spacing=content["spacingMeters"].number())
-
-
-_KALIBR: Mapping[str, Callable[[Tree, Mapping[str, int]], Board]] = {
-    "aprilgrid": _aprilgrid,
-    "checkerboard": _checkerboard,
-    "circlegrid": _circlegrid,
-}
+        raise InputError(error.message, file=path) from None

@@ -1,17 +1,33 @@
-"""A calibration as users have it: corners of a board with values to start from, and its adjustment."""
+"""A calibration as users have it: corners of a board with values to start from, adjusted or simulated."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Literal
 
-from photogram.adjustment.adjustment import Progress
-from photogram.adjustment.robust import Loss
-from photogram.targets.adjusting import adjusted_start, snooped_start
-from photogram.targets.calibration_result import Calibrated
-from photogram.targets.start import Start
+import numpy as np
 
-__all__ = ["Calibration"]
+from photogram.adjustment.adjustment import Progress, adjust, adjusted_again
+from photogram.adjustment.robust import Loss
+from photogram.adjustment.snooping import snoop
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import one_of
+from photogram.arguments.types import Bools, Floats
+from photogram.errors import InputError, RankError
+from photogram.messages import Message
+from photogram.network.block import Block
+from photogram.network.cameras import images_of
+from photogram.results.result import Result
+from photogram.targets.calibration_result import Calibrated, deviation_of_corners, with_unknown_weight
+from photogram.targets.findings import judged
+from photogram.targets.housing import transformed
+from photogram.targets.motion import dated, errors_of_speeds
+from photogram.targets.regularisation import regularised
+from photogram.targets.start import Start
+from photogram.targets.vision import FLIP, photo_poses
+
+__all__ = ["Calibration", "simulate_corners", "weighted_block"]
 
 
 class Calibration(Start):
@@ -96,7 +112,26 @@ class Calibration(Start):
         InputError
             Priors without the size of pictures.
         """
-        return adjusted_start(self, loss=loss, outliers=outliers, threads=threads, progress=progress)
+        if outliers is not None:
+            one_of("outliers", outliers, ("mrcal",))
+        how: dict[str, Any] = {"loss": loss, "threads": threads, "progress": progress}
+        start: Start = self
+        rounds = 0
+        while True:
+            # Knots that no image touches are determined by priors alone.
+            free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
+            if free is None:
+                result = adjust(weighted_block(start), **how, covariance="verdict", tolerance=FINELY)
+            else:
+                result = _with_priors(start, free, threads)
+            worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
+            if worse.any() and result.converged:
+                start = start.without(worse)
+            elif rounds < ROUNDS and (better := _better(start, result)) is not None:
+                start, rounds = better, rounds + 1
+            else:
+                break
+        return _ended(start, result, free if start.regularise else None)
 
     def snoop(self, **options: Any) -> Calibrated:
         """Take gross errors out one after the other, and adjust what is left.
@@ -113,4 +148,185 @@ class Calibration(Start):
         RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
             As of :func:`photogram.snoop`.
         """
-        return snooped_start(self, **options)
+        if self.regularise is not None and not _has_knots(self):
+            raise InputError("gross errors are taken out without priors of cameras: regularise is None")
+        start = self.adjust().calibration if self.sync == "offset" else self
+        found = snoop(weighted_block(start), **options)
+        result = found.judged
+        assert isinstance(result, Result)
+        own = start.with_images_of(result.block)
+        told = replace(result, messages=[*own.messages, *result.messages])
+        return judged(Calibrated(calibration=own, result=told, snooped=found))
+
+
+ROUNDS = 8
+"""In which the standard deviation of corners is found, at the most, and the change that is none."""
+CHANGE = 0.01
+FINELY = 1e-6
+"""Of a standard deviation: where the steps of a splined lens end."""
+
+
+def _ended(start: Start, result: Result, unregularised: Result | None) -> Calibrated:
+    """Return a calibration that was adjusted, with all that is to be said of it."""
+    messages = [*start.messages, *result.messages]
+    if start.sync == "offset":
+        messages += checked_clocks(Calibrated(calibration=start, result=result))
+    told = replace(result, messages=messages)
+    if start.sd0 is None:
+        told = with_unknown_weight(told)
+    return judged(Calibrated(calibration=start, result=told, unregularised=unregularised))
+
+
+def _better(start: Start, result: Result) -> Start | None:
+    """Return what to adjust again: other sd of corners, or motion of the board; None where all is as held."""
+    found = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
+    if (sd := _sd_to_assume(start, result)) is not None:
+        found = found.replace(assumed=sd)
+    return None if found is start else found
+
+
+def _in_motion(start: Start, result: Result) -> Start:
+    """Return a calibration whose board moves as its adjusted poses say; itself where this changes nothing."""
+    ended = Calibrated(calibration=start, result=result)
+    again = ended.restarted().replace(motion=None)
+    # Where the new motion has pictures, with everything else as adjusted.
+    late = {name: each.values[0] for name, each in ended.offsets.items()}
+    there = again.replace(
+        sensors=ended.sensors, offsets=[late.get(each.name, 0.0) for each in ended.cameras]
+    ).picture_poses()
+    pictures = slice(len(start.corners.pictures))
+    gaps = np.abs(photo_poses(there)[0] - result.photo_positions[pictures])
+    return start if (gaps <= CHANGE * result.photo_sd[pictures, :3]).all() else again
+
+
+def _sd_to_assume(start: Start, result: Result) -> float | None:
+    """Return another standard deviation of corners to weigh the board against; None where none is asked."""
+    if start.sd0 is not None or start.shape != "points" or not result.converged:
+        return None
+    found = deviation_of_corners(result)
+    # Corners that fit to the last digit are made, not measured.
+    return start.assumed * found if abs(found - 1) > CHANGE and start.assumed * found > 1e-6 else None
+
+
+def _has_knots(start: Start) -> bool:
+    return any(each.knot_unknowns for each in start.cameras)
+
+
+def weighted_block(start: Start) -> Block:
+    """Return the block of a calibration with the priors of its cameras."""
+    if start.regularise is None:
+        return start.block()
+    observed = 2 * len(start.board.places) * len(start.corners.pictures)
+    return start.block(regularised(start.cameras, start.corners.sizes, observed))
+
+
+def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
+    """Return the adjustment with the priors of cameras, from where that without them has ended."""
+    if start.regularise is None:
+        return free
+    found = adjusted_again(weighted_block(start), free.options, free.state, threads=threads)
+    assert isinstance(found, Result)
+    return found
+
+
+NOTABLE, MOST = 0.01, 0.2
+"""Shares of the motion that are errors of poses: told, and refused where an offset is free."""
+
+
+def checked_clocks(calibrated: Calibrated) -> list[Message]:
+    """Return what is to be said of the motion of a board by which offsets between cameras are known.
+
+    Its speeds follow from poses that have errors: v = v_true + e. An offset comes out too small by the share
+    of E(e'e) in v'v, all by the weights of the poses, and has too small a standard deviation. RankError: a
+    free offset, where a fifth or more are errors: the board stands still.
+    """
+    messages = []
+    start, result = calibrated.calibration, calibrated.result
+    corners, sd = start.corners, np.asarray(start.sd_offsets)
+    shares = _shares(calibrated)
+    for camera, each in enumerate(calibrated.cameras):
+        if each.name not in calibrated.offsets or sd[camera] == 0:
+            continue
+        views = np.unique(corners.views[corners.cameras == camera])
+        share = float(shares[0, views].sum() / shares[1, views].sum())
+        if share > MOST and np.isinf(sd[camera]):
+            photos = [result.block.photo_ids[row] for row in calibrated.photos[views].tolist()]
+            what = f"the offset of {each.name} is not determined: the board hardly moves"
+            told = (
+                f"{what}; {share:.0%} of its motion are errors of its poses. Weigh it (sd_offsets, --offset)"
+            )
+            raise RankError(told, photos, [], [each.name], what)
+        if share > NOTABLE:
+            messages.append(
+                Message(
+                    f"the offset of {each.name} comes out too small by about {share:.0%}: so much of the"
+                    " motion of the board are errors of its poses"
+                )
+            )
+    return messages
+
+
+def _shares(calibrated: Calibrated) -> Floats:
+    """Return (2, V): squared speeds that errors of poses make on average, and those that are there."""
+    start, result = calibrated.calibration, calibrated.result
+    steps = ("step", [result.block.photo_ids[row] for row in calibrated.photos.tolist()])
+    joint = result.covariance([steps]) / result.covariance_scale
+    count = len(calibrated.photos)
+    own = joint.reshape(count, 6, count, 6)[np.arange(count), :, np.arange(count)]
+    speeds = np.nan_to_num(np.asarray(start.motion)[:, 0])
+    there = np.einsum("vi,vi->v", speeds, np.linalg.solve(own, speeds[..., np.newaxis])[..., 0])
+    by_errors = errors_of_speeds(dated(start.corners, start.tied), start.references_of_views())
+    return np.stack([6 * np.nan_to_num(by_errors) * result.covariance_scale, there])
+
+
+ANY, TAKEN = 5.0, 4.0
+"""Times the rms of all: beyond the first a coordinate calls for action, beyond the second corners go."""
+
+
+def marked_as_mrcal(result: Result) -> Bools:
+    """Return (m,) which images mrcal takes out: only to reproduce its results.
+
+    None, unless a weighted residual is beyond 5 rms of all; then those with one beyond 4. Snooping tests each
+    corner by its own accuracy.
+    """
+    weighted = np.abs(result.residuals / result.image_given_sd)
+    rms = np.sqrt(np.nanmean(weighted**2))
+    far = np.nanmax(weighted, axis=1, initial=0.0)
+    return far > TAKEN * rms if (far > ANY * rms).any() else np.zeros(len(far), dtype=bool)
+
+
+def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:
+    """Return a calibration whose corners are images of its own values, with errors as large as it says.
+
+    The points of a board whose shape is `points` are drawn about their nominal places, once for all views.
+
+    Parameters
+    ----------
+    calibration
+        Its cameras, poses and sensors are taken for true; which corners there are stays as it is.
+    seed
+        The same seed gives the same errors.
+
+    Raises
+    ------
+    InputError
+        Nobody has said how well corners are measured, or one has no image by these values.
+    """
+    if calibration.sd0 is None:
+        raise InputError("corners are drawn with a standard deviation: sd0 says none")
+    random = np.random.default_rng(seed)
+    corners = calibration.corners
+    places = calibration.places().copy()
+    if calibration.shape == "points":
+        places += calibration.board.deviations(corners.view_count) * random.standard_normal(places.shape)
+    poses = calibration.picture_poses()
+    seen = transformed(poses[corners.picture], places[corners.point])
+    xy = images_of(calibration.cameras, corners.cameras[corners.picture], seen @ FLIP)
+    if not np.isfinite(xy).all():
+        row = int(np.argmin(np.isfinite(xy).all(axis=1)))
+        raise InputError(f"{corners.title(row)} has no image by the values of the calibration")
+    errors = calibration.sd0 * corners.sd[:, np.newaxis] * random.standard_normal(xy.shape)
+    return calibration.replace(corners=corners.replace(xy=xy + errors))
+
+
+check_arguments(globals(), ["simulate_corners"])

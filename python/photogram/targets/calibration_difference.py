@@ -10,13 +10,12 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
 from photogram.show.summary import Brief, Rows
-from photogram.targets.datums import fixed_points
-from photogram.targets.difference_test import DifferenceTest
+from photogram.targets.cross_validation import DifferenceTest
 from photogram.targets.housing import transformed
-from photogram.targets.imaging import imaged, unknown_of, values_of
 from photogram.targets.maps import distance_text, image_grid
 from photogram.targets.motion_fit import Criterion, Fitted, differences_at, fitted_motion, points_at
-from photogram.targets.projection import of_functions, point_partials, worst
+from photogram.targets.projection import fixed_points, of_functions, point_partials, worst
+from photogram.targets.vision import imaged, unknown_of, values_of
 
 __all__ = ["CameraDifference", "Side", "compared"]
 
@@ -39,7 +38,7 @@ class Side:
     covariance
         (p, p) of its parameters; None where it is not known.
     rows
-        (6, p) the datum `corners` (:func:`photogram.targets.datums.fixed_points`); None with `covariance`.
+        (6, p) the datum `corners` (:func:`~photogram.targets.projection.fixed_points`); None as `covariance`.
     """
 
     name: str
@@ -156,10 +155,7 @@ class CameraDifference(Brief):
         shift = ", ".join(f"{each:.3g}" for each in self.translation)
         moved = f", {shift} {self.unit}" if self.fitted.finite else ""
         rows = [
-            (
-                "motion",
-                f"{self.rotation:.4g} degrees{moved}",
-            ),
+            ("motion", f"{self.rotation:.4g} degrees{moved}"),
             ("difference", f"rms {self.rms:.3g} px, largest {self.largest:.3g} px where the board was seen"),
         ]
         return self.title, rows + [("", each) for each in self.remarks]
@@ -204,23 +200,11 @@ def compared(
     radius: float | None = None,
     grid: tuple[int, int] = (60, 40),
 ) -> CameraDifference:
-    """Compare two cameras.
+    """Compare two cameras at some distances over the pictures of a, `size` their width and height.
 
-    Parameters
-    ----------
-    a, b
-        The cameras.
-    size, unit
-        Width and height of the pictures of a, and the unit of lengths.
-    distances
-        At which they are compared.
-    criterion
-        What is least when the motion between them is fitted.
-    radius
-        Pixels about the middle that count in the fit; None: all where both are known, each with its weight,
-        else a sixth of the shorter side.
-    grid
-        Pixels across and down.
+    `criterion` says what is least when the motion between them is fitted, `radius` which pixels about the
+    middle count in the fit; None: all where both are known, each with its weight, else a sixth of the shorter
+    side. The grid is pixels across and down.
     """
     columns, rows, pixels = image_grid(size, grid)
     known = a.covariance is not None and b.covariance is not None

@@ -1,7 +1,11 @@
-"""An adjusted calibration: cameras, sensors, views and the board, with the cofactors of all of them."""
+"""An adjusted calibration: cameras, sensors, views and the board, with the cofactors of all of them.
+
+What it is worth goes with it: maps of uncertainty, what cross-validation says of them, what to do next.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import ClassVar, Literal, get_args
@@ -10,7 +14,7 @@ import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
-from photogram.lazy_dataclasses import dataclass, fields, replace
+from photogram.lazy_dataclasses import dataclass, field, fields, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
 from photogram.network.trajectories import Clock
@@ -22,11 +26,94 @@ from photogram.show.methods import Shown
 from photogram.show.summary import Brief, Rows
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
-from photogram.targets.appraisal_report import Worth
+from photogram.targets.calibration_difference import CameraDifference
+from photogram.targets.cross_validation import CrossValidation, Into
+from photogram.targets.maps import UncertaintyMap, distance_text
+from photogram.targets.new_views import Suggestions
+from photogram.targets.projection import DatumName
 from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
-__all__ = ["STEPS", "Calibrated", "Part", "UnknownWeight", "deviation_of_corners", "with_unknown_weight"]
+__all__ = [
+    "Calibrated",
+    "UnknownWeight",
+    "Worth",
+    "WorthOptions",
+    "deviation_of_corners",
+    "with_unknown_weight",
+]
+
+
+@dataclass(frozen=True)
+class WorthOptions:
+    """What is asked of a calibration.
+
+    Attributes
+    ----------
+    distances
+        At which maps are drawn, in the unit of the board; none: infinity, and the boards' median distance.
+    datum, noise_only
+        Of maps.
+    cross_validate
+        How views are split; None: they are not.
+    suggest
+        How many views to take next are looked for.
+    grid
+        Of maps, pixels across and down.
+    """
+
+    distances: Sequence[float] = ()
+    datum: DatumName = "corners"
+    noise_only: bool = False
+    cross_validate: Into | None = "odd"
+    suggest: int = 0
+    grid: tuple[int, int] = (60, 40)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Worth:
+    """What a calibration is worth.
+
+    Attributes
+    ----------
+    maps
+        Of each camera at each distance.
+    cross
+        Cross-validations, one for each housing.
+    suggestions
+        Views to take next, for the first camera.
+    differences
+        From another calibration, camera by camera.
+    remarks
+        What could not be computed, and why.
+    """
+
+    maps: tuple[UncertaintyMap, ...] = ()
+    cross: tuple[CrossValidation, ...] = ()
+    suggestions: tuple[Suggestions, ...] = ()
+    differences: tuple[CameraDifference, ...] = ()
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def largest(self) -> float:
+        """Largest standard deviation of all maps where the board was seen, pixels; NaN without maps."""
+        return max((each.largest for each in self.maps), default=math.nan)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What a reader wants first, a line for each thing."""
+        said = []
+        for camera in dict.fromkeys(each.camera for each in self.maps):
+            own = [each for each in self.maps if each.camera == camera]
+            largest = ", ".join(
+                f"{each.largest:.2g} px {distance_text(each.distance, each.unit)}" for each in own
+            )
+            said.append(f"{camera}: worst where the board was seen {largest}; {own[0].model}")
+        said += [line for each in self.differences for line in each.sentences]
+        for each in self.suggestions:
+            said += [f"view to take next: {line}" for line in each.sentences]
+        return [*said, *self.remarks]
+
 
 Part = Literal["cameras", "sensors", "board", "views"]
 """What has cofactors."""

@@ -22,12 +22,22 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.show.summary import Brief, Rows
 from photogram.targets.calibration_difference import CameraDifference
-from photogram.targets.imaging import TURNED
-from photogram.targets.least_lens import HELD, Moved, Points
-from photogram.targets.lens_fit import GRID, KNOTS, fitted_in_stages, free_names, lens_of, shows, within
+from photogram.targets.lens_fit import (
+    GRID,
+    HELD,
+    KNOTS,
+    Moved,
+    Points,
+    fitted_in_stages,
+    free_names,
+    lens_of,
+    shows,
+    within,
+)
 from photogram.targets.maps import distance_text, image_grid
 from photogram.targets.motion_fit import Fitted, points_at
 from photogram.targets.output.rig import Rig
+from photogram.targets.vision import TURNED
 
 __all__ = ["Conversion", "convert_lens"]
 
@@ -274,8 +284,7 @@ def _roots(source: Camera, known: tuple[list[int], Floats], points: Floats) -> F
     covariances = partials @ matrix @ partials.transpose(0, 2, 1)
     mean = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 2
     lower = np.linalg.cholesky(covariances + (FIRMEST * mean or 1.0) * np.eye(2))
-    found: Floats = np.linalg.inv(lower)
-    return found
+    return np.asarray(np.linalg.inv(lower))
 
 
 def _passed_on(

@@ -1,31 +1,278 @@
-"""Files of corners, boards and models at a path: how they are known, and whether a board was shown there."""
+"""Files of corners, boards and models at a path: how they are known, and whether a board was shown there.
+
+Tables of corners are read: CSV under all usual names of its columns, the text of mrcal (`.vnl`), Kalibr's.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.io.delimited import ColumnTable, read_columns, read_rows
 from photogram.io.files import read_beginning, reading
+from photogram.io.numbers import finite_number
 from photogram.lazy_dataclasses import dataclass
 from photogram.targets.board import Board
 from photogram.targets.board_files import is_board
-from photogram.targets.corner_tables import (
-    is_headless,
-    is_table,
-    is_vnl,
-    read_headless,
-    read_table,
-    read_vnl,
-)
 from photogram.targets.corner_views import Measured
 from photogram.targets.opencv_corners import BEGIN, is_npz, is_storage, read_npz, read_storage
 
-__all__ = ["KEY", "Form", "files_at", "holds_targets", "is_picture", "sorted_files"]
+__all__ = ["KEY", "Form", "files_at", "holds_targets", "is_picture", "read_table", "read_vnl", "sorted_files"]
+
+_SYNONYMS: Mapping[str, str] = {
+    **dict.fromkeys(("photo", "picture", "file", "filename", "img", "image_name"), "image"),
+    **dict.fromkeys(("corner", "corner_id", "id", "target", "marker", "point_id"), "point"),
+    **dict.fromkeys(("u", "column", "col", "x_px"), "x"),
+    **dict.fromkeys(("v", "row", "y_px"), "y"),
+    **dict.fromkeys(("cam", "camera_id"), "camera"),
+    **dict.fromkeys(("frame",), "view"),
+    **dict.fromkeys(("timestamp", "t", "stamp"), "time"),
+    **dict.fromkeys(("tag_id",), "tag"),
+    "sigma": "sd",
+}
+_NUMBERS = {"x", "y", "sd", "level", "weight", "time"}
+NANOSECONDS = 1e12
+"""Times beyond are nanoseconds: seconds would lie 30,000 years ahead."""
+HEADLESS = ("time", "point", "x", "y")
+MISSING = "-"
+"""What stands for a missing value in the text of mrcal."""
+
+
+def _spelled(names: Sequence[str]) -> list[str]:
+    """Return the columns by their own names; `corner` beside `tag` is that of a tag."""
+    own = {"corner": "corner"} if {"tag", "tag_id"} & {*names} else {}
+    return [own.get(name) or _SYNONYMS.get(name, name) for name in names]
+
+
+def _first_line(path: Path) -> str:
+    """Return the first line that is neither empty nor a comment."""
+    lines = (line.strip() for line in read_beginning(path).splitlines())
+    return next((line for line in lines if line and line[0] != "#"), "")
+
+
+def _header(path: Path) -> list[str]:
+    """Return the columns of the first line that has any."""
+    cells = _first_line(path).replace(";", ",").split(",")
+    return _spelled([cell.strip('" ').lower() for cell in cells])
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a file is a table of corners by its columns."""
+    if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
+        return False
+    found = {*_header(path)}
+    return {"x", "y"} <= found and bool(found & {"image", "time"}) and bool(found & {"point", "i", "tag"})
+
+
+def is_headless(path: Path) -> bool:
+    """Return whether a file has rows of a time, a corner, x and y, and no header."""
+    if path.suffix.lower() not in (".csv", ".txt"):
+        return False
+    cells = _first_line(path).replace(",", " ").split()
+    try:
+        return len(cells) == len(HEADLESS) and all(finite_number(cell) >= 0 for cell in cells[:2])
+    except ValueError:
+        return False
+
+
+def is_vnl(path: Path) -> bool:
+    """Return whether a file is the text of mrcal: a comment that names its columns."""
+    heads = [line[1:].split() for line in read_beginning(path).splitlines() if line.startswith("#")]
+    return any(head[:3] == ["filename", "x", "y"] for head in heads)
+
+
+def read_vnl(path: Path, board: Board | None) -> Measured:
+    """Read the text of mrcal: all corners of an image, row by row; `-` for what is missing.
+
+    InputError: an image with another number of rows than the board has points, a cell that is no number.
+    """
+    table = read_columns(path, known=("filename",), spelling=lambda names: names[:4])
+    table.require("filename", "x", "y")
+    images = table.names("filename")
+    within = _within(images.rows, len(images.names))
+    counts = np.bincount(images.rows, minlength=len(images.names))
+    missing = np.array([cell == MISSING for cell in table.texts("x")], dtype=bool)
+    none = np.bincount(images.rows[~missing], minlength=len(counts)) == 0
+    if board is not None:
+        _check_counts(table, images.rows, counts, none, len(board.places))
+    there = ~missing
+    xy = table.vectors(("x", "y"), read=_dashed)
+    table.check_given(np.where(there[:, np.newaxis], xy, 0.0), ("x", "y"))
+    sd, use = _of_levels(table)
+    return Measured(
+        path=path,
+        images=images.names,
+        image=images.rows[there],
+        point=within[there],
+        xy=xy[there],
+        sd=sd[there],
+        use=use[there],
+    )
+
+
+def _within(rows: Indices, count: int) -> Indices:
+    """Return which of its image's rows each row is."""
+    order = np.argsort(rows, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))[:-1]])
+    found = np.empty(len(rows), dtype=np.int64)
+    found[order] = np.arange(len(rows)) - starts[rows[order]]
+    return found
+
+
+def _check_counts(table: ColumnTable, rows: Indices, counts: Indices, none: Bools, points: int) -> None:
+    wrong = np.flatnonzero((counts != points) & ~none)
+    if len(wrong):
+        row = int(np.flatnonzero(rows == wrong[0])[0])
+        raise table.error(row, f"the image has {counts[wrong[0]]} rows, but the board {points} points")
+
+
+def _dashed(cell: str) -> float:
+    return np.nan if cell == MISSING else finite_number(cell)
+
+
+def _of_levels(table: ColumnTable) -> tuple[Floats, Bools]:
+    """Return standard deviations over that of level 0, and which corners count.
+
+    A level l is 2^l, a weight 1/weight; neither `-` nor a negative level, nor a weight of 0, counts.
+    """
+    if "level" in table:
+        level = table.numbers("level", np.nan, read=_dashed)
+        use = level >= 0
+        return np.where(use, 2.0 ** np.where(use, level, 0.0), 1.0), use
+    if "weight" in table:
+        weight = table.numbers("weight", np.nan, read=_dashed)
+        use = weight > 0
+        return np.where(use, 1 / np.where(use, weight, 1.0), 1.0), use
+    if "sd" in table:
+        sd = table.numbers("sd", 1.0)
+        bad = np.flatnonzero(~(sd > 0))
+        if len(bad):
+            raise table.error(int(bad[0]), "column sd: is no positive standard deviation")
+        return sd, np.ones(table.count, dtype=bool)
+    return np.ones(table.count), np.ones(table.count, dtype=bool)
+
+
+def read_table(path: Path, board: Board | None) -> Measured:
+    """Read a table with columns image (or time), point (or i, j; or tag, corner), x, y.
+
+    It may have camera, view, time, sd or level, and use. InputError: columns that are missing, cells that are
+    no numbers, points that the board does not have.
+    """
+    table = read_columns(path, known=("image", "time"), numbers=_NUMBERS, spelling=_spelled)
+    return _of_table(table, board)
+
+
+def read_headless(path: Path, board: Board | None) -> Measured:
+    """Read rows of a time, a corner, x and y; the camera is what the file is called."""
+    found = _of_table(read_rows(path, HEADLESS, numbers=("time", "x", "y")), board)
+    return replace(found, cameras=[path.stem] * len(found.images))
+
+
+def _of_table(table: ColumnTable, board: Board | None) -> Measured:
+    table.require("x", "y")
+    xy = table.vectors(("x", "y"))
+    table.check_given(xy, ("x", "y"))
+    sd, use = _of_levels(table)
+    own = "image" if "image" in table else "time"
+    table.require(own)
+    cameras = table.texts("camera") if "camera" in table else None
+    keys = table.texts(own)
+    if own == "image":
+        table.names(own)
+    # An image may be called alike once for each camera.
+    whole = (
+        keys if cameras is None else [f"{camera}\0{key}" for camera, key in zip(cameras, keys, strict=True)]
+    )
+    place: dict[str, int] = {}
+    image = np.array([place.setdefault(key, len(place)) for key in whole], dtype=np.int64)
+    first = np.unique(image, return_index=True)[1].tolist()
+    times = table.numbers("time") if "time" in table else None
+    return Measured(
+        path=table.path,
+        images=[keys[row] for row in first],
+        image=image,
+        point=_points(table, board),
+        xy=xy,
+        sd=sd,
+        use=use & table.flags("use"),
+        cameras=None if cameras is None else [cameras[row] for row in first],
+        views=_of_images(table, image, first),
+        times=None if times is None else _seconds(table, times, first),
+    )
+
+
+def _of_images(table: ColumnTable, image: Indices, first: list[int]) -> list[str] | None:
+    """Return the views of images; None where the table does not say them."""
+    if "view" not in table:
+        return None
+    views = table.texts("view")
+    found = [views[row] for row in first]
+    for row, own in enumerate(image.tolist()):
+        if views[row] != found[own]:
+            raise table.error(row, "column view: the image had another view before")
+    return found
+
+
+def _seconds(table: ColumnTable, times: Floats, first: list[int]) -> Floats:
+    own = times[first]
+    missing = np.flatnonzero(np.isnan(own))
+    if len(missing):
+        raise table.error(first[int(missing[0])], "column time: is empty")
+    return np.asarray(own * (1e-9 if own.max(initial=0.0) > NANOSECONDS else 1.0))
+
+
+def _points(table: ColumnTable, board: Board | None) -> Indices:
+    """Return the number of the board's point of each row."""
+    if "point" in table:
+        names = {name: k for k, name in enumerate(board.names)} if board is not None else None
+        found = np.empty(table.count, dtype=np.int64)
+        for row, cell in enumerate(table.texts("point")):
+            number = (int(cell) if cell.isdecimal() else None) if names is None else names.get(cell)
+            if number is None:
+                raise table.error(row, f"column point: the board has no point {cell!r}")
+            found[row] = number
+        return found
+    if board is None:
+        raise table.head.error("says corners by columns and rows, which need the board")
+    if "tag" in table:
+        return _of_tags(table, board)
+    table.require("i", "j")
+    columns, rows = board.grid
+    i, j = (_whole(table, name, count) for name, count in (("i", columns), ("j", rows)))
+    return j * columns + i
+
+
+def _whole(table: ColumnTable, name: str, count: int) -> Indices:
+    values = table.numbers(name)
+    bad = np.flatnonzero(~((values == np.floor(values)) & (values >= 0) & (values < count)))
+    if len(bad):
+        raise table.error(int(bad[0]), f"column {name}: is no whole number from 0 to {count - 1}")
+    return values.astype(np.int64)
+
+
+def _of_tags(table: ColumnTable, board: Board) -> Indices:
+    """Return points of an AprilGrid: tags from the lower left, their corners anticlockwise from there."""
+    if board.kind != "aprilgrid":
+        raise table.head.error(f"has tags, but the board is no aprilgrid: {board.described}")
+    table.require("corner")
+    tag = _whole(table, "tag", board.columns * board.rows)
+    corner = _whole(table, "corner", 4)
+    right, up = np.array([0, 1, 1, 0])[corner], np.array([0, 0, 1, 1])[corner]
+    row, column = np.divmod(tag, board.columns)
+    return np.asarray((2 * row + up) * (2 * board.columns) + 2 * column + right)
+
 
 MODEL = ".cameramodel"
 KEY = "optimization_inputs"
 """Of a model of mrcal that keeps its corners."""
 PICTURES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff", ".webp"})
+ENDINGS = frozenset(
+    {*(".vnl", ".csv", ".tsv", ".txt", ".yml", ".yaml", ".xml", ".json", ".npz", ".toml"), MODEL}
+)
 MOST = 2000
 """Files of a folder that are looked at."""
 
@@ -38,10 +285,6 @@ class Form:
     knows: Callable[[Path], bool]
     read: Callable[[Path, Board | None], Measured]
     clear: bool = True
-
-
-def _of_model(path: Path) -> bool:
-    return path.suffix == MODEL or (path.suffix == ".txt" and KEY in read_beginning(path, BEGIN))
 
 
 _FORMS = (
@@ -74,23 +317,11 @@ def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Pa
     models, boards = [], []
     corners: dict[Form, list[Path]] = {}
     for each in files_at(path):
-        if each.suffix.lower() not in (
-            ".vnl",
-            ".csv",
-            ".tsv",
-            ".txt",
-            ".yml",
-            ".yaml",
-            ".xml",
-            ".json",
-            ".npz",
-            ".toml",
-            MODEL,
-        ):
+        if each.suffix.lower() not in ENDINGS:
             continue
         if is_board(each):
             boards.append(each)
-        elif _of_model(each):
+        elif each.suffix == MODEL or (each.suffix == ".txt" and KEY in read_beginning(each, BEGIN)):
             models.append(each)
         elif (form := next((own for own in _FORMS if own.knows(each)), None)) is not None:
             corners.setdefault(form, []).append(each)

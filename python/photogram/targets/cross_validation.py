@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -21,13 +21,61 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.summary import Brief, Rows
-from photogram.targets.datums import datum_rows
-from photogram.targets.difference_test import EXPLAINED, DifferenceTest
+from photogram.statistics.distributions import log_chi_square, log_fisher
 from photogram.targets.housing import Housing
-from photogram.targets.imaging import unknown_of, values_of
-from photogram.targets.projection import common_partials
+from photogram.targets.projection import common_partials, datum_rows
+from photogram.targets.vision import unknown_of, values_of
 
-__all__ = ["CrossMap", "CrossValidation", "Into", "changes_between", "cross_map", "parts_agree", "splits"]
+__all__ = [
+    "CrossValidation",
+    "DifferenceTest",
+    "Into",
+    "changes_between",
+    "cross_map",
+    "parts_agree",
+    "splits",
+]
+
+EXPLAINED = 0.01
+"""Probability beyond which calibrations differ as they should."""
+
+
+@dataclass(frozen=True)
+class DifferenceTest:
+    """The test of a difference of two calibrations.
+
+    Attributes
+    ----------
+    name
+        What differs.
+    chi2, dof
+        dk' cov(dk)^-1 dk over the variance of unit weight, and how many unknowns.
+    probability
+        Of a difference as large.
+    """
+
+    name: str
+    chi2: float
+    dof: int
+    probability: float
+
+    @classmethod
+    def of(cls, name: str, chi2: float, dof: int, freedom: float = math.inf) -> Self:
+        """Return the test of a difference; `freedom`: that of the unit weight, infinite where known."""
+        known = math.isinf(freedom)
+        logarithm = log_chi_square(chi2, dof) if known else log_fisher(chi2 / dof, dof, freedom)
+        return cls(name, chi2, dof, float(np.exp(logarithm)))
+
+    @property
+    def explained(self) -> bool:
+        """Whether the cofactors explain the difference."""
+        return self.probability > EXPLAINED
+
+    @property
+    def factor(self) -> float:
+        """By which the they differ more than their standard deviations say, in the mean."""
+        return math.sqrt(self.chi2 / self.dof)
+
 
 Into = Literal["odd", "halves"] | int
 """How views are split."""
@@ -89,16 +137,9 @@ def changes_between(a: Housing, b: Housing) -> tuple[Floats, Floats]:
 def parts_agree(
     a: Housing, b: Housing, names: Sequence[str], unit: tuple[float, float] = (1.0, math.inf)
 ) -> list[DifferenceTest]:
-    """Test the differences of two parts, of each camera, and of all cameras and sensors together.
+    """Test the differences of two parts, of each of K cameras, and of all cameras and sensors together.
 
-    Parameters
-    ----------
-    a, b
-        The parts.
-    names
-        Of the K cameras.
-    unit
-        Variance of unit weight with its degrees of freedom; infinite where it was known before.
+    `unit` is the variance of unit weight with its degrees of freedom; infinite where it was known before.
     """
     change, cofactors = changes_between(a, b)
     variance, freedom = unit

@@ -1,7 +1,11 @@
-"""The JSON document of a calibration: that of its block, with the board and its views; `docs/json.md`."""
+"""The JSON document of a calibration, and its maps as files.
+
+The document (`docs/json.md`) is that of the block, with the board, the views and what it is worth.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -11,14 +15,14 @@ from photogram.io import json
 from photogram.results.document import block_members
 from photogram.show.methods import document_of
 from photogram.show.quantity import Quantity, records
-from photogram.targets.appraisal_files import worth_members
-from photogram.targets.board_fit import STRETCHES, board_fit
-from photogram.targets.calibration_result import Calibrated
-from photogram.targets.prior_shift import prior_shift
-from photogram.targets.splined import splines
-from photogram.targets.tables import views
+from photogram.targets.calibration_difference import CameraDifference
+from photogram.targets.calibration_result import Calibrated, Worth
+from photogram.targets.cross_validation import CrossValidation, DifferenceTest, changes_between
+from photogram.targets.maps import UncertaintyMap, map_name
+from photogram.targets.new_views import Suggestions
+from photogram.targets.tables import STRETCHES, board_fit, prior_shift, splines, views
 
-__all__ = ["calibration_document", "to_json"]
+__all__ = ["calibration_document", "to_json", "worth_files", "worth_members"]
 
 
 @document_of.register(Calibrated)
@@ -73,3 +77,94 @@ def _board(calibrated: Calibrated) -> dict[str, Any]:
         found["spacing_ppm"] = dict(zip(STRETCHES, fit.stretch.tolist(), strict=True))
         found["sd_spacing_ppm"] = dict(zip(STRETCHES, fit.sd.tolist(), strict=True))
     return found
+
+
+def worth_files(worth: Worth) -> dict[str, bytes]:
+    """Return the maps as tables and arrays, by their names: `map-left-infinity.csv`."""
+    files = {}
+    for each in worth.maps:
+        name = f"map-{map_name(each)}"
+        files[f"{name}.csv"], files[f"{name}.npz"] = each.to_csv(), each.to_npz()
+    return files
+
+
+def worth_members(worth: Worth) -> dict[str, Any]:
+    """Return what the JSON document has of it."""
+    return {
+        "maps": [_map(each) for each in worth.maps],
+        "cross_validation": [_cross(each) for each in worth.cross],
+        "difference": [_difference(each) for each in worth.differences],
+        "suggested_views": [_suggested(each) for each in worth.suggestions],
+        "worth": worth.sentences,
+    }
+
+
+def _map(found: UncertaintyMap) -> dict[str, Any]:
+    return {
+        "camera": found.camera,
+        "distance": found.distance if math.isfinite(found.distance) else None,
+        "datum": found.datum,
+        "noise_only": found.noise_only,
+        "model": found.model,
+        "largest_where_seen": found.largest,
+        "columns": found.columns.tolist(),
+        "rows": found.rows.tolist(),
+        "sd": found.sd,
+        "covariances": found.covariances,
+    }
+
+
+def _cross(found: CrossValidation) -> dict[str, Any]:
+    return {
+        "into": found.into,
+        "explained": found.explained,
+        "factor": found.factor,
+        "splits": [
+            {
+                "views": [list(part) for part in parts],
+                "tests": [_test(each) for each in tests],
+                "dk": changes_between(*housings)[0][: found.whole.board.start].tolist(),
+            }
+            for parts, tests, housings in zip(found.parts, found.tests, found.housings, strict=True)
+        ],
+    }
+
+
+def _test(test: DifferenceTest) -> dict[str, Any]:
+    return {"name": test.name, "chi2": test.chi2, "dof": test.dof, "p": test.probability}
+
+
+def _difference(found: CameraDifference) -> dict[str, Any]:
+    return {
+        "cameras": list(found.cameras),
+        "distances": [each if math.isfinite(each) else None for each in found.distances],
+        "motion": found.fitted.motion,
+        "rotation_deg": found.rotation,
+        "rms": found.rms,
+        "largest": found.largest,
+        "shared_corners": found.shared,
+        "test": found.test and _test(found.test),
+        "columns": found.columns.tolist(),
+        "rows": found.rows.tolist(),
+        "vectors": found.vectors,
+        "covariances": found.covariances,
+        "remarks": found.remarks,
+    }
+
+
+def _suggested(found: Suggestions) -> dict[str, Any]:
+    return {
+        "camera": found.camera,
+        "distance": found.distance if math.isfinite(found.distance) else None,
+        "largest_before": float(np.max(found.before)),
+        "views": [
+            {
+                "name": each.candidate.name,
+                "pose": each.candidate.pose,
+                "corners": each.corners.tolist(),
+                "largest": each.largest,
+                "rms": each.rms,
+            }
+            for each in found.views
+        ],
+    }

@@ -1,4 +1,7 @@
-"""First values of cameras, poses and rig from corners of boards alone, for any lens."""
+"""First values of cameras, poses and rig from corners of boards alone, for any lens.
+
+Where only the data sheet of a camera is known it is a nominal one: what pictures of a board are planned for.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import math
 
 import numpy as np
 
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import number
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -13,15 +18,192 @@ from photogram.messages import Message, counted, listed
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.corners import FEWEST, Corners
-from photogram.targets.first_camera import first_camera, picture_size
-from photogram.targets.homographies import frontal_tilts
-from photogram.targets.lens_fit import KNOTS
+from photogram.targets.first_camera import FAMILIES, NARROW, first_camera, picture_size, usual_models
+from photogram.targets.lens_fit import KNOTS, fitted, free_names, grid_of_pixels, lens_of
 from photogram.targets.orders import Pictures, rays_shown
-from photogram.targets.sensors import Rig, connected, mean_pose
-from photogram.targets.sightings import LISTED, Listings, Sightings
-from photogram.targets.vision import inverted
+from photogram.targets.regularisation import WEAK
+from photogram.targets.sightings import LISTED, Listings, Sightings, frontal_tilts, nearest_rotations
+from photogram.targets.vision import composed, inverted
 
-__all__ = ["FirstCalibration", "first_values"]
+__all__ = ["FirstCalibration", "connected", "first_values", "mean_pose", "nominal_camera", "weakly_known"]
+
+WIDE = "fisheye"
+"""The family of lenses beyond the fields of perspective ones: equidistant."""
+SHARE = 0.1
+"""Of the width of a picture: what a free parameter of a nominal camera may move an image by."""
+RATIONAL = "k6"
+"""A term in the denominator, of models that have one."""
+
+
+def nominal_camera(
+    size: tuple[int, int],
+    model: str | None = None,
+    *,
+    field: float | None = None,
+    focal: float | None = None,
+    knots: tuple[int, int] = KNOTS,
+) -> Camera:
+    """Return a camera with a field of view or a focal length, and all that a calibration finds free.
+
+    Its principal point is in the middle of the picture. Below 90 degrees of field it is a perspective lens
+    without distortion, beyond an equidistant one, to which the terms of the model are fitted; so is a lens of
+    any field with terms in a denominator, which without distortion do what those in the numerator do.
+
+    Parameters
+    ----------
+    size
+        Width and height of its pictures, pixels.
+    model
+        The lens, as of :func:`first_values`; None: the one that is usual at its field of view.
+    field, focal
+        Its horizontal field of view, degrees, or its focal length, pixels: one of both.
+    knots
+        Along columns and rows, of a splined lens.
+
+    Raises
+    ------
+    InputError
+        Neither field nor focal length, or both; values that no camera has; a model that there is not, or that
+        shows nothing of such a picture.
+    """
+    if (field is None) == (focal is None):
+        raise InputError(
+            "a nominal camera has a field of view (field) or a focal length (focal): one of both"
+        )
+    angle = _field(size[0], focal) if field is None else math.radians(number("field", field))
+    if not 0 < angle <= 2 * math.pi:
+        raise InputError(f"field is a number of degrees up to 360, not {math.degrees(angle):g}")
+    if focal is None:
+        focal = size[0] * (1 / (2 * math.tan(angle / 2)) if angle < NARROW else FAMILIES[WIDE](angle))
+    half = math.hypot(*size) / (2 * focal)
+    wanted = model or usual_models(angle, math.atan(half) if angle < NARROW else half)[0]
+    centre = {"cx": (size[0] - 1) / 2, "cy": (size[1] - 1) / 2}
+    source = Camera(WIDE, {"fx": focal, "fy": focal, **centre}, unit="px", name="camera")
+    lens = lens_of(wanted, source, size, knots)
+    flat = angle < NARROW and RATIONAL not in free_names(lens)
+    return fitted(source.replace(model="pinhole") if flat else source, wanted, size, knots=knots)
+
+
+def weakly_known(camera: Camera, size: tuple[int, int]) -> Camera:
+    """Return a camera whose free parameters have standard deviations: they move images by a tenth of a width.
+
+    So much a data sheet says; it makes any number of views determine the camera, and next to nothing of what
+    they determine well. Knots have their usual weights.
+    """
+    if camera.knots is not None:
+        return camera.replace(knot_sd=WEAK) if camera.knot_unknowns else camera
+    partials = camera.partials(camera.rays(grid_of_pixels(size)))[2]
+    reach = np.nanmax(np.linalg.norm(partials, axis=1), axis=0)
+    sd = {
+        name: SHARE * size[0] / own if math.isinf(given) else given
+        for name, own, given in zip(camera.names, reach.tolist(), camera.deviations.tolist(), strict=True)
+    }
+    return camera.replace(sd=sd)
+
+
+def _field(width: int, focal: float | None) -> float:
+    """Return the horizontal field of view (radians) of a focal length in pixels."""
+    given = number("focal", focal)
+    if not 0 < given < math.inf:
+        raise InputError(f"focal is a positive number of pixels, not {given:g}")
+    flat = 2 * math.atan(width / (2 * given))
+    return flat if flat < NARROW else width / given
+
+
+AGREE = 0.2
+"""Radians, or parts of the distance of boards: poses that are apart by less are of one sensor."""
+UNTURNED = 1e-3
+"""The same: what a pose without a turn of the board may be worse, to be taken before one with a turn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """K cameras, as far as they have views in common.
+
+    Attributes
+    ----------
+    sensors
+        (K, 4, 4) from the reference of a camera to the camera.
+    references
+        (K,) which camera that is: the first of those that hang together.
+    turned
+        (P,) the order of `turns` in which corners of each picture were listed; 0 where they were not.
+    apart
+        (P,) whether a picture agrees with no pose of its camera on the rig.
+    """
+
+    sensors: Floats
+    references: Indices
+    turned: Indices
+    apart: Bools
+
+
+def connected(poses: Floats, cameras: Indices, views: Indices, count: int, turns: dict[int, Floats]) -> Rig:
+    """Return the poses of cameras on their rig, each by the one before with which it has most views.
+
+    Poses are (P, 4, 4) board -> camera of each picture, NaN where not known; cameras and views (P,) of each,
+    `count` is K. `turns` are turns of the board that are not seen, by their orders; order 0 is none.
+    """
+    sensors, references = np.tile(np.eye(4), (count, 1, 1)), np.full(count, -1)
+    found, turned = poses.copy(), np.zeros(len(poses), dtype=np.int64)
+    apart = np.zeros(len(poses), dtype=bool)
+    known = np.isfinite(poses).all(axis=(1, 2))
+    seen = np.full((count, int(views.max(initial=-1)) + 1), -1)
+    seen[cameras[known], views[known]] = np.flatnonzero(known)
+    common = (seen >= 0).astype(np.int64) @ (seen >= 0).T
+    while (references < 0).any():
+        done, rest = np.flatnonzero(references >= 0), np.flatnonzero(references < 0)
+        shared = common[np.ix_(done, rest)]
+        if not shared.any():
+            references[rest[0]] = rest[0]
+            continue
+        before, own = (int(k) for k in np.unravel_index(np.argmax(shared), shared.shape))
+        before, own = int(done[before]), int(rest[own])
+        both = np.flatnonzero((seen[before] >= 0) & (seen[own] >= 0))
+        first, second = seen[before, both], seen[own, both]
+        step, orders, away = _relation(found[first], found[second], turns)
+        references[own], sensors[own] = references[before], step @ sensors[before]
+        turned[second], apart[second] = orders, away
+        for order, turn in turns.items():
+            rows = second[orders == order]
+            found[rows] = found[rows] @ inverted(turn)
+    return Rig(sensors, references, turned, apart)
+
+
+def mean_pose(poses: Floats) -> Floats:
+    """Return the (4, 4) chordal mean of the attitudes of poses with the median of their translations."""
+    rotation = nearest_rotations(poses[:, :3, :3].mean(axis=0)[np.newaxis])[0]
+    return composed(rotation, np.median(poses[:, :3, 3], axis=0))
+
+
+def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[Floats, Indices, Bools]:
+    """Return the pose of a second camera by a first, turns of its (m) boards, and which boards disagree.
+
+    Each board gives a pose for each turn. All boards share one: that which is nearest to one of each.
+    """
+    orders = np.array([*turns])
+    turned = second[:, np.newaxis] @ np.linalg.inv(np.array([*turns.values()]))
+    poses = turned @ np.linalg.inv(first)[:, np.newaxis]
+    far = float(np.median(np.linalg.norm(first[:, :3, 3], axis=1)))
+    scores = np.empty(poses.shape[:2])
+    for board, turn in np.ndindex(*scores.shape):
+        nearest = _apart(poses, poses[board, turn], far).min(axis=1)
+        scores[board, turn] = np.minimum(nearest, AGREE).mean()
+    scores[:, 1:] += UNTURNED
+    best = poses[np.unravel_index(np.argmin(scores), scores.shape)]
+    distances = _apart(poses, best, far)
+    chosen = np.argmin(distances + UNTURNED * (orders > 0), axis=1)
+    rows = np.arange(len(poses))
+    agree = distances[rows, chosen] < AGREE
+    return mean_pose(poses[rows, chosen][agree]), orders[np.where(agree, chosen, 0)], ~agree
+
+
+def _apart(poses: Floats, other: Floats, far: float) -> Floats:
+    """Return how far (..., 4, 4) poses are from another: chords of attitudes, shifts over a length."""
+    turns = np.linalg.norm(poses[..., :3, :3] - other[:3, :3], axis=(-2, -1)) / math.sqrt(2)
+    shifts = np.linalg.norm(poses[..., :3, 3] - other[:3, 3], axis=-1) / far
+    return np.asarray(turns + shifts)
+
 
 IN_A_PLANE = "all its points lie in one plane, but those of the board do not"
 HIDDEN = f"the lens shows fewer than {FEWEST} of its corners"
@@ -215,3 +397,6 @@ def _renumbered(corners: Corners, listings: Listings, orders: Indices, turned: I
     """Return the corners with the numbers that points have in the orders that were found."""
     first = listings.points[orders[corners.picture], corners.point]
     return corners.replace(point=listings.points[turned[corners.picture], first])
+
+
+check_arguments(globals(), ["nominal_camera"])

@@ -1,24 +1,256 @@
-"""The first values of one camera: a family of lenses that fits, adjusted, and the wanted model from it."""
+"""The first values of one camera: a family of lenses that fits, adjusted, and the wanted model from it.
+
+Families and fields of view are tried without any start value.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
-from photogram.arguments.types import Floats
-from photogram.errors import InputError
-from photogram.messages import Message
+from photogram.adjustment.adjustment import adjust
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import dataclass
+from photogram.messages import Message, Undetermined
+from photogram.network.attitudes import Attitudes
+from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
-from photogram.targets.families import POOR, Trial, adjusted_family, misfits, rays_of, trials
-from photogram.targets.homographies import poses, ray_homographies
 from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
-from photogram.targets.sightings import Sightings
-from photogram.targets.small_block import Adjusted, adjusted_views
+from photogram.targets.sightings import (
+    Sightings,
+    angles_apart,
+    focal_lengths,
+    homographies,
+    poses,
+    ray_homographies,
+)
+from photogram.targets.vision import photo_poses, vision_poses
 
-__all__ = ["NARROW", "WIDEST", "first_camera", "from_axis", "picture_size", "usual_models"]
+__all__ = [
+    "NARROW",
+    "POOR",
+    "WIDEST",
+    "adjusted_views",
+    "first_camera",
+    "from_axis",
+    "misfits",
+    "picture_size",
+    "rays_of",
+    "trials",
+    "usual_models",
+    "wide",
+]
+
+ROUGHLY = 1e-3
+"""Of a standard deviation: where steps end of what is only to be begun with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Adjusted:
+    """A camera with the poses of its views, adjusted.
+
+    Attributes
+    ----------
+    camera
+        The camera; what was free of it is.
+    poses
+        (P, 4, 4) board -> camera.
+    variance
+        The variance of unit weight, px^2.
+    is_whole
+        Whether all that was free was adjusted, converged, and is more than hardly determined.
+    """
+
+    camera: Camera
+    poses: Floats
+    variance: float
+    is_whole: bool
+
+
+def adjusted_views(
+    camera: Camera, seen: Sightings, poses: Floats, tolerance: float = ROUGHLY
+) -> Adjusted | None:
+    """Adjust a camera and the poses of views; with less of it free where they do not determine all.
+
+    What is unknown of the camera is free; nothing is where the poses alone are adjusted. Corners are in the
+    order of their numbers, poses (P, 4, 4) board -> camera to begin with; `tolerance` is that of
+    :func:`photogram.adjust`. None where the adjustment fails, whatever is held.
+    """
+    view, point = np.nonzero(np.isfinite(seen.xy[..., 0]))
+    positions, attitudes = photo_poses(poses)
+    block = Block(
+        photo_positions=positions,
+        photo_attitudes=attitudes.values("omega_phi_kappa"),
+        point_positions=seen.places,
+        point_sd=0.0,
+        image_photos=view,
+        image_points=point,
+        image_xy=seen.xy[view, point],
+        image_sd=np.repeat(seen.sd[view, point, np.newaxis], 2, axis=1),
+        cameras=[camera],
+        photo_cameras=0,
+    )
+    attempts = _less_and_less(camera)
+    for free in attempts:
+        own = camera.replace(sd=dict.fromkeys(free, math.inf))
+        try:
+            result = adjust(block.replace(cameras=[own]), covariance=False, tolerance=tolerance)
+        except AdjustmentError:
+            continue
+        if result.status == "diverged":
+            continue
+        turned = Attitudes.of("omega_phi_kappa", result.photo_attitudes)
+        found = vision_poses(result.photo_positions, turned)
+        adjusted = result.cameras[0].camera.replace(sd=camera.sd)
+        squares, freedom = result.sum_and_freedom
+        weak = any(isinstance(each, Undetermined) for each in result.messages)
+        whole = free == attempts[0] and result.converged and not weak
+        return Adjusted(adjusted, found, squares / max(freedom, 1.0), whole)
+    return None
+
+
+def _less_and_less(camera: Camera) -> Sequence[list[str]]:
+    """Return what is free in one attempt after the other: all, then no lens, then no principal point."""
+    free = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
+    attempts: list[list[str]] = []
+    for kept in ({*free}, {"f", "fx", "fy", "cx", "cy"}, {"f", "fx", "fy"}):
+        own = [name for name in free if name in kept]
+        if own not in attempts and (own or not free):
+            attempts.append(own)
+    return attempts
+
+
+FIELDS = np.linspace(60.0, 200.0, 15)
+"""Degrees of horizontal field that are tried; then what is between them is halved."""
+ENOUGH = 24
+"""Pictures that fields are tried by, at the most."""
+FINEST = 0.5
+"""Degrees of field to which the best is found."""
+RIVALS = 1.5
+"""Families whose misfits differ by a smaller factor are adjusted, each."""
+POOR = 5.0
+"""A view that fits so many times worse than the median view does not fit."""
+NO_FOCUS = 1.2
+"""Focal length over the width of the picture, where nothing says it."""
+
+FAMILIES: Mapping[str, Callable[[float], float]] = MappingProxyType(
+    {"fisheye": lambda field: 1 / field, "stereographic": lambda field: 1 / (4 * math.tan(field / 4))}
+)
+"""Wide families: focal length over the width of the picture, of the horizontal field (rad)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A lens that was tried.
+
+    Attributes
+    ----------
+    camera
+        Its focal length and principal point, free.
+    orders
+        (P,) in which order the corners of each picture fit best.
+    misfits
+        (P,) median angles (rad) between rays and the board in each.
+    """
+
+    camera: Camera
+    orders: Indices
+    misfits: Floats
+
+    @property
+    def angle(self) -> float:
+        """Median over the pictures, radians."""
+        return float(np.median(self.misfits))
+
+    @property
+    def pixels(self) -> float:
+        """The same near the axis, pixels: what families are compared by."""
+        return self.angle * self.camera.scale
+
+
+def rays_of(camera: Camera, xy: Floats) -> Floats:
+    """Return (P, n, 3) rays, axes of vision, of (P, n, 2) pixels; NaN where there are none."""
+    return np.asarray((camera.rays(xy.reshape(-1, 2)) * [1.0, -1.0, -1.0]).reshape(*xy.shape[:2], 3))
+
+
+def misfits(seen: Sightings, rays: Floats) -> Floats:
+    """Return (P,) the median angle (rad) between the rays of each picture and those of the board."""
+    found = ray_homographies(seen.coordinates, rays)
+    return np.asarray(np.nanmedian(angles_apart(seen.coordinates, rays, found), axis=1))
+
+
+def _tried(seen: Sightings, camera: Camera) -> Trial:
+    """Return how a lens fits, each picture in the order that fits best; one without rays does not."""
+    own = []
+    for order in seen.listings.shapes:
+        listed = seen.listed(np.full(len(seen.xy), order))
+        rays = rays_of(camera, listed.xy)
+        if np.isnan(rays[np.isfinite(listed.xy).all(axis=2)]).any():
+            return Trial(camera, np.zeros(len(seen.xy), dtype=np.int64), np.full(len(seen.xy), np.inf))
+        own.append(misfits(listed, rays))
+    best = np.argmin(own, axis=0)
+    return Trial(camera, np.array(seen.listings.shapes)[best], np.min(own, axis=0))
+
+
+def _camera(family: str, fx: float, fy: float, size: tuple[int, int]) -> Camera:
+    parameters = {"fx": fx, "fy": fy, "cx": (size[0] - 1) / 2, "cy": (size[1] - 1) / 2}
+    return Camera(family, parameters, dict.fromkeys(parameters, math.inf), unit="px")
+
+
+def perspective(seen: Sightings, size: tuple[int, int]) -> Trial:
+    """Return the perspective lens of the homographies of pixels; of 1.2 widths where these say nothing."""
+    first = _tried(seen, _camera("pinhole", size[0], size[0], size))
+    found = homographies(seen.coordinates, seen.listed(first.orders).xy)
+    fx, fy, f = focal_lengths(found, (np.array(size) - 1) / 2)
+    if not (fx > 0 and fy > 0):
+        fx = fy = f if f > 0 else NO_FOCUS * size[0]
+    return _tried(seen, _camera("pinhole", fx, fy, size))
+
+
+def wide(seen: Sightings, size: tuple[int, int], family: str) -> Trial:
+    """Return the lens of a wide family that fits best: fields of 60 to 200 degrees, then halved."""
+
+    def tried(field: float) -> Trial:
+        f = FAMILIES[family](math.radians(field)) * size[0]
+        return _tried(seen, _camera(family, f, f, size))
+
+    fields: dict[float, Trial] = {field: tried(field) for field in FIELDS.tolist()}
+    step = float(FIELDS[1] - FIELDS[0])
+    while step > FINEST:
+        step /= 2
+        best = min(fields, key=lambda field: fields[field].angle)
+        fields |= {field: tried(field) for field in (best - step, best + step)}
+    return min(fields.values(), key=lambda trial: trial.angle)
+
+
+def trials(seen: Sightings, size: tuple[int, int]) -> list[Trial]:
+    """Return the families that fit, the best first: those within a factor of it."""
+    some = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / ENOUGH)))
+    few = [perspective(some, size), *(wide(some, size, family) for family in FAMILIES)]
+    found = [_tried(seen, trial.camera) for trial in few]
+    found.sort(key=lambda trial: trial.pixels)
+    return [trial for trial in found if trial.pixels <= RIVALS * found[0].pixels]
+
+
+def adjusted_family(seen: Sightings, found: list[Trial]) -> tuple[Trial, Adjusted | None]:
+    """Return the family whose adjustment ends lowest, by the views that fit; the best, if none can be."""
+    ended = []
+    for trial in found:
+        fit = trial.misfits <= POOR * trial.angle
+        own = seen.of(fit).listed(trial.orders[fit])
+        start = poses(ray_homographies(own.coordinates, rays_of(trial.camera, own.xy)))
+        adjusted = adjusted_views(trial.camera, own, start)
+        if adjusted is not None:
+            ended.append((trial, adjusted))
+    if not ended:
+        return found[0], None
+    return min(ended, key=lambda each: each[1].variance)
+
 
 MANY = 62
 """Pictures that first values of a camera are adjusted by, at the most: the others would say the same."""
@@ -48,22 +280,10 @@ def first_camera(
 ) -> tuple[Camera, list[Message]]:
     """Return a camera with the wanted model, free, and remarks.
 
-    Parameters
-    ----------
-    seen
-        The pictures of the camera.
-    size, name
-        Width and height of them in pixels, and what the camera is called.
-    model
-        The wanted model; None for what is usual at its field of view. The knots of a splined one are fitted
-        to the usual one: many of them are where no corner is.
-    knots
-        Along columns and rows, of a splined one.
-
-    Raises
-    ------
-    InputError
-        A model that there is not, or one that cannot show corners that the camera sees.
+    `seen` are its pictures, `size` width and height of them in pixels. The model is what is usual at its
+    field of view where None is wanted; the `knots` of a splined one, along columns and rows, are fitted to
+    the usual one: many of them are where no corner is. InputError: a model that there is not, or one that
+    cannot show corners that the camera sees.
     """
     used = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MANY)))
     trial, adjusted = adjusted_family(used, trials(used, size))
@@ -130,13 +350,7 @@ def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str |
 
 
 def usual_models(field: float, farthest: float) -> list[str]:
-    """Return the models that are usual at a horizontal field of view, in order.
-
-    Parameters
-    ----------
-    field, farthest
-        Radians; the latter is how far from the axis anything is seen.
-    """
+    """Return the models that are usual, in order, at a horizontal field; `farthest` is off the axis (rad)."""
     if farthest >= WIDEST:
         return ["opencv_fisheye"]
     return ["opencv5"] if field < NARROW else ["opencv8", "opencv_fisheye"]

@@ -13,8 +13,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
-from photogram.targets.imaging import unknown_of
-from photogram.targets.vision import cross_matrices
+from photogram.targets.vision import cross_matrices, imaged, motion_partials, unknown_of
 
 __all__ = ["Housing", "SeenCorners", "mean_motion", "transformed"]
 
@@ -121,6 +120,20 @@ class Housing:
         """Return it with the cofactors that the errors of the corners alone cause: Q - Q P Q."""
         to_common = self.cofactors[:, : self.common]
         return replace(self, cofactors=self.cofactors - to_common @ self.weights @ to_common.T)
+
+    def linearized(self, camera: int, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return (n, 2) images by a camera of (n, 3) points in axes of camera 0, with their partials.
+
+        By these points, (n, 2, 3), and by the common unknowns, (n, 2, c), of which those of the board are 0.
+        """
+        turn, shift = self.sensors[camera, :3, :3], self.sensors[camera, :3, 3]
+        turned = points @ turn.T
+        images = imaged(self.cameras[camera], turned + shift)
+        by_common = np.zeros((len(points), 2, self.common))
+        by_common[:, :, self.parameters(camera)] = images.by_parameters
+        if camera:
+            by_common[:, :, self.sensor(camera)] = images.by_point @ motion_partials(turned)
+        return images.xy, images.by_point @ turn, by_common
 
     def places(self, camera: int) -> tuple[Floats, Floats]:
         """Return (m, 3) where the corners that a camera saw were in its axes, and (m,) their sd in pixels."""

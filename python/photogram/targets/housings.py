@@ -9,23 +9,15 @@ import numpy as np
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.network.knots import Knot
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
-from photogram.targets.imaging import unknown_of
-from photogram.targets.vision import sensor_steps
+from photogram.targets.vision import sensor_steps, unknown_of
 
 __all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
 
 
 def camera_number(calibrated: Calibrated, camera: int | str) -> int:
-    """Return the number of a camera by its number or name.
-
-    Raises
-    ------
-    InputError
-        There is no such camera.
-    """
+    """Return the number of a camera by its number or name; an InputError where there is no such one."""
     names = [each.name for each in calibrated.cameras]
     if isinstance(camera, str) and camera in names:
         return names.index(camera)
@@ -35,13 +27,7 @@ def camera_number(calibrated: Calibrated, camera: int | str) -> int:
 
 
 def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
-    """Return width and height of the pictures of a camera.
-
-    Raises
-    ------
-    InputError
-        Nobody has said.
-    """
+    """Return width and height of the pictures of a camera; an InputError where nobody has said."""
     size = calibrated.calibration.corners.sizes[camera]
     if size is None:
         name = calibrated.cameras[camera].name
@@ -73,15 +59,15 @@ def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
 def _housing(calibrated: Calibrated, cameras: list[int]) -> Housing:
     corners = calibrated.calibration.corners
     views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
-    poses = calibrated.poses[views]
+    poses, by_board = calibrated.poses[views], _points_by_board(calibrated)
     return Housing(
         cameras=tuple(calibrated.cameras[each].camera for each in cameras),
         sensors=calibrated.sensors[cameras],
         poses=poses,
         points=calibrated.points,
-        points_by_board=_points_by_board(calibrated),
+        points_by_board=by_board,
         seen=_seen(calibrated, cameras, views),
-        cofactors=_cofactors(calibrated, cameras, views, poses),
+        cofactors=_cofactors(calibrated, cameras, views, poses, by_board.shape[2]),
         weights=_weights(calibrated, cameras),
         variance=calibrated.result.covariance_scale,
     )
@@ -92,11 +78,6 @@ def _board_rows(calibrated: Calibrated) -> list[int]:
     if calibrated.calibration.shape != "points":
         return []
     return np.flatnonzero(calibrated.result.used_points).tolist()
-
-
-def _board_size(calibrated: Calibrated) -> int:
-    """Return how many unknowns the board has: coordinates of its points, or the two of its bend."""
-    return 3 * len(_board_rows(calibrated)) if calibrated.bend is None else 2
 
 
 def _points_by_board(calibrated: Calibrated) -> Floats:
@@ -125,13 +106,15 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCor
     )
 
 
-def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats) -> Floats:
-    """Return the cofactors of common unknowns and of the mean motion of the boards."""
+def _cofactors(
+    calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats, board: int
+) -> Floats:
+    """Return the cofactors of common unknowns, `board` of them of the board, and of its mean motion."""
     given = calibrated.result.block.cameras
     lengths = [len(each.names) + 2 * len(each.knot_unknowns) for each in given]
     starts = np.concatenate([[0], np.cumsum(lengths)])
     kept = [starts[each] + np.flatnonzero(unknown_of(calibrated.cameras[each].camera)) for each in cameras]
-    sensors, board = calibrated.sensors_adjusted(), _board_size(calibrated)
+    sensors = calibrated.sensors_adjusted()
     kept += [starts[-1] + 6 * sensors.index(each) + np.arange(6) for each in cameras[1:]]
     kept.append(starts[-1] + 6 * len(sensors) + np.arange(board))
     columns = np.concatenate(kept)
@@ -144,32 +127,27 @@ def _cofactors(calibrated: Calibrated, cameras: list[int], views: Indices, poses
     return calibrated.combined(partials, parts)
 
 
-def _weight_of(knot: Knot) -> Floats:
-    """Return (2, 2) of the observation that a knot is 0."""
-    return np.zeros((2, 2)) if knot.covariance is None else np.asarray(np.linalg.inv(knot.covariance))
-
-
 def _weight_of_sensor(calibrated: Calibrated, camera: int) -> Floats:
     """Return (6, 6) of the observation of a sensor, by its steps dt, w."""
     back = np.linalg.inv(sensor_steps(calibrated.sensors[camera]))
     sd = np.asarray(calibrated.calibration.sd_sensors)[camera]
-    found: Floats = back.T @ np.diag(1 / sd**2) @ back
-    return found
+    return np.asarray(back.T @ np.diag(1 / sd**2) @ back)
 
 
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
     """Return the inverse covariances of what was known before: of cameras, sensors, points and the bend."""
     block, rows = calibrated.result.block, _board_rows(calibrated)
     blocks = []
-    for each in cameras:
-        sd = block.cameras[each].deviations
+    for number in cameras:
+        camera = block.cameras[number]
+        sd = camera.deviations
         weighted = np.isfinite(sd[sd > 0])
         own = np.diag(np.where(weighted, 1 / sd[sd > 0] ** 2, 0.0))
-        covariance = block.cameras[each].prior_covariance
+        covariance = camera.prior_covariance
         if covariance is not None:
             own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
-        knots = [knot for knot in block.cameras[each].knot_unknowns if np.any(knot.sd)]
-        blocks += [own, *(_weight_of(knot) for knot in knots)]
+        knots = [knot.covariance for knot in camera.knot_unknowns if np.any(knot.sd)]
+        blocks += [own, *(np.zeros((2, 2)) if each is None else np.linalg.inv(each) for each in knots)]
     blocks += [_weight_of_sensor(calibrated, each) for each in cameras[1:]]
     points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
     bend = np.diag(1 / np.asarray(calibrated.calibration.sd_bend) ** 2)

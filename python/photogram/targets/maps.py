@@ -12,10 +12,9 @@ from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import hull, outside
 from photogram.show.summary import Brief, Rows
-from photogram.targets.datums import DatumName
-from photogram.targets.projection import worst
+from photogram.targets.projection import DatumName, worst
 
-__all__ = ["UncertaintyCurve", "UncertaintyMap", "distance_text", "image_grid"]
+__all__ = ["UncertaintyCurve", "UncertaintyMap", "distance_text", "image_grid", "map_name"]
 
 
 def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
@@ -140,6 +139,12 @@ class UncertaintyMap(Brief):
                 "variance_row": flat[:, 1, 1],
             }
         )
+
+
+def map_name(found: UncertaintyMap) -> str:
+    """Return what files and pictures call a map: `left-infinity`."""
+    away = "infinity" if math.isinf(found.distance) else f"{found.distance:g}"
+    return f"{found.camera}-{away}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

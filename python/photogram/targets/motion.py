@@ -43,10 +43,7 @@ POWERS = 2 * EACH_SIDE
 def dated(corners: Corners, tied: Bools) -> Floats:
     """Return (V,) the times of views: of their pictures by cameras that are not tied; NaN without.
 
-    Raises
-    ------
-    InputError
-        Pictures without times.
+    InputError: pictures without times.
     """
     if corners.times is None:
         raise InputError("offsets between cameras need the times of their pictures: a column time")
@@ -59,23 +56,9 @@ def dated(corners: Corners, tied: Bools) -> Floats:
 def moving(poses: Floats, times: Floats, references: Indices) -> Floats:
     """Return (V, 4, 6) c_k and r_k of views: through as many neighbours on each side, two at the most.
 
-    Parameters
-    ----------
-    poses
-        (V, 4, 4) board -> reference.
-    times
-        (V,) of views.
-    references
-        (V,) the camera that each counts from.
-
-    Returns
-    -------
-    NaN of views without a neighbour within 0.2 s before and after, 0 for powers that these do not tell.
-
-    Raises
-    ------
-    InputError
-        Two views of one time.
+    Poses are (V, 4, 4) board -> reference, times and references (V,) of views. NaN of views without a
+    neighbour within 0.2 s before and after, 0 for powers that these do not tell. InputError: two views of one
+    time.
     """
     found = np.full((len(poses), POWERS, 6), np.nan)
     places, attitudes = photo_poses(poses)
@@ -140,14 +123,8 @@ def pictures_in_motion(
 ) -> list[Timed]:
     """Return the pictures: each view is a trajectory whose pose is unknown, and whose motion is known.
 
-    Parameters
-    ----------
-    corners
-        Whose pictures they are.
-    poses, motion, times
-        (V, 4, 4), (V, 4, 6), (V,) of views.
-    sensors, clocks
-        Of each camera; no clock of one that is not tied.
+    Poses, motion and times are (V, 4, 4), (V, 4, 6), (V,) of views; sensors and clocks of each camera, no
+    clock of one that is not tied.
     """
     assert corners.times is not None
     places, attitudes = photo_poses(poses)

@@ -15,8 +15,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
-from photogram.targets.imaging import imaged, motion_partials, rays
-from photogram.targets.vision import moved_by
+from photogram.targets.vision import imaged, motion_partials, moved_by, rays
 
 __all__ = ["Criterion", "Fitted", "differences_at", "fitted_motion", "points_at"]
 
@@ -72,26 +71,12 @@ def fitted_motion(
     criterion: Criterion = "pixels",
     weights: Floats | None = None,
 ) -> Fitted:
-    """Return the motion by which two cameras differ least.
+    """Return the motion by which two cameras differ least at (n, 2) pixels of camera a.
 
-    Parameters
-    ----------
-    a, b
-        The cameras.
-    pixels
-        (n, 2) of camera a, where they are compared; those that one of the two does not see do not count.
-    distances
-        At which; a translation is fitted where all are finite, and arbitrary along the rays with one.
-    criterion
-        What is least.
-    weights
-        Of each pixel at each distance, one after the other: (D n, 2, 2) W of differences in pixels, (D n,) w
-        of mrcal's criterion; NaN where a pixel does not count. None: equal weights.
-
-    Raises
-    ------
-    InputError
-        The two see too few pixels in common.
+    Pixels that one of the two does not see do not count. A translation is fitted where all distances are
+    finite, and arbitrary along the rays with one. Weights are of each pixel at each distance, one after the
+    other: (D n, 2, 2) W of differences in pixels, (D n,) w of mrcal's criterion; NaN where a pixel does not
+    count, None for equal ones. InputError: the two see too few pixels in common.
     """
     finite = bool(np.isfinite(distances).all())
     towards = points_at(a, pixels, distances)
@@ -104,7 +89,8 @@ def fitted_motion(
         raise InputError(f"the two cameras both see {count} of the pixels: too few to compare them")
     towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
     motion, free = np.eye(4), slice(0 if finite else 3, 6)
-    motion[:3, :3] = _turned_onto(_unit(towards), aims)
+    unit = towards / np.linalg.norm(towards, axis=1)[:, np.newaxis]
+    motion[:3, :3] = _turned_onto(unit, aims)
     for _ in range(STEPS):
         moved = transformed(motion, towards)
         by_motion = motion_partials(moved, finite)[:, :, free]
@@ -150,10 +136,6 @@ def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats)
     normal = 2 * np.einsum("n,ni,nj->ij", weights * inside, slope, slope)
     normal += np.einsum("n,nki,nkj->ij", level, turned, turned)
     return normal, -np.einsum("n,ni->i", level, slope)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, np.newaxis])
 
 
 def _turned_onto(vectors: Floats, onto: Floats) -> Floats:

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import ast
 import base64
+import math
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,38 +19,79 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.files import read_text
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
+from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
-from photogram.targets.mrcal_lenses import freed, lens_of_mrcal
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
 
-__all__ = ["read_lens", "read_model"]
+__all__ = ["PREFIX", "read_lens", "read_model"]
+
+PREFIX = "LENSMODEL_"
+CORE = ("fx", "fy", "cx", "cy")
+LENSES = {
+    "PINHOLE": ("pinhole", 4),
+    "STEREOGRAPHIC": ("stereographic", 4),
+    **{f"OPENCV{terms}": ("opencv_pinhole", 4 + terms) for terms in (4, 5, 8, 12)},
+    "CAHVOR": ("cahvor", 9),
+}
+"""Models by the name here, with as many of its parameters."""
+SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x_deg=([\d.]+)")
+
+
+def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera:
+    """Return a camera, held, of its name and numbers in mrcal.
+
+    InputError: a lens that is not taken, or another number of values.
+    """
+    said = model.removeprefix(PREFIX)
+    if splined := SPLINED.fullmatch(said):
+        order, nx, ny, fov = map(float, splined.groups())
+        _count(model, values, 4 + 2 * int(nx) * int(ny))
+        return Camera(
+            KNOTTED,
+            dict(
+                zip((*CORE, "order", "nx", "ny", "fov_x_deg"), [*values[:4], order, nx, ny, fov], strict=True)
+            ),
+            name=name,
+            knots=np.reshape(values[4:], (int(ny), int(nx), 2)),
+        )
+    if said not in LENSES:
+        raise InputError(
+            f"{model} is none of the lenses that are taken, {', '.join(LENSES)}, splined ones:"
+            f" `mrcal-convert-lensmodel --sampled --intrinsics-only {PREFIX}OPENCV8 FILE` fits one that is"
+        )
+    own, count = LENSES[said]
+    _count(model, values, count)
+    names = Camera(own, dict.fromkeys(CORE, 1.0)).names[:count]
+    return Camera(own, dict(zip(names, values, strict=True)), name=name)
+
+
+def _count(model: str, values: Sequence[float], needed: int) -> None:
+    if len(values) != needed:
+        raise InputError(f"{model} has {needed} values, not {len(values)}")
+
+
+def freed(camera: Camera, model: str, core: bool, lens: bool) -> Camera:
+    """Return a camera of mrcal with what mrcal had free: the core, and the terms of the lens or its knots."""
+    own = CORE if core else ()
+    if camera.knots is not None:
+        return camera.replace(sd=dict.fromkeys(own, math.inf), knot_sd=math.inf if lens else 0.0)
+    terms = camera.names[4 : LENSES[model.removeprefix(PREFIX)][1]]
+    return camera.replace(sd=dict.fromkeys((*own, *(terms if lens else ())), math.inf))
+
 
 INDICES = "indices_frame_camintrinsics_camextrinsics"
-
-
-@dataclass(frozen=True)
-class _Free:
-    """What of a calibration was optimized."""
-
-    core: bool
-    lens: bool
-    warp: bool
 
 
 def read_model(path: Path) -> Calibration:
     """Read the calibration that a `.cameramodel` holds: corners, board, and its values as the start.
 
-    Raises
-    ------
-    InputError
-        The file is no such text, holds no corners, or what is not taken: lenses that there are not, points
-        that were observed one by one, cameras that moved, values that were held.
+    InputError: the file is no such text, holds no corners, or what is not taken: lenses that there are not,
+    points that were observed one by one, cameras that moved, values that were held.
     """
     arrays = read_arrays(path, _packed(path))
     for name in ("observations_point", "observations_point_triangulated"):
@@ -58,15 +102,15 @@ def read_model(path: Path) -> Calibration:
         raise InputError(f"its {KEY} hold no corners of a board", file=path)
     observed = arrays.numbers("observations_board", None, None, None, 3)
     indices = _indices(arrays, len(observed))
-    free = _freed(arrays)
-    cameras = _cameras(arrays, free)
+    core, lens, warped = _freed(arrays)
+    cameras = _cameras(arrays, core, lens)
     sensors, poses = _poses(arrays, indices, len(cameras))
     warp = arrays.numbers("calobject_warp", 2) if "calobject_warp" in arrays else np.zeros(2)
     board = Board(
         columns=observed.shape[2],
         rows=observed.shape[1],
         spacing=float(arrays.numbers("calibration_object_spacing")),
-        shape="bend" if free.warp else "held",
+        shape="bend" if warped else "held",
     )
     sizes = arrays.numbers("imagersizes", len(cameras), 2).astype(int).tolist()
     return Calibration(
@@ -83,10 +127,7 @@ def read_model(path: Path) -> Calibration:
 def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
     """Read the camera of a `.cameramodel`, held, and width and height of its pictures.
 
-    Raises
-    ------
-    InputError
-        The file is no such text, or its lens is not taken.
+    InputError: the file is no such text, or its lens is not taken.
     """
     content = _content(path)
     try:
@@ -131,22 +172,23 @@ def _indices(arrays: Arrays, count: int) -> Indices:
     return found
 
 
-def _freed(arrays: Arrays) -> _Free:
+def _freed(arrays: Arrays) -> tuple[bool, bool, bool]:
+    """Return whether cores, terms of lenses or knots, and the bend of the board were optimized."""
     core = arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core")
     lens = arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
     for held in ("do_optimize_frames", "do_optimize_extrinsics"):
         if held in arrays and not arrays.says(held):
             raise arrays.error(held, "is false: poses that were held are not taken")
-    return _Free(arrays.says(core), arrays.says(lens), arrays.says("do_optimize_calobject_warp"))
+    return arrays.says(core), arrays.says(lens), arrays.says("do_optimize_calobject_warp")
 
 
-def _cameras(arrays: Arrays, free: _Free) -> list[Camera]:
+def _cameras(arrays: Arrays, core: bool, lens: bool) -> list[Camera]:
     model, rows = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None)
     try:
         own = [lens_of_mrcal(model, row, f"camera {number}") for number, row in enumerate(rows.tolist())]
     except InputError as error:
         raise InputError(error.message, file=arrays.path) from None
-    return [freed(each, model, free.core, free.lens) for each in own]
+    return [freed(each, model, core, lens) for each in own]
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:

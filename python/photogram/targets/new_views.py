@@ -18,12 +18,11 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.show.summary import Brief, Rows
 from photogram.targets.housing import Housing, transformed
-from photogram.targets.imaging import TURNED, rays
 from photogram.targets.maps import distance_text
 from photogram.targets.projection import of_functions, worst
-from photogram.targets.view_rows import view_rows
+from photogram.targets.vision import TURNED, motion_partials, rays
 
-__all__ = ["Added", "Candidate", "NewView", "Suggestions", "best_views", "shown_of"]
+__all__ = ["Candidate", "NewView", "Suggestions", "best_views", "shown_of", "view_rows"]
 
 FEWEST = 12
 """Corners that a picture must have to count."""
@@ -174,14 +173,9 @@ class Suggestions(Brief):
 
 
 def shown_of(camera: Camera, size: Floats, places: Floats) -> tuple[Indices, Floats]:
-    """Return which points a picture would show, and their images; none where they are fewer than 12.
+    """Return which of (n, 3) points in its axes a picture would show, and their images; none below 12.
 
-    Parameters
-    ----------
-    camera, size
-        The camera, and (2,) width and height of its pictures.
-    places
-        (n, 3) the points in its axes.
+    `size` is (2,) width and height of the pictures of the camera.
     """
     xy = camera.project(places * TURNED)
     with np.errstate(invalid="ignore"):
@@ -200,15 +194,16 @@ def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added 
     cameras, points = np.repeat(np.arange(len(shown)), [len(own) for own in shown]), np.concatenate(shown)
     if not len(points):
         return None
-    rows, before = view_rows(housing, pose, cameras, points), housing.board.start
-    by_cameras = rows.by_common[:, :, :before].reshape(-1, before) / sd
+    _, by_common, by_pose, by_place = view_rows(housing, pose, cameras, points)
+    before = housing.board.start
+    by_cameras = by_common[:, :, :before].reshape(-1, before) / sd
     touched = np.flatnonzero(by_cameras.any(axis=0))
     return Added(
         touched=touched,
         by_cameras=by_cameras[:, touched],
         places=before + 3 * points[:, np.newaxis] + np.arange(3),
-        by_place=rows.by_point / sd,
-        by_pose=rows.by_pose.reshape(-1, 6) / sd,
+        by_place=by_place / sd,
+        by_pose=by_pose.reshape(-1, 6) / sd,
         corners=np.bincount(cameras, minlength=len(housing.cameras)),
     )
 
@@ -229,20 +224,9 @@ def best_views(
     """Return views that make the largest standard deviation of a map smallest, each with those before it.
 
     Of splined lenses the root mean square counts: a view says something of the knots that it touches alone,
-    and hardly any makes the largest smaller.
-
-    Parameters
-    ----------
-    housing
-        The cameras.
-    functions
-        (n, 2, c) J of the map by the common unknowns, in a datum that stays as it is; by none of the board.
-    candidates
-        Views that may be taken, each once.
-    sizes, sd
-        (K, 2) of pictures, and the standard deviation of a corner in pixels.
-    count
-        How many views.
+    and hardly any makes the largest smaller. Functions are (n, 2, c) J of the map by the common unknowns, in
+    a datum that stays as it is; by none of the board. Candidates may be taken once each; sizes are (K, 2) of
+    pictures, `sd` that of a corner in pixels.
     """
     seen = [(each, added_by(housing, each.pose, sizes, sd)) for each in candidates]
     left = [(each, added) for each, added in seen if added is not None]
@@ -273,3 +257,23 @@ def best_views(
 def _rounded(value: float) -> float:
     """Return a number in six figures: of views that are mirrored images, as good, the first is taken."""
     return float(f"{value:.6g}")
+
+
+def view_rows(
+    housing: Housing, pose: Floats, cameras: Indices, points: Indices
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return (n, 2) images of points of the board, each in one of the cameras, and their partials.
+
+    By the c common unknowns, (n, 2, c), by the step (dt, w) of the pose, (n, 2, 6), and by the place of the
+    point on the board, (n, 2, 3). The pose is (4, 4) board -> camera 0; cameras and points are (n,) of each.
+    """
+    xy, by_pose, by_point = (np.empty((len(points), 2, *more)) for more in ((), (6,), (3,)))
+    by_common = np.zeros((len(points), 2, housing.common))
+    turned = housing.points[points] @ pose[:3, :3].T
+    for number in np.unique(cameras).tolist():
+        own = cameras == number
+        xy[own], in_first, by_common[own] = housing.linearized(number, turned[own] + pose[:3, 3])
+        by_point[own] = in_first @ pose[:3, :3]
+        by_common[own, :, housing.board] = by_point[own] @ housing.points_by_board[points[own]]
+        by_pose[own] = in_first @ motion_partials(turned[own])
+    return xy, by_common, by_pose, by_point

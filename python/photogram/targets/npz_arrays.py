@@ -76,12 +76,8 @@ class Arrays:
 def read_arrays(path: Path, data: bytes) -> Arrays:
     """Read an archive.
 
-    Raises
-    ------
-    InputError
-        Bytes that are no archive, or arrays of Python objects, which nothing here unpickles.
-    OutOfMemoryError
-        It would take more memory than there is.
+    InputError: bytes that are no archive, or arrays of Python objects, which nothing here unpickles.
+    OutOfMemoryError: it would take more memory than there is.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:

@@ -13,7 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_beginning, read_bytes
-from photogram.io.tree import Tree, read_json
+from photogram.io.json import Tree, read_json
 from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import Message
 from photogram.targets.board import Board
@@ -44,10 +44,8 @@ def is_npz(path: Path) -> bool:
 def read_storage(path: Path, board: Board | None) -> Measured:
     """Read `image_points` (views x corners x 2), and the board of `board_width`, `square_size` ...
 
-    Raises
-    ------
-    InputError
-        Matrices that are missing or of another shape, another number of corners than the board has points.
+    InputError: matrices that are missing or of another shape, another number of corners than the board has
+    points.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":
@@ -57,14 +55,14 @@ def read_storage(path: Path, board: Board | None) -> Measured:
     xy = _matrix(content[POINTS])
     if xy.ndim != 3 or xy.shape[2] != 2:
         raise content[POINTS].error("is no matrix of views by corners of x and y")
-    size = None
+    sizes = {}
     if "image_width" in content and "image_height" in content:
-        size = tuple(content[f"image_{side}"].whole(1) for side in ("width", "height"))
+        sizes[""] = content["image_width"].whole(1), content["image_height"].whole(1)
     own = _board(content) if board is None else board
     grid = _matrix(content["grid_points"]) if "grid_points" in content else None
     if own is not None and grid is not None and board is None:
         _check_grid(content["grid_points"], own, grid)
-    return _measured(path, xy, own, {} if size is None else {"": (size[0], size[1])}, _told(path, own, board))
+    return _measured(path, xy, own, sizes, _told(path, own, board))
 
 
 def _told(path: Path, own: Board | None, given: Board | None) -> list[Message]:
@@ -182,10 +180,8 @@ def _value(word: str) -> Any:
 def read_npz(path: Path, board: Board | None) -> Measured:
     """Read arrays `imgpoints` (views x corners x 2), and `objpoints`, a grid, where no board is given.
 
-    Raises
-    ------
-    InputError
-        No such arrays, those of Python objects, points of the board that are no grid, or differ in views.
+    InputError: no such arrays, those of Python objects, points of the board that are no grid, or differ in
+    views.
     """
     arrays = read_arrays(path, read_bytes(path))
     name = arrays.first("imgpoints", "image_points")
@@ -194,17 +190,17 @@ def read_npz(path: Path, board: Board | None) -> Measured:
         xy = arrays.numbers(name, None, None, 1, 2)[:, :, 0]
     else:
         xy = arrays.numbers(name, None, None, 2)
-    size = None
+    sizes = {}
     for key in ("image_size", "imgsize"):
         if key in arrays:
             width, height = arrays.numbers(key, 2).astype(int).tolist()
-            size = width, height
+            sizes[""] = width, height
     own = board
     if own is None:
         own = _gridded(
             path, arrays.numbers(arrays.first("objpoints", "object_points"), len(xy), xy.shape[1], 3)
         )
-    return _measured(path, xy, own, {} if size is None else {"": size}, _told(path, own, board))
+    return _measured(path, xy, own, sizes, _told(path, own, board))
 
 
 def _gridded(path: Path, places: Floats) -> Board:

@@ -8,10 +8,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
-from photogram.targets.families import POOR, rays_of
-from photogram.targets.homographies import angles_apart, centres, poses, ray_homographies
-from photogram.targets.sightings import LISTED, Sightings
-from photogram.targets.small_block import adjusted_views
+from photogram.targets.first_camera import POOR, adjusted_views, rays_of
+from photogram.targets.sightings import LISTED, Sightings, angles_apart, centres, poses, ray_homographies
 
 __all__ = ["Pictures", "rays_shown"]
 

@@ -1,4 +1,4 @@
-"""The page of a calibration: that of its block, with the board and the views before it."""
+"""The page of a calibration: that of its block, with what it is worth, the board and the views before it."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 from photogram.plots.panels import figure_of
 from photogram.show.cells import page_table
 from photogram.show.methods import page_of
-from photogram.show.page import Drawing, Facts, Layers, Page, Part, Remarks, Section
-from photogram.targets.appraisal_page import worth_facts, worth_section
-from photogram.targets.calibration_result import Calibrated
+from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Remarks, Section
+from photogram.targets.calibration_difference import CameraDifference
+from photogram.targets.calibration_result import Calibrated, Worth
+from photogram.targets.drawing import draw_cross_validation, draw_difference, draw_uncertainty
 from photogram.targets.grouping import Groups, residual_groups
-from photogram.targets.prior_shift import prior_shift
+from photogram.targets.maps import UncertaintyMap, distance_text, map_name
 from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
-from photogram.targets.splined import spline_lines
-from photogram.targets.tables import board_facts, views, worst_points
+from photogram.targets.tables import board_facts, prior_shift, spline_lines, views, worst_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["calibration_page"]
+__all__ = ["calibration_page", "drawings", "worth_facts"]
 
 
 @page_of.register(Calibrated)
@@ -50,22 +50,26 @@ def calibration_page(calibrated: Calibrated) -> Page:
     ]
     highlights = [*([] if worth is None else worth_facts(worth)), *page.highlights]
     return replace(
-        page,
-        what="Calibration with targets",
-        highlights=highlights,
-        sections=[*sections, *page.sections],
+        page, what="Calibration with targets", highlights=highlights, sections=[*sections, *page.sections]
     )
 
 
 def _residuals(calibrated: Calibrated) -> list[Part]:
     """Return tables of residuals by groups, and pictures of them over the board and in the poorest views."""
-    figures = {
-        "board-residuals": ("On the board", "Mean residuals over all views: errors of the print.", _on_board),
-        "poorest-views": ("Poorest views", "Residuals of the pictures that fit worst.", _poorest),
+    figures: dict[str, tuple[str, str, partial[object]]] = {
+        "board-residuals": (
+            "On the board",
+            "Mean residuals over all views: errors of the print.",
+            partial(draw_board_residuals, calibrated),
+        ),
+        "poorest-views": (
+            "Poorest views",
+            "Residuals of the pictures that fit worst.",
+            partial(draw_poorest_views, calibrated),
+        ),
     }
     drawings = [
-        Drawing(name, title, caption, partial(draw, calibrated))
-        for name, (title, caption, draw) in figures.items()
+        Drawing(name, title, caption, _figure(draw)) for name, (title, caption, draw) in figures.items()
     ]
     tables = [page_table(title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
     return [Layers("corner-residuals", drawings), *(each for each in tables if len(each.rows) > 1)]
@@ -78,9 +82,75 @@ _GROUPS: dict[Groups, str] = {
 }
 
 
-def _on_board(calibrated: Calibrated) -> Figure:
-    return figure_of(lambda ax: draw_board_residuals(calibrated, ax=ax))
+CAPTION = (
+    "Standard deviation, in the worst direction, of the image of a point that stays fixed to the housing."
+    " Dots: corners that were seen; line: their convex hull; dashed, of splined lenses: where knots end."
+)
+CROSS = (
+    "Images of the same points by the second part of the views less those by the first (vectors), and what"
+    " that is beside its covariance: about 1 where the covariance explains it."
+)
+APART = "Where both calibrations image the same points, once the motion between their axes is out."
 
 
-def _poorest(calibrated: Calibrated) -> Figure:
-    return figure_of(lambda ax: draw_poorest_views(calibrated, ax=ax))
+def worth_facts(worth: Worth) -> list[Fact]:
+    """Return the largest standard deviation of each map where the board was seen."""
+    return [
+        Fact(
+            f"{each.camera}, {distance_text(each.distance, each.unit)}",
+            f"{each.largest:.2g}",
+            "px",
+            "largest standard deviation of projection where the board was seen",
+        )
+        for each in worth.maps
+    ]
+
+
+def worth_section(worth: Worth | None) -> Section:
+    """Return the section; it has no parts where nothing was asked."""
+    parts: list[Part] = []
+    if worth is not None:
+        parts += [Remarks(worth.sentences)] if worth.sentences else []
+        made = drawings(worth)
+        parts += [Layers("uncertainty", made)] if made else []
+        parts += [Facts("Cross-validation", facts)] if (facts := _tests(worth)) else []
+    return Section("uncertainty", "Uncertainty of projection", parts, CAPTION)
+
+
+def drawings(worth: Worth) -> list[Drawing]:
+    """Return all pictures, still to be drawn."""
+    found = [
+        Drawing(f"map-{map_name(each)}", _title(each), CAPTION, _figure(partial(draw_uncertainty, each)))
+        for each in worth.maps
+    ]
+    for cross in worth.cross:
+        for own in worth.maps:
+            if own.camera in cross.cameras:
+                draw = partial(draw_cross_validation, cross, own)
+                name = f"cross-validation-{map_name(own)}"
+                found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, _figure(draw)))
+    return found + [_of_difference(each) for each in worth.differences]
+
+
+def _tests(worth: Worth) -> list[Fact]:
+    found = []
+    for cross in worth.cross:
+        for (a, b), tests in zip(cross.parts, cross.tests, strict=True):
+            for each in tests:
+                note = f"chi² of {each.dof}, p {each.probability:.2g}; {len(a)} and {len(b)} views"
+                found.append(Fact(each.name, f"{each.chi2:.3g}", "", note, "" if each.explained else "bad"))
+    return found
+
+
+def _of_difference(found: CameraDifference) -> Drawing:
+    name = f"difference-{found.cameras[0]}-{found.cameras[1]}".replace(" ", "-")
+    return Drawing(name, "Difference", APART, _figure(partial(draw_difference, found)))
+
+
+def _title(found: UncertaintyMap) -> str:
+    return f"{found.camera} {distance_text(found.distance, found.unit)}"
+
+
+def _figure(draw: partial[object]) -> partial[Figure]:
+    """Return what draws into a figure of its own."""
+    return partial(figure_of, lambda ax: draw(ax=ax))

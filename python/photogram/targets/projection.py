@@ -1,27 +1,115 @@
 """How far off the image of a point may be that stays fixed to the housing of a camera.
 
 With K and Pi the partials of the image by the camera's parameters k and by the point p = d r(q), and
-G = (I, -[p]x):  dq = K dk + Pi G tau,  tau = T db of the datum,  Q_q = J Q J'.
+G = (I, -[p]x):  dq = K dk + Pi G tau,  Q_q = J Q J'.  A calibration moves its own axes: what stays with the
+housing is said by the datum, a matrix T by which a change db of the unknowns goes with the motion tau = T db,
+(dt, w), of the axes of a camera.
 """
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
-from photogram.targets.imaging import imaged, motion_partials, rays
+from photogram.targets.vision import cross_matrices, imaged, motion_partials, rays, unknown_of
 
 __all__ = [
+    "DatumName",
     "common_partials",
-    "image_partials",
+    "datum_rows",
+    "fixed_points",
+    "housing_rows",
     "of_functions",
     "point_partials",
     "projection_cofactors",
-    "with_motion",
     "worst",
 ]
+
+DatumName = Literal["corners", "mean-frames", "image", "axes"]
+"""What holds still: the corners that the camera saw, the mean of the boards, rays of the whole image, or the
+axes of the camera themselves."""
+
+POINTS_TOGETHER = 4096
+"""Points whose partials are in memory at a time."""
+
+
+def datum_rows(
+    housing: Housing, camera: int, datum: DatumName, fixed: tuple[Floats, Floats, bool] | None = None
+) -> Floats:
+    """Return (6, c + 6) T of a camera by the name of a datum.
+
+    Of `image`, `fixed` are (n, 3) points in the axes of the camera that hold still, their (n, 2, 2) weights
+    W, and whether they are at finite distances.
+    """
+    found = np.zeros((6, housing.common + 6))
+    own = housing.parameters(camera)
+    if datum == "corners":
+        places, sd = housing.places(camera)
+        found[:, own] = fixed_points(
+            housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
+        )
+    elif datum == "image" and fixed is not None:
+        found[:, own] = fixed_points(housing.cameras[camera], *fixed)
+    elif datum == "mean-frames":
+        turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
+        # p' = R p + t:  R (dt + w x p) + dt_s + w_s x R p  with R p = p' - t.
+        about = np.eye(6)
+        about[:3, 3:] = cross_matrices(shift)
+        found[:, housing.mean_motion] = about @ np.kron(np.eye(2), turn)
+        if camera:
+            found[:, housing.sensor(camera)] = about
+    return found
+
+
+def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool = True) -> Floats:
+    """Return (6, p) T by which the images of points move least when the camera's parameters change.
+
+    T = -(sum G' Pi' W Pi G)^-1 sum G' Pi' W K of (n, 3) points in its axes with (n, 2, 2) weights W of their
+    images. At infinity, not `finite`, there is no translation to find.
+    """
+    normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
+    for start in range(0, len(points), POINTS_TOGETHER):
+        part = slice(start, start + POINTS_TOGETHER)
+        images = imaged(camera, points[part])
+        by_motion = images.by_point @ motion_partials(points[part], finite)
+        weighted = (weights[part] @ by_motion).reshape(-1, 6)
+        normal += weighted.T @ by_motion.reshape(-1, 6)
+        right += weighted.T @ images.by_parameters.reshape(len(weighted), -1)
+    return _moved_back(normal, right, finite)
+
+
+def housing_rows(housing: Housing) -> Floats:
+    """Return (6, c + 6) T_rig: motion of axes of camera 0 by which the corners of all cameras move least."""
+    normal, right = np.zeros((6, 6)), np.zeros((6, housing.common + 6))
+    for number, camera in enumerate(housing.cameras):
+        places, sd = housing.places(number)
+        turn, shift = housing.sensors[number, :3, :3], housing.sensors[number, :3, 3]
+        for start in range(0, len(places), POINTS_TOGETHER):
+            part = slice(start, start + POINTS_TOGETHER)
+            images = imaged(camera, places[part])
+            by_point = images.by_point / sd[part, np.newaxis, np.newaxis]
+            turned = places[part] - shift  # R_s p
+            by_motion = (by_point @ turn @ motion_partials(turned @ turn)).reshape(-1, 6)
+            normal += by_motion.T @ by_motion
+            own = images.by_parameters / sd[part, np.newaxis, np.newaxis]
+            right[:, housing.parameters(number)] += by_motion.T @ own.reshape(len(by_motion), -1)
+            if number:
+                by_sensor = (by_point @ motion_partials(turned)).reshape(-1, 6)
+                right[:, housing.sensor(number)] += by_motion.T @ by_sensor
+    return _moved_back(normal, right, True)
+
+
+def _moved_back(normal: Floats, right: Floats, finite: bool) -> Floats:
+    """Return -N^-1 B; without translation where points are at infinity."""
+    found = np.zeros_like(right)
+    free = slice(0 if finite else 3, 6)
+    found[free] = -np.linalg.solve(normal[free, free], right[free])
+    return found
+
 
 TOGETHER = 2048
 """Pixels whose partials are in memory at a time."""
@@ -32,14 +120,8 @@ def projection_cofactors(
 ) -> Floats:
     """Return (n, 2, 2) cofactors of the images of points at (n, 2) pixels; NaN where a pixel sees nothing.
 
-    Parameters
-    ----------
-    housing, camera
-        The cameras, and the number of one.
-    pixels, distance
-        Where, and how far from the centre of this camera; infinite: directions.
-    rows
-        (6, c + 6) the datum (:func:`photogram.targets.datums.datum_rows`).
+    The distance is from the centre of this camera, infinite of directions; `rows` are (6, c + 6) the datum
+    (:func:`datum_rows`).
     """
     cofactors = with_motion(housing, camera, rows)
     found = np.empty((len(pixels), 2, 2))

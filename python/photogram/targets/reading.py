@@ -19,10 +19,10 @@ from photogram.targets.corner_views import Grouping, Measured, ViewBy, grouped
 from photogram.targets.corners import Corners
 from photogram.targets.detection import detected
 from photogram.targets.first_calibration import first_values
-from photogram.targets.knot_weights import with_knot_sd
 from photogram.targets.lens_fit import KNOTS
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz
+from photogram.targets.regularisation import with_knot_sd
 from photogram.targets.start import Regularisation, Synchronisation
 
 __all__ = ["read"]

@@ -1,6 +1,7 @@
-"""Priors of cameras as mrcal 2.2 has them: weak observations that lens terms are 0 and the centre is central.
+"""Priors of cameras: standard deviations of knots about zero, and the weak observations of mrcal 2.2.
 
-With n = 2 (corners of the board) (pictures), whatever is missing, and n_d lens terms of all cameras:
+These say that lens terms are 0 and the centre is central. With n = 2 (corners of the board) (pictures),
+whatever is missing, and n_d lens terms of all cameras:
 
     lambda p = 0,  lambda^2 = 0.0025 n / (4 n_d)         every lens term; 5 lambda for k4, k5, k6
     mu (cx - (w - 1)/2) = 0,  mu^2 = 0.0025 n / (2 K 500^2)       likewise cy; K cameras
@@ -22,8 +23,9 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
+from photogram.network.knots import KNOTTED
 
-__all__ = ["regularised"]
+__all__ = ["WEAK", "regularised", "with_knot_sd"]
 
 CORE = ("fx", "fy", "f", "cx", "cy")
 DENOMINATOR = ("k4", "k5", "k6")
@@ -37,19 +39,8 @@ def regularised(
 ) -> list[Camera]:
     """Return cameras with the priors of mrcal on what is free in them.
 
-    Parameters
-    ----------
-    cameras
-        The cameras.
-    sizes
-        Width and height of their pictures.
-    observed
-        n: two for each corner of the board and picture.
-
-    Raises
-    ------
-    InputError
-        A camera whose pictures have no known size.
+    Sizes are width and height of their pictures: an InputError of one that is not known. `observed` is n: two
+    for each corner of the board and picture.
     """
     terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
     count = sum(map(len, terms))
@@ -93,3 +84,29 @@ def _of_knots(camera: Camera, firm: float) -> Floats:
 
 def _free(camera: Camera, name: str) -> bool:
     return float(camera.deviations[camera.names.index(name)]) > 0
+
+
+WEAK = (1.0, 0.1)
+"""Along the radius and across, in units of the stereographic image: 1 is 53 degrees off the axis."""
+
+
+def with_knot_sd(
+    cameras: Sequence[Camera], knot_sd: tuple[float, float] | None, regularise: str | None
+) -> list[Camera]:
+    """Return cameras whose free knots are observed as zero, radially and tangentially.
+
+    Along the radius and across with `knot_sd`, by default `WEAK`, unless `regularise` says whose priors
+    cameras have. InputError: standard deviations of knots that there are not, or that are said twice; such
+    that are not positive.
+    """
+    if knot_sd is not None:
+        if not all(0 < each < np.inf for each in knot_sd):
+            raise InputError(f"knot_sd is two positive numbers, radial and tangential, not {knot_sd}")
+        if regularise is not None:
+            raise InputError(f"knot_sd: {regularise} has standard deviations of knots of its own")
+        if not any(each.model == KNOTTED for each in cameras):
+            raise InputError(f"knot_sd: {cameras[0].model} has no knots; {KNOTTED} has")
+    if regularise is not None:
+        return list(cameras)
+    own = WEAK if knot_sd is None else knot_sd
+    return [each.replace(knot_sd=own) if each.knot_unknowns else each for each in cameras]

@@ -11,9 +11,7 @@ from photogram.show.methods import report_of
 from photogram.show.quantity import Quantity
 from photogram.show.sections import Section, composed, headline
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.prior_shift import moved_lines
-from photogram.targets.splined import spline_lines
-from photogram.targets.tables import board_facts, views, worst_points
+from photogram.targets.tables import board_facts, moved_lines, spline_lines, views, worst_points
 
 __all__ = ["calibration_summary", "report"]
 

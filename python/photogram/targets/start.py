@@ -27,7 +27,7 @@ from photogram.targets.corners import Corners
 from photogram.targets.motion import NEAR, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.vision import FLIP, photo_poses
 
-__all__ = ["BOARD", "CLOCK", "Regularisation", "Start", "Synchronisation"]
+__all__ = ["CLOCK", "Regularisation", "Start", "Synchronisation"]
 
 Synchronisation = Literal["known", "none", "offset"]
 Regularisation = Literal["mrcal"]
@@ -186,8 +186,7 @@ class Start(Valued, Brief):
     @property
     def tied(self) -> Bools:
         """(K,) whether a camera is tied to another, its reference."""
-        found: Bools = np.asarray(self.references) != np.arange(len(self.cameras))
-        return found
+        return np.asarray(np.asarray(self.references) != np.arange(len(self.cameras)))
 
     def picture_poses(self) -> Floats:
         """Return (P, 4, 4) the pose of each picture: board -> its camera."""
@@ -198,8 +197,7 @@ class Start(Valued, Brief):
             steps = corners.times + late - dated(corners, self.tied)[corners.views]
             steps = np.where(self.tied[corners.cameras], steps, 0.0)
             poses = moved(poses, np.nan_to_num(np.asarray(self.motion))[corners.views], steps)
-        found: Floats = sensors[corners.cameras] @ poses
-        return found
+        return np.asarray(sensors[corners.cameras] @ poses)
 
     @property
     def shape(self) -> Shape:
@@ -236,15 +234,15 @@ class Start(Valued, Brief):
         corners, poses = self.corners, np.asarray(self.poses)
         frames, photo = self.frames()
         names = [*corners.pictures, *frames]
-        of_frames = poses[photo >= len(corners.pictures)]
-        centres, attitudes = photo_poses(np.concatenate([self.picture_poses(), of_frames]))
+        alone = photo >= len(corners.pictures)
+        centres, attitudes = photo_poses(np.concatenate([self.picture_poses(), poses[alone]]))
         use = corners.use
         return Block(
             photo_ids=names,
             photo_positions=centres,
             photo_attitudes=attitudes.values("omega_phi_kappa"),
             cameras=self.cameras if cameras is None else cameras,
-            photo_cameras=np.concatenate([corners.cameras, self._cameras_of_frames(photo)]),
+            photo_cameras=np.concatenate([corners.cameras, self.references_of_views()[alone]]),
             point_ids=self.board.names,
             point_positions=self.board.places if self.shape == "bend" else self.places(),
             point_sd=self.board.deviations(corners.view_count),
@@ -263,10 +261,6 @@ class Start(Valued, Brief):
         if self.shape != "bend":
             return []
         return [Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
-
-    def _cameras_of_frames(self, photo: Indices) -> Indices:
-        """Return the references of views that have no picture of them."""
-        return self.references_of_views()[photo >= len(self.corners.pictures)]
 
     def references_of_views(self) -> Indices:
         """Return (V,) the camera that the pose of each view is of."""

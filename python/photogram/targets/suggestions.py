@@ -14,16 +14,14 @@ from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.datums import datum_rows
 from photogram.targets.housing import Housing, transformed
 from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
-from photogram.targets.imaging import rays
 from photogram.targets.maps import image_grid
 from photogram.targets.new_views import Candidate, Suggestions, best_views, shown_of
 from photogram.targets.picture_parts import parts_of
-from photogram.targets.projection import common_partials, worst
+from photogram.targets.projection import common_partials, datum_rows, worst
 from photogram.targets.uncertainty import checked_distance
-from photogram.targets.vision import composed, inverted
+from photogram.targets.vision import composed, inverted, rays
 
 __all__ = ["GRID", "TILTS", "candidate_views", "suggest_views", "views_over_picture", "views_towards"]
 

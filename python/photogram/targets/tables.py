@@ -1,18 +1,38 @@
-"""Tables of a calibration, quantity by quantity: what text, page, JSON and CSV are written from."""
+"""Tables of a calibration, quantity by quantity: what text, page, JSON and CSV are written from.
+
+Of splined lenses what is to be said of knots that hang on their priors, and of pixels beyond the knots.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.knots import Knot, beyond_knots
+from photogram.network.observations.unknowns import Prior
 from photogram.show.page import Fact, Tone, significant
 from photogram.show.quantity import Axis, Quantity
-from photogram.targets.board_fit import STRETCHES, board_fit
 from photogram.targets.calibration_result import Calibrated
+from photogram.targets.lens_fit import field_of, grid_of_pixels
+from photogram.targets.vision import TURNED
 
-__all__ = ["board_facts", "view_rms", "views", "worst_points"]
+__all__ = [
+    "board_facts",
+    "board_fit",
+    "moved_lines",
+    "prior_shift",
+    "spline_lines",
+    "splines",
+    "view_rms",
+    "views",
+    "worst_points",
+]
 
 LISTED = 10
 """Points of the board that a report names at most: those that fit worst."""
@@ -33,36 +53,21 @@ def views(calibrated: Calibrated) -> list[Quantity]:
     largest = np.zeros(count)
     np.maximum.at(largest, view, np.nan_to_num(np.abs(result.standardized)).max(axis=1, initial=0.0))
     left_out = np.bincount(of_picture[corners.picture[~use]], minlength=count)
+    names = np.array(corners.view_names(), dtype=object)
     return [
-        Quantity(
-            np.array(corners.view_names(), dtype=object),
-            (),
-            "name",
-            "view",
-            "name",
-            "first picture of the view",
-            head="View",
-        ),
-        Quantity(
-            np.bincount(of_picture, minlength=count), (), "number", "pictures", "pictures", head="Pictures"
-        ),
-        Quantity(used, (), "number", "corners", "corners", head="Corners"),
-        Quantity(left_out, (), "number", "left_out", "left_out", head="Left out"),
-        Quantity(rms, _PIXELS, "value", "rms_px", "rms_px", head="rms"),
-        Quantity(
-            _sums(view, result.redundancy, count), (), "number", "redundancy", "redundancy", head="Redundancy"
-        ),
-        Quantity(_sums(view, weighted, count), (), "number", "chi2", "chi2", head="chi²", figures=4),
-        Quantity(
-            largest,
-            (),
-            "number",
-            "largest_standardized",
-            "largest_standardized",
-            head="Largest standardized",
-            marked=largest > NOTABLE,
-        ),
+        Quantity(names, (), "name", "view", "name", "first picture of the view", head="View"),
+        _of_views("pictures", np.bincount(of_picture, minlength=count), "Pictures"),
+        _of_views("corners", used, "Corners"),
+        _of_views("left_out", left_out, "Left out"),
+        _of_views("rms_px", rms, "rms", axes=_PIXELS, kind="value"),
+        _of_views("redundancy", _sums(view, result.redundancy, count), "Redundancy"),
+        _of_views("chi2", _sums(view, weighted, count), "chi²", figures=4),
+        _of_views("largest_standardized", largest, "Largest standardized", marked=largest > NOTABLE),
     ]
+
+
+def _of_views(name: str, values: Floats | Indices, head: str, **how: Any) -> Quantity:
+    return Quantity(values, name=name, member=name, head=head, **how)
 
 
 def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:
@@ -73,8 +78,7 @@ def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:
 
 def _sums(view: Indices, values: Floats, count: int) -> Floats:
     """Return the sums of (m, 2) values over the corners of each view."""
-    found: Floats = np.bincount(view, weights=values.sum(axis=1), minlength=count).astype(float)
-    return found
+    return np.asarray(np.bincount(view, weights=values.sum(axis=1), minlength=count).astype(float))
 
 
 def board_facts(calibrated: Calibrated) -> list[Fact]:
@@ -127,3 +131,209 @@ def _told(calibrated: Calibrated, row: int, tests: Floats) -> str:
     apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in zip("xyz", off, strict=True))
     name, much = result.block.point_ids[row], f"{tests.max():.1f} standard deviations"
     return f"point {name}: {apart} {unit} off its place, {much}"
+
+
+STRETCHES = ("scale x", "scale y", "shear")
+"""The affine part of the spacing."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoardFit:
+    """The adjusted points of a board against their nominal places.
+
+    Attributes
+    ----------
+    plane
+        (3,) a, b, c of z = a + b x + c y, fitted to the adjusted points.
+    rms_out_of_plane
+        Of z about it, in the unit of the board.
+    stretch, sd
+        (3,) in ppm, with standard deviations: by how much the spacing along x and along y is longer than it
+        should be, and the sine of what the angle between columns and rows lacks of 90 degrees.
+    """
+
+    plane: Floats
+    rms_out_of_plane: float
+    stretch: Floats
+    sd: Floats
+
+
+def board_fit(calibrated: Calibrated) -> BoardFit | None:
+    """Return what was found of the board; None where its points were held, or fewer than four were seen.
+
+    The adjusted places are fitted to the nominal ones, (x, y) = t + M (X, Y), all points alike. With columns
+    m, n of M the stretches are |m| - 1, |n| - 1 and m'n.
+    """
+    result, board = calibrated.result, calibrated.calibration.board
+    seen = np.flatnonzero(result.used_points)
+    if calibrated.calibration.shape != "points" or len(seen) < 4:
+        return None
+    nominal, found = board.places[seen], result.point_positions[seen]
+    design = np.column_stack([np.ones(len(seen)), nominal[:, :2]])
+    solve = np.linalg.pinv(design)
+    plane = solve @ found[:, 2]
+    away = found[:, 2] - design @ plane
+    fitted = (solve @ found[:, :2])[1:]  # rows m and n
+    lengths = np.linalg.norm(fitted, axis=1)
+    stretch = np.array([*(lengths - 1), fitted[0] @ fitted[1]])
+    # Partials of |m|, |n| and m'n by m and n, which are linear in the points.
+    units = fitted / lengths[:, np.newaxis]
+    by_rows = np.zeros((3, 2, 2))
+    by_rows[0, 0], by_rows[1, 1] = units
+    by_rows[2] = fitted[::-1]
+    by_points = np.einsum("rij,in->rnj", by_rows, solve[1:])
+    partials = np.concatenate([by_points, np.zeros((3, len(seen), 1))], axis=2).reshape(3, -1)
+    covariance = result.covariance(("point", [result.block.point_ids[row] for row in seen.tolist()]))
+    sd = np.sqrt(np.einsum("ri,ij,rj->r", partials, covariance, partials))
+    return BoardFit(plane, float(np.sqrt(np.mean(away**2))), 1e6 * stretch, 1e6 * sd)
+
+
+MOVED = 0.2
+"""Of a standard deviation: what moves less is no matter."""
+
+
+def prior_shift(calibrated: Calibrated) -> list[Quantity]:
+    """Return how far priors moved each unknown parameter, and that over its sd; nothing without priors.
+
+    The adjustment without the priors is where the one with them began.
+    """
+    before = calibrated.unregularised
+    if before is None:
+        return []
+    names, changes, axes = list[str](), list[float](), list[Axis]()
+    of_sd = list[float]()
+    for own, free in zip(calibrated.cameras, before.cameras, strict=True):
+        for k in own.estimated:
+            names.append(f"{own.name} {own.names[k]}")
+            axes.append(Axis.of(own.names[k], own.camera.unit_of(own.names[k])))
+            changes.append(float(own.values[k] - free.values[k]))
+            of_sd.append(changes[-1] / float(own.sd[k]))
+    return [
+        Quantity(np.array(names, dtype=object), (), "name", "parameter", "parameter", head="Parameter"),
+        Quantity(
+            np.array(changes), tuple(axes), "value", None, "change", head="Moved", of=np.arange(len(names))
+        ),
+        Quantity(np.array(of_sd), (), "number", None, "over_sd", head="Over its sd"),
+    ]
+
+
+def moved_lines(calibrated: Calibrated) -> list[str]:
+    """Return the largest of it in a line for each parameter that moved by more than a fifth of its sd."""
+    table = prior_shift(calibrated)
+    if not table:
+        return []
+    names, changes, of_sd = (each.values for each in table)
+    largest = int(np.argmax(np.abs(of_sd)))
+    lines = [f"largest: {names[largest]} by {of_sd[largest]:+.2f} of its standard deviation"]
+    return lines + [
+        f"{name} moved by {change:+.3g}, {over:+.2f} of its standard deviation"
+        for name, change, over in zip(names, changes, of_sd, strict=True)
+        if abs(over) > MOVED
+    ]
+
+
+HANGS = 0.05
+"""Redundancy of a prior below which what it is of comes from it."""
+
+
+@dataclass(frozen=True)
+class Spline:
+    """What is to be said of the knots of a splined lens.
+
+    Attributes
+    ----------
+    camera
+        Its name.
+    knots
+        How many are unknown.
+    from_prior, untouched
+        Of these, how many come from their prior, and how many no image touches.
+    beyond
+        The share of the picture beyond the knots; None where its size is not known.
+    fov_x_deg
+        With which no pixel would be beyond; None where none is.
+    """
+
+    camera: str
+    knots: int
+    from_prior: int
+    untouched: int
+    beyond: float | None
+    fov_x_deg: int | None
+
+    @property
+    def lines(self) -> list[str]:
+        """The same in sentences."""
+        found = [
+            f"{self.camera}: {self.from_prior} of {self.knots} knots are from their prior (redundancy below"
+            f" {HANGS:g}); {self.untouched} of them no image touches"
+            if self.knots
+            else f"{self.camera}: its knots are held"
+        ]
+        if self.fov_x_deg is not None:
+            found.append(
+                f"{self.camera}: {self.beyond:.1%} of the picture is beyond its knots, where nothing is said"
+                f" of its uncertainty; fov_x_deg = {self.fov_x_deg} would do"
+            )
+        elif self.beyond is not None:
+            found.append(f"{self.camera}: the whole picture is within its knots")
+        return found
+
+
+def splines(calibrated: Calibrated) -> list[Spline]:
+    """Return what is to be said of each splined lens."""
+    found = []
+    for number, each in enumerate(calibrated.cameras):
+        if each.camera.knots is None:
+            continue
+        knots = len(each.given.knot_unknowns)
+        untouched = knots - _touched(calibrated, number) if knots else 0
+        hang = _from_prior(calibrated, number)
+        found.append(Spline(each.name, knots, hang, untouched, *_beyond(calibrated, number)))
+    return found
+
+
+def spline_lines(calibrated: Calibrated) -> list[str]:
+    """Return sentences on the knots of each splined lens."""
+    return [line for each in splines(calibrated) for line in each.lines]
+
+
+def _from_prior(calibrated: Calibrated, number: int) -> int:
+    """Return how many knots of a camera come from their priors."""
+    of_knots = {id(each) for each in calibrated.cameras[number].given.knot_unknowns}
+    hang = 0
+    block = calibrated.result.block
+    for kind in calibrated.result.kinds.values():
+        for row, own in zip(kind.rows.tolist(), kind.redundancy, strict=True):
+            observation = block.observations[row]
+            if not (isinstance(observation, Prior) and isinstance(observation.unknown, Knot)):
+                continue
+            if id(observation.unknown) in of_knots:
+                hang += bool(np.nansum(own) / 2 < HANGS)
+    return hang
+
+
+def _touched(calibrated: Calibrated, number: int) -> int:
+    """Return how many knots of a camera the image of a corner touches."""
+    camera = calibrated.cameras[number].camera
+    corners = calibrated.calibration.corners
+    poses = calibrated.picture_poses[corners.picture]
+    own = corners.use & (corners.cameras[corners.picture] == number)
+    points = calibrated.points[corners.point[own]]
+    seen = np.einsum("nij,nj->ni", poses[own, :3, :3], points) + poses[own, :3, 3]
+    patches, _ = _photocore.camera_patches(camera.model, camera.values, seen * TURNED)
+    return len(np.unique(patches))
+
+
+def _beyond(calibrated: Calibrated, number: int) -> tuple[float | None, int | None]:
+    """Return which share of the picture lies beyond the knots, and the field that would do."""
+    size = calibrated.calibration.corners.sizes[number]
+    if size is None:
+        return None, None
+    camera = calibrated.cameras[number].camera
+    rays = camera.rays(grid_of_pixels(size))
+    share = float(beyond_knots(camera.parameters, rays).mean())
+    if not share:
+        return share, None
+    count = (int(camera.parameters["nx"]), int(camera.parameters["ny"]))
+    return share, math.ceil(field_of(rays, count, camera.parameters["order"]))

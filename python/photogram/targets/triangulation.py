@@ -12,15 +12,24 @@ have in common: no mean of many points is free of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from photogram.arguments.annotations import check_arguments
+from photogram.arguments.arrays import length, shaped
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.targets.housing import Housing
-from photogram.targets.imaging import imaged, motion_partials, rays
+from photogram.targets.calibration_result import Calibrated
+from photogram.targets.housing import Housing, transformed
+from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
+from photogram.targets.maps import image_grid
+from photogram.targets.projection import housing_rows
+from photogram.targets.vision import imaged, motion_partials, rays
 
-__all__ = ["Triangulated", "triangulated"]
+__all__ = ["Triangulated", "distance_uncertainty", "triangulate", "triangulated"]
 
 STEPS = 30
 CLOSE = 1e-12
@@ -74,20 +83,11 @@ class Triangulated:
 def triangulated(
     housing: Housing, cameras: Sequence[int], pixels: Floats, pixel_sd: float, still: Floats | None = None
 ) -> Triangulated:
-    """Return points by their images in k cameras.
+    """Return points by their (n, k, 2) images in k cameras of a housing, 2 or more, by their numbers.
 
-    Parameters
-    ----------
-    housing, cameras
-        The cameras, and the numbers of k of them, 2 or more.
-    pixels
-        (n, k, 2) images of n points.
-    pixel_sd
-        Standard deviation of an image coordinate, pixels.
-    still
-        (6, c + 6) the motion of the axes of camera 0 that goes with the unknowns
-        (:func:`photogram.targets.datums.housing_rows`), where points are fixed to the housing; None: they are
-        in the axes of camera 0 themselves.
+    `pixel_sd` is that of an image coordinate. Where points are fixed to the housing, `still` is (6, c + 6)
+    the motion of the axes of camera 0 that goes with the unknowns
+    (:func:`~photogram.targets.projection.housing_rows`); None: they are in the axes of camera 0 themselves.
     """
     points = _settled(housing, cameras, pixels, _met(housing, cameras, pixels))
     residuals, by_point, by_common = _rows(housing, cameras, pixels, points)
@@ -127,32 +127,20 @@ def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: F
             moved = np.linalg.norm(step, axis=1) / np.linalg.norm(points, axis=1)
         if not (moved > CLOSE).any():
             break
-    found: Floats = np.where((moved <= 1e3 * CLOSE)[:, np.newaxis], points, np.nan)
-    return found
+    return np.asarray(np.where((moved <= 1e3 * CLOSE)[:, np.newaxis], points, np.nan))
 
 
 def _rows(
     housing: Housing, cameras: Sequence[int], pixels: Floats, points: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return (n, 2 k) observed less computed, and partials by points (n, 2 k, 3) and unknowns (n, 2 k, c)."""
-    count = len(points)
-    residuals = np.empty((count, len(cameras), 2))
-    by_point = np.empty((count, len(cameras), 2, 3))
-    by_common = np.zeros((count, len(cameras), 2, housing.common))
-    for number, camera in enumerate(cameras):
-        turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
-        turned = points @ turn.T
-        images = imaged(housing.cameras[camera], turned + shift)
-        residuals[:, number] = pixels[:, number] - images.xy
-        by_point[:, number] = images.by_point @ turn
-        by_common[:, number, :, housing.parameters(camera)] = images.by_parameters
-        if camera:
-            by_common[:, number, :, housing.sensor(camera)] = images.by_point @ motion_partials(turned)
-    rows = 2 * len(cameras)
+    parts = [housing.linearized(camera, points) for camera in cameras]
+    xy, by_point, by_common = (np.stack(each, axis=1) for each in zip(*parts, strict=True))
+    shape = len(points), 2 * len(cameras)
     return (
-        residuals.reshape(count, rows),
-        by_point.reshape(count, rows, 3),
-        by_common.reshape(count, rows, housing.common),
+        (pixels - xy).reshape(shape),
+        by_point.reshape(*shape, 3),
+        by_common.reshape(*shape, housing.common),
     )
 
 
@@ -168,3 +156,101 @@ def _inverted(matrices: Floats) -> Floats:
     found = np.full_like(matrices, np.nan)
     found[rows] = np.linalg.inv(matrices[rows])
     return found
+
+
+Axes = Literal["axes", "corners"]
+
+
+def triangulate(
+    result: Calibrated, cameras: Sequence[int | str], pixels: ArrayLike, pixel_sd: float, datum: Axes = "axes"
+) -> Triangulated:
+    """Return points by their images in cameras of a rig, with both parts of their covariance.
+
+    Parameters
+    ----------
+    result, cameras
+        The adjusted calibration of a rig, and k of its cameras: numbers or names.
+    pixels
+        (n, k, 2) images of n points, from 0 at the centre of the first pixel.
+    pixel_sd
+        Standard deviation of an image coordinate, pixels.
+    datum
+        `axes`: points are in the axes of camera 0 of the rig, which distances do not depend on. `corners`:
+        they are fixed to the housing, as the corners of all cameras hold it.
+
+    Raises
+    ------
+    InputError
+        Cameras that are not on a rig, fewer than two, one twice; other shapes.
+    """
+    housing, numbers = _of_rig(result, cameras)
+    where = shaped("pixels", pixels, (length("pixels", pixels), len(numbers), 2))
+    if not 0 < pixel_sd < np.inf:
+        raise InputError(f"the standard deviation of pixels is a positive number, not {pixel_sd:g}")
+    still = housing_rows(housing) if datum == "corners" else None
+    return triangulated(housing, numbers, where, pixel_sd, still)
+
+
+def distance_uncertainty(
+    result: Calibrated,
+    cameras: Sequence[int | str],
+    depth: float,
+    pixel_sd: float,
+    grid: tuple[int, int] = (30, 20),
+) -> tuple[Floats, Triangulated]:
+    """Return how uncertain distances are over the picture of the first camera, at a depth along its axis.
+
+    Parameters
+    ----------
+    result, cameras, pixel_sd
+        As of :func:`triangulate`.
+    depth
+        Of the points along the axis of the first camera, in the unit of the board.
+    grid
+        Pixels across and down.
+
+    Returns
+    -------
+    (n, 2) pixels of the first camera that all others see, too, and the points.
+
+    Raises
+    ------
+    InputError
+        As of :func:`triangulate`; pictures whose size nobody knows, a depth that is not positive.
+    """
+    if not 0 < depth < np.inf:
+        raise InputError(f"a depth is a positive number, not {depth:g}")
+    housing, numbers = _of_rig(result, cameras)
+    sizes = [size_of(result, camera_number(result, each)) for each in cameras]
+    pixels = image_grid(sizes[0], grid)[2]
+    looking = rays(housing.cameras[numbers[0]], pixels)
+    ahead = looking[:, 2] > 0
+    points = looking[ahead] * (depth / looking[ahead, 2:])
+    images = _images(housing, numbers, points)
+    with np.errstate(invalid="ignore"):
+        seen = ((images >= 0) & (images <= np.array(sizes) - 1)).all(axis=(1, 2))
+    return pixels[ahead][seen], triangulated(housing, numbers, images[seen], pixel_sd)
+
+
+def _images(housing: Housing, cameras: Sequence[int], points: Floats) -> Floats:
+    """Return (n, k, 2) images of points in the axes of the first of k cameras."""
+    to_first = np.linalg.inv(housing.sensors[cameras[0]])
+    found = [
+        imaged(housing.cameras[each], transformed(housing.sensors[each] @ to_first, points)).xy
+        for each in cameras[1:]
+    ]
+    return np.stack([imaged(housing.cameras[cameras[0]], points).xy, *found], axis=1)
+
+
+def _of_rig(result: Calibrated, cameras: Sequence[int | str]) -> tuple[Housing, list[int]]:
+    """Return the housing of some cameras, and their numbers in it."""
+    numbers = [camera_number(result, each) for each in cameras]
+    if len(numbers) < 2 or len(set(numbers)) < len(numbers):
+        raise InputError("points are triangulated by two cameras or more, each of them once")
+    housed = housed_with(result, numbers[0])
+    if not set(numbers) <= set(housed):
+        raise InputError("points are triangulated by cameras that are tied to each other: these are not")
+    return housing_of(result, numbers[0])[0], [housed.index(each) for each in numbers]
+
+
+check_arguments(globals(), ["distance_uncertainty", "triangulate"])

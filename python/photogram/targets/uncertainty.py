@@ -1,4 +1,4 @@
-"""How uncertain a calibrated camera is: at pixels, over its picture, against distance."""
+"""How uncertain a calibrated camera is: at pixels, over its picture, against distance; how two differ."""
 
 from __future__ import annotations
 
@@ -8,19 +8,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import length, shaped
+from photogram.arguments.arrays import length, shaped, shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.network.cameras import Camera
 from photogram.network.knots import beyond_knots
+from photogram.targets.calibration_difference import CameraDifference, Side, compared
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.datums import DatumName, datum_rows
 from photogram.targets.housing import Housing
 from photogram.targets.housings import camera_number, housing_of, size_of
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
-from photogram.targets.motion_fit import points_at
-from photogram.targets.projection import projection_cofactors, worst
+from photogram.targets.motion_fit import Criterion, points_at
+from photogram.targets.projection import DatumName, datum_rows, projection_cofactors, worst
 
-__all__ = ["checked_distance", "projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"]
+__all__ = [
+    "checked_distance",
+    "difference",
+    "projection_uncertainty",
+    "uncertainty_against_distance",
+    "uncertainty_map",
+]
 
 IMAGE = (60, 40)
 """Rays of the whole picture that hold still in the datum `image`."""
@@ -63,7 +70,9 @@ def projection_uncertainty(
     """
     where = shaped("pixels", pixels, (length("pixels", pixels), 2))
     number = camera_number(result, camera)
-    housing, own = _with(result, number, noise_only)
+    housing, own = housing_of(result, number)
+    if noise_only:
+        housing = housing.noise_only()
     rows = _rows(result, number, housing, own, datum, checked_distance(distance))
     found = housing.variance * projection_cofactors(housing, own, where, distance, rows)
     seen = result.cameras[number].camera
@@ -162,21 +171,10 @@ def uncertainty_against_distance(
 
 
 def checked_distance(distance: float) -> float:
-    """Return a distance.
-
-    Raises
-    ------
-    InputError
-        It is not positive.
-    """
+    """Return a distance; an InputError where it is not positive."""
     if not distance > 0:
         raise InputError(f"a distance from the camera is positive, or infinite, not {distance:g}")
     return float(distance)
-
-
-def _with(result: Calibrated, camera: int, noise_only: bool) -> tuple[Housing, int]:
-    housing, own = housing_of(result, camera)
-    return (housing.noise_only() if noise_only else housing), own
 
 
 def _rows(
@@ -191,4 +189,82 @@ def _rows(
     return datum_rows(housing, own, datum, (points, equal, bool(np.isfinite(distance))))
 
 
-check_arguments(globals(), ["projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"])
+def difference(
+    a: Calibrated | Camera,
+    b: Calibrated | Camera,
+    distance: float | Sequence[float] = np.inf,
+    *,
+    camera: int | str = 0,
+    size: tuple[int, int] | None = None,
+    criterion: Criterion = "pixels",
+    radius: float | None = None,
+    grid: tuple[int, int] = (60, 40),
+) -> CameraDifference:
+    """Compare two calibrations: where they image the same points, the motion of their axes out.
+
+    Parameters
+    ----------
+    a, b
+        Adjusted calibrations, or cameras alone, of which no uncertainty is known.
+    distance
+        At which they are compared, one or several, from the centre of camera a in the unit of its board.
+        Infinite: only a rotation lies between them. One finite distance leaves the translation arbitrary.
+    camera
+        Which camera of calibrations: number or name.
+    size
+        Width and height of the pictures of a; None: as its calibration says.
+    criterion
+        `pixels`: least squares of the differences, weighted by the uncertainties where both are known.
+        `mrcal`: least fourth powers of angles between rays.
+    radius
+        Pixels about the middle of the picture that the motion is fitted to; None: all, weighted, or a sixth
+        of the shorter side where uncertainties are not known.
+    grid
+        Pixels across and down.
+
+    Raises
+    ------
+    InputError
+        Neither a calibration nor a camera, a size that nobody knows, a distance that is not positive,
+        cameras that see too little in common.
+    """
+    distances = [distance] if isinstance(distance, float | int) else list(distance)
+    if not distances:
+        raise InputError("two calibrations are compared at a distance: none is given")
+    if size is None:
+        if not isinstance(a, Calibrated):
+            raise InputError("two cameras are compared over a picture: give its size")
+        size = size_of(a, camera_number(a, camera))
+    unit = next((each.calibration.board.unit for each in (a, b) if isinstance(each, Calibrated)), "m")
+    return compared(
+        _side(a, camera, "a"),
+        _side(b, camera, "b"),
+        size,
+        tuple(checked_distance(each) for each in distances),
+        unit=unit,
+        criterion=criterion,
+        radius=radius,
+        grid=grid,
+    )
+
+
+def _side(given: object, camera: int | str, name: str) -> Side:
+    if isinstance(given, Camera):
+        return Side(given.name or name, given)
+    if not isinstance(given, Calibrated):
+        raise InputError(f"{name} is neither a calibration that was adjusted nor a camera: {shown(given)}")
+    number = camera_number(given, camera)
+    housing, own = housing_of(given, number)
+    columns = housing.parameters(own)
+    return Side(
+        name=f"{given.cameras[number].name} of {name}",
+        camera=housing.cameras[own],
+        corners=housing.seen.xy[housing.seen.cameras == own],
+        covariance=housing.variance * housing.cofactors[columns, columns],
+        rows=datum_rows(housing, own, "corners")[:, columns],
+    )
+
+
+check_arguments(
+    globals(), ["difference", "projection_uncertainty", "uncertainty_against_distance", "uncertainty_map"]
+)

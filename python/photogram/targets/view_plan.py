@@ -13,20 +13,18 @@ from photogram.arguments.arrays import whole_number
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.network.cameras import Camera
-from photogram.targets.adjusting import weighted_block
 from photogram.targets.appraisal import median_distance
-from photogram.targets.appraisal_report import Worth
 from photogram.targets.board import Board
-from photogram.targets.calibration import Calibration
-from photogram.targets.calibration_result import Calibrated
+from photogram.targets.calibration import Calibration, weighted_block
+from photogram.targets.calibration_result import Calibrated, Worth
 from photogram.targets.corners import Corners
+from photogram.targets.first_calibration import weakly_known
 from photogram.targets.housing import transformed
-from photogram.targets.imaging import rays
 from photogram.targets.new_views import Candidate, shown_of
-from photogram.targets.nominal import weakly_known
 from photogram.targets.suggestions import GRID, TILTS, suggest_views, views_over_picture, views_towards
 from photogram.targets.uncertainty import checked_distance, uncertainty_map
 from photogram.targets.view_plan_result import PlannedView, ViewPlan
+from photogram.targets.vision import rays
 
 __all__ = ["plan_views"]
 

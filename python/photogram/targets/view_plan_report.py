@@ -18,9 +18,9 @@ from photogram.show.page import Drawing, Judgement, Layers, Page, Section, Tone
 from photogram.show.quantity import Axis, Quantity, frame, records
 from photogram.show.sections import Section as Lines
 from photogram.show.sections import composed, headline
-from photogram.targets.appraisal_files import worth_files, worth_members
-from photogram.targets.appraisal_page import drawings, worth_facts
+from photogram.targets.document import worth_files, worth_members
 from photogram.targets.maps import distance_text
+from photogram.targets.page import drawings, worth_facts
 from photogram.targets.plan_drawing import draw_planned_views
 from photogram.targets.view_plan_result import ViewPlan
 

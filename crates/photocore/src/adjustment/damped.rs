@@ -1,9 +1,8 @@
-//! Gauss-Newton with step control: full steps, damped where they fail.
+//! Full steps: with step control, damped where they fail, or whatever becomes of the sum of squares, as published programs took them.
 
 use std::ops::ControlFlow;
 
-use super::method::{self, NEGLIGIBLE, Stop};
-use super::options::{Iteration, Status};
+use super::options::{self, Iteration, NEGLIGIBLE, Published, Status, Stop};
 use super::result::AdjustError;
 use super::run::{End, NEAR, Run, State};
 
@@ -251,7 +250,7 @@ impl<'a> Run<'a, '_> {
     /// Goes on in a trust region, to its end. It has converged where a full step from there is short, which damping may hide, or where the
     /// sum of squares has crept to rest along a combination that is named.
     fn handed_over(&mut self, unknowns: Vec<f64>, stop: Stop) -> Result<End<'a>, AdjustError> {
-        let state = self.form(unknowns, method::FIRST_DAMPING)?;
+        let state = self.form(unknowns, options::FIRST_DAMPING)?;
         let end = self.in_trust_region(state, stop)?;
         if end.status != Status::Converged || !self.weak.is_empty() {
             return Ok(end);
@@ -362,5 +361,44 @@ impl<'a> Run<'a, '_> {
         self.curved = false;
         let state = self.form(values, 0.0)?;
         self.stay(state, Status::Converged)
+    }
+}
+
+impl<'a> Run<'a, '_> {
+    /// Full steps, whatever becomes of the sum of squares.
+    pub(super) fn full_steps(&mut self, start: State<'a>, rule: Published) -> Result<End<'a>, AdjustError> {
+        let mut state = start;
+        let mut previous: Option<f64> = None;
+        for number in 1..=self.options.max_iterations {
+            let Some(step) = self.step(&state)? else {
+                return Ok(End::at(Status::Diverged, state.recycle()));
+            };
+            let largest_change = state.linearized.change();
+            let mut iteration = Iteration { number, sum_of_squares: f64::NAN, largest_change, damping: 0.0 };
+            if let Published::Length { first, count, limit } = rule {
+                let length = step[first..first + count].iter().map(|dx| dx * dx).sum::<f64>().sqrt();
+                if length < limit || number == self.options.max_iterations {
+                    let status = if length < limit { Status::Converged } else { Status::NotConverged };
+                    return Ok(End::after(status, state, step, iteration));
+                }
+            }
+            let next = self.form(self.problem.advanced(state.values(), &step), 0.0)?;
+            let sum = next.linearized.sum_of_squares;
+            if !sum.is_finite() {
+                return Ok(End::with(Status::Diverged, state));
+            }
+            iteration.sum_of_squares = sum;
+            self.accept(iteration, state.values(), next.values())?;
+            state.recycle();
+            state = next;
+            if let Published::Percent(percent) = rule {
+                match previous.map(|before| (sum - before) / before * 100.0) {
+                    Some(change) if change.abs() < percent => return self.stay(state, Status::Converged),
+                    Some(change) if change >= percent => return self.stay(state, Status::Diverged),
+                    _ => previous = Some(sum),
+                }
+            }
+        }
+        self.stay(state, Status::NotConverged)
     }
 }

@@ -1,11 +1,12 @@
 //! The observation equations of a problem at given values of the unknowns, in unit weight.
+//!
+//! What a step does to the observations of one group.
 
-use super::group_step::GroupStep;
 use super::loss::Reweighting;
 use super::problem::{AnyProblem, Evaluated};
 use super::walk::Buffers;
 use crate::Threads;
-use crate::normals::{Contribution, Equations, GroupRows, Prior, TieRows, dot};
+use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, TieRows, dot};
 
 /// The equations of a problem at given values of the unknowns: weighted to unit weight, by a loss besides, without fixed unknowns.
 pub(super) struct ObservationEquations<'a> {
@@ -269,5 +270,28 @@ fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
     let width = part.len() / rows;
     for (column, _) in fixed.enumerate().filter(|&(_, fixed)| fixed) {
         (0..rows).for_each(|row| part[row * width + column] = 0.0);
+    }
+}
+
+/// What a step does to the unknowns of one group.
+pub(super) struct GroupStep<'s> {
+    pub local: &'s [f64],
+    pub retained: &'s [f64],
+    pub shared: Vec<f64>,
+}
+
+impl<'s> GroupStep<'s> {
+    pub fn of(step: &'s [f64], layout: &Layout, local: usize, group: usize) -> Self {
+        Self {
+            local: &step[layout.local_range(local)],
+            retained: &step[layout.retained_range(layout.retained_of(group))],
+            shared: layout.shared_columns(group).map(|unknown| step[unknown]).collect(),
+        }
+    }
+
+    /// By how much it changes a row of the group: A v.
+    pub fn change(&self, rows: &GroupRows<'_>, row: usize) -> f64 {
+        let part = |values: &[f64], step: &[f64]| dot(&values[row * step.len()..][..step.len()], step);
+        part(rows.local, self.local) + part(rows.retained, self.retained) + part(rows.shared, &self.shared)
     }
 }

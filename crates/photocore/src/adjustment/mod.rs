@@ -59,22 +59,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod acceleration;
-mod chord;
 mod corrected;
 mod damped;
 mod datum;
 mod distributions;
 mod ended;
 mod equations;
-mod group_step;
 mod group_test;
-mod history;
-mod in_datum;
 mod leverages;
 mod linearized;
 mod loss;
-mod method;
 mod motions;
 mod noncentral;
 mod observation_rows;
@@ -82,8 +76,6 @@ mod options;
 mod part;
 mod problem;
 mod projection;
-mod published;
-mod resistance;
 mod result;
 mod run;
 mod secants;
@@ -102,19 +94,17 @@ pub use distributions::{
     student_limit,
 };
 pub use group_test::{Few, GroupTest, VISIBLE, canonical_correlation};
-pub use history::History;
 pub use leverages::{Leverages, TieCofactors};
 pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;
-pub use method::{Method, Published, Stop};
+pub use motions::Classes;
 pub use noncentral::{
     detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
 };
 pub use observation_rows::ObservationRows;
-pub use options::{Event, Iteration, Options, Phase, Status};
+pub use options::{Event, History, Iteration, Method, Options, Phase, Published, Status, Stop};
 pub use part::{PartError, PartOptions};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
-pub use resistance::Classes;
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
 pub(crate) use run::go_on;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use thiserror::Error;
 
-use super::method::NEGLIGIBLE;
+use super::options::NEGLIGIBLE;
 use super::options::{Iteration, Status};
 use super::statistics::{Counts, Observed, standardized};
 use crate::Stopped;

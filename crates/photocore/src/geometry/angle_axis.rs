@@ -124,12 +124,7 @@ pub fn right_jacobian_inverse(r: &Vector3) -> Matrix3 {
     Matrix3::identity() + 0.5 * skew + second * skew * skew
 }
 
-/// Jr, the right Jacobian: Exp(r + dr) = Exp(r) Exp(Jr dr) to first order.
-pub fn right_jacobian(r: &Vector3) -> Matrix3 {
-    angle_axis_with_jacobian(r).1.transpose()
-}
-
-/// How [`right_jacobian`] changes where r changes by r' in a second.
+/// How Jr, the right Jacobian, Exp(r + dr) = Exp(r) Exp(Jr dr) to first order, changes where r changes by r' in a second.
 pub fn right_jacobian_rate(r: &Vector3, rate: &Vector3) -> Matrix3 {
     let square = r.norm_squared();
     let (_, versine, rest) = ratios(square);

@@ -51,7 +51,6 @@ pub mod commons;
 mod composed;
 mod covariance;
 mod datum;
-mod effects;
 mod error;
 mod evaluated;
 pub mod film;

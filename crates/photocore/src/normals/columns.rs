@@ -1,14 +1,16 @@
 //! Right-hand sides that go through a system in parts: up, reduced by what each part eliminates, and down again as solutions.
+//!
+//! The solution with an older factor for the right-hand sides that the equations have elsewhere.
 
 use std::ops::ControlFlow;
 
-use super::eliminated::Elimination;
-use super::equations::{Equations, Prior};
+use super::eliminated::{Elimination, Reduced};
+use super::equations::{Equations, Prior, TieRows};
 use super::factor::Factor;
 use super::system::System;
-use super::vectorised::LANES;
-use super::watch::{Between, watched};
-use crate::{Stopped, Threads};
+use super::vectorised::{LANES, dot};
+use super::watch::{Between, Control, watched};
+use crate::{Stopped, Threads, parallel};
 
 /// Right-hand sides of a part, reduced by the unknowns that it eliminates, C at a time: y = L^-1 r.
 #[derive(Debug)]
@@ -104,5 +106,96 @@ impl Elimination<'_> {
         }
         (0..all - outer).for_each(|row| add(&|k| reduced.others[k * all + row]));
         sums
+    }
+}
+
+impl System {
+    /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
+    /// that the factor comes from: a chord step; and by how much it lowers the sum of squares of the equations there.
+    ///
+    /// For a whole system, and a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]).
+    pub fn chord(
+        &self,
+        threads: &Threads,
+        factor: &Factor,
+        of: (&dyn Equations, &Prior),
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, (Vec<f64>, f64)> {
+        let reduced = self.reduce_chord(threads, factor, of, &of.1.right, &mut *between)?;
+        let decrease = reduced.products[0];
+        let step = self.solve_reduced_rights(threads, factor, of, reduced, &[], between)?;
+        ControlFlow::Continue((step, decrease))
+    }
+
+    /// The right-hand side A^T l of equations and priors at other values than those that the factor comes from, with `rights` over all unknowns,
+    /// reduced. The local blocks are eliminated from it by the equations given, the others by the factor. The same bits for any number of
+    /// threads. For a factor that has cached what the elimination of the local blocks has left.
+    ///
+    /// `rights`: of a whole system those of priors; of a part also what the parts below it have left, and zero for outer unknowns.
+    pub fn reduce_chord(
+        &self,
+        threads: &Threads,
+        factor: &Factor,
+        (equations, prior): (&dyn Equations, &Prior),
+        rights: &[f64],
+        between: Between<'_>,
+    ) -> ControlFlow<Stopped, ReducedRights<1>> {
+        watched(threads, between, |control| {
+            let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
+            let mut others = control.allocated(self.of_others(rights))?;
+            self.add_rights_of_ties(equations, &mut others);
+            let at_node = |index: usize| self.rights_at_node(equations, prior, index, control);
+            let found: Vec<Reduced<1>> = parallel::map_each((0..factor.eliminated.len()).collect(), &at_node);
+            // One after the other in a fixed order, whichever thread has found them.
+            found.iter().for_each(|found| found.add_to(&mut others, counts.0));
+            factor.forward_columns(&mut others);
+            let own: Vec<Vec<[f64; 1]>> = found.into_iter().map(|found| found.own).collect();
+            let square = |values: &[f64]| dot(values, values);
+            let of_locals = own.iter().map(|own| square(own.as_flattened())).sum::<f64>();
+            let products = vec![of_locals + square(&others[..counts.0 - counts.1])];
+            Some(ReducedRights { own, others, products, counts })
+        })
+    }
+
+    /// What the local blocks assembled in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the
+    /// equations: to form them takes less time than to read what the factor has cached.
+    fn rights_at_node(
+        &self,
+        equations: &dyn Equations,
+        prior: &Prior,
+        index: usize,
+        control: &Control,
+    ) -> Reduced<1> {
+        let (mut batch, mut found) = (self.workspace.batch(), Reduced::default());
+        for run in self.incidence.batches_at(index).iter().take_while(|_| !control.stopped()) {
+            batch.gather(equations, self, run);
+            batch.eliminate_from_rights(&self.layout, prior);
+            if !batch.apart {
+                found.own.extend_from_slice(batch.reduced.as_chunks().0);
+            }
+            let start = found.values.len();
+            batch.ranges(&self.symbolic).for_each(|range| found.room(0, range));
+            batch.add_rights_of_others(&self.layout, found.values[start..].as_flattened_mut());
+            self.count(run, control);
+        }
+        self.workspace.put_back_batch(batch);
+        found
+    }
+
+    /// Adds A^T l of ties to a right-hand side in the order of elimination.
+    fn add_rights_of_ties(&self, equations: &dyn Equations, others: &mut [f64]) {
+        let (layout, symbolic) = (&self.layout, &*self.symbolic);
+        let (mut constant, mut coefficients) = (Vec::new(), Vec::new());
+        for (index, tie) in layout.ties().iter().enumerate() {
+            let of_block = |&block: &u32| symbolic.range(symbolic.position(block as usize));
+            let columns: Vec<usize> = tie.retained.iter().flat_map(of_block).collect();
+            constant.resize(tie.rows, 0.0);
+            coefficients.resize(tie.rows * columns.len(), 0.0);
+            equations
+                .write_tie(index, &mut TieRows { constant: &mut constant, coefficients: &mut coefficients });
+            for (row, constant) in coefficients.chunks_exact(columns.len()).zip(&constant) {
+                columns.iter().zip(row).for_each(|(&column, a)| others[column] += a * constant);
+            }
+        }
     }
 }

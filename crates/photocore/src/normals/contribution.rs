@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::front::Front;
 use super::layout::Layout;
-use super::selected::SelectedInverse;
+use super::panels::SelectedInverse;
 use super::system::System;
 
 /// What the elimination of a part leaves for its outer unknowns, block by block.

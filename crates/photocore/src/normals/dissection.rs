@@ -1,8 +1,13 @@
 //! Nested dissection: a separator cuts the graph in two, the halves are dissected in turn, the separator is eliminated last
 //! (George 1973). The halves do not fill in between each other, and are independent subtrees of the elimination tree.
+//!
+//! Approximate minimum degree (Amestoy, Davis and Duff 1996), as `faer` has it.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::amd;
 
 use super::graph::{Graph, NOWHERE};
-use super::minimum_degree::minimum_degree;
 
 /// Parts of at most so many blocks are ordered by minimum degree.
 const LEAF: usize = 48;
@@ -132,5 +137,19 @@ fn principal_axes(members: &[usize], places: &[[f64; 3]]) -> [[f64; 3]; 2] {
     match spread.self_adjoint_eigen(faer::Side::Lower) {
         Ok(eigen) => [2, 1].map(|axis| std::array::from_fn(|k| eigen.U()[(k, axis)])),
         Err(_) => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+    }
+}
+
+/// Orders a graph so that each block in turn leaves few couplings behind; in input order where the graph is too large.
+pub(super) fn minimum_degree(graph: &Graph) -> Vec<usize> {
+    let (pointers, neighbours) = graph.compressed();
+    let count = graph.len();
+    let matrix = SymbolicSparseColMatRef::new_checked(count, count, &pointers, None, neighbours);
+    let (mut order, mut place) = (vec![0_u32; count], vec![0_u32; count]);
+    let mut memory = MemBuffer::new(amd::order_scratch::<u32>(count, neighbours.len()));
+    let control = amd::Control::default();
+    match amd::order(&mut order, &mut place, matrix, control, MemStack::new(&mut memory)) {
+        Ok(_) => order.into_iter().map(|block| block as usize).collect(),
+        Err(_) => (0..count).collect(),
     }
 }

@@ -8,7 +8,7 @@ use faer::{Mat, Side};
 
 use super::equations::{Equations, GroupRows, Prior};
 use super::functions::Function;
-use super::selected::SelectedInverse;
+use super::panels::SelectedInverse;
 use super::system::System;
 
 /// The equations of one local block: A x_local + B x_others = l.

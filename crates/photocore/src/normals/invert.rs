@@ -1,5 +1,7 @@
 //! The selected inverse: the blocks of the inverse inside the pattern of the factor (Takahashi et al. 1973), in one walk down
 //! the elimination tree that hands on cofactors of local blocks and equations on the way.
+//!
+//! The front of outer unknowns, which stays unfactored (see [`Contribution`]).
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -8,13 +10,13 @@ use std::time::Instant;
 use faer::{MatMut, MatRef};
 
 use super::cofactors::{AtNode, Cofactors, GroupCofactors};
-use super::contribution::unpack;
+use super::contribution::{Contribution, packed, unpack};
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
 use super::factor::Factor;
 use super::options::InvertOptions;
+use super::panels::SelectedInverse;
 use super::panels::{Handover, Panels};
-use super::selected::SelectedInverse;
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::watch::{Between, Control, watched};
@@ -165,5 +167,36 @@ fn take_coupled_rows(symbolic: &Symbolic, index: usize, parent: &[f64], front: &
                 target[to_row..to_row + rows].copy_from_slice(&source[from_row..from_row + rows]);
             }
         }
+    }
+}
+
+impl Factor {
+    /// Takes what is left for the outer unknowns, in the order of the layout, and the memory of its front; empty for a whole system,
+    /// and the second time.
+    pub fn take_contribution(&mut self) -> Contribution<'static> {
+        let symbolic = &*self.panels.symbolic;
+        let Some(open) = symbolic.open() else { return Contribution::default() };
+        let (s, first) = (&symbolic.supernodes()[open], symbolic.first_unknown(open));
+        if self.panels.values.len() < s.panel.end {
+            return Contribution::default();
+        }
+        let mut matrix = Vec::with_capacity(packed(s.width));
+        for (j, column) in self.panels.panel(open).chunks_exact(s.width.max(1)).enumerate() {
+            matrix.extend_from_slice(&column[j..]);
+        }
+        self.panels.values.truncate(s.panel.start);
+        self.panels.values.shrink_to_fit();
+        Contribution {
+            matrix: matrix.into(),
+            right: self.right[first..].to_vec().into(),
+            diagonal: self.diagonal[first..].to_vec().into(),
+        }
+    }
+}
+
+impl Panels {
+    /// Makes room again for the front of outer unknowns that was taken.
+    pub fn reopen(&mut self) {
+        self.values.resize(self.symbolic.values(), 0.0);
     }
 }

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::room::vectors;
 use super::system::System;
+use super::system::vectors;
 use super::workspace::Workspace;
 
 /// Of a number.

@@ -1,9 +1,9 @@
 //! The order in which retained blocks are eliminated.
 
+use super::dissection::minimum_degree;
 use super::dissection::nested_dissection;
 use super::graph::{Graph, NOWHERE};
 use super::layout::Layout;
-use super::minimum_degree::minimum_degree;
 
 /// How the retained blocks are ordered for elimination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,14 +1,17 @@
 //! A system ready to be formed and solved again and again.
+//!
+//! Which front what touches several retained blocks goes to.
+//!
+//! Numbers that there is room for: in vectors, and in what the elimination of local blocks leaves.
 
 use std::sync::Arc;
 
 use super::incidence::Incidence;
 use super::layout::{Layout, LayoutError};
-use super::nodes::Nodes;
 use super::ordering::Ordering;
-use super::room::{made_of_results, numbers_at};
 use super::symbolic::Symbolic;
 use super::tree::Tree;
+use super::triangle::Triangle;
 use super::watch::Control;
 use super::workspace::Workspace;
 
@@ -98,4 +101,67 @@ fn formation_work(incidence: &Incidence, layout: &Layout, index: usize) -> f64 {
         run.len() * (2 * width * width * layout.local_dim() + 500 * layout.groups_of_unit(first).len())
     };
     incidence.batches_at(index).iter().map(of_batch).sum::<usize>() as f64
+}
+
+/// Lists of retained blocks, those of ties or of what systems below leave, by their *assembly node*: the supernode of the first of their blocks in
+/// the order of elimination. All other blocks of a list are in the pattern of its node.
+#[derive(Debug)]
+pub(super) struct Nodes {
+    by_node: Vec<u32>,
+    /// Where those of each supernode start; one more at the end.
+    node_ptr: Vec<usize>,
+}
+
+impl Nodes {
+    pub fn new<'a>(lists: impl Iterator<Item = &'a Vec<u32>>, symbolic: &Symbolic) -> Self {
+        let node = |blocks: &Vec<u32>| {
+            let positions = blocks.iter().map(|&block| symbolic.position(block as usize));
+            positions.min().map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
+        };
+        let node: Vec<usize> = lists.map(node).collect();
+        let mut by_node: Vec<u32> = (0..node.len() as u32).collect();
+        by_node.sort_by_key(|&list| node[list as usize]);
+        let start = |supernode| by_node.partition_point(|&list| node[list as usize] < supernode);
+        let node_ptr = (0..=symbolic.supernode_count()).map(start).collect();
+        Self { by_node, node_ptr }
+    }
+
+    /// The lists whose node is a supernode.
+    pub fn at(&self, supernode: usize) -> &[u32] {
+        match self.node_ptr.get(supernode..supernode + 2) {
+            Some(ends) => &self.by_node[ends[0]..ends[1]],
+            None => &[],
+        }
+    }
+}
+
+/// Numbers for each unknown: values, steps, priors and their copies, cofactors, what is made of them for the caller.
+const PER_UNKNOWN: usize = 38;
+/// Numbers for each equation beside its coefficients: observed value, standard deviation, residual, redundancy number and test value,
+/// as given, as ordered for the adjustment and as handed back.
+const PER_EQUATION: usize = 18;
+/// Of these, the part that is made of the results after the last solution: what is cached from the formation to the solution may take it.
+const LATER: f64 = 0.65;
+
+/// Numbers in vectors, the problem itself and its results counted.
+pub(super) fn vectors(layout: &Layout) -> usize {
+    PER_UNKNOWN * layout.unknowns() + PER_EQUATION * layout.equations()
+}
+
+/// Numbers in what is made of results only.
+pub(super) fn made_of_results(layout: &Layout) -> usize {
+    (LATER * vectors(layout) as f64) as usize
+}
+
+/// Numbers that are cached of so many local blocks of one pattern, at the most.
+fn numbers_of(layout: &Layout, first: usize, count: usize) -> usize {
+    let l = layout.local_dim();
+    count * (l * (layout.reduced_width(first) + 1) + Triangle::numbers(l))
+}
+
+/// The same of all local blocks assembled in a supernode.
+pub(super) fn numbers_at(incidence: &Incidence, layout: &Layout, index: usize) -> usize {
+    let of_batch =
+        |run: &[u32]| run.first().map_or(0, |&first| numbers_of(layout, first as usize, run.len()));
+    incidence.batches_of_locals_at(index).iter().map(of_batch).sum()
 }

@@ -1,7 +1,6 @@
 //! What an adjustment of a block is given: photos with their cameras, poses in angles.
 
 use nalgebra::DMatrix;
-use numpy::PyReadonlyArrayDyn;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::PoseNumbers;
 use photocore::network::{Camera, Minimum, Network, Options, Passage, Photo, Screens, Start, UnitVariance};
@@ -9,7 +8,7 @@ use pyo3::prelude::*;
 
 use super::block_network::BlockNetwork;
 use super::{images, points};
-use crate::arrays::{check_lengths, indices, numbers, rows};
+use crate::arrays::{Array, Indices, check_lengths, indices, numbers, rows};
 use crate::camera::knotted;
 use crate::commons::{CommonRow, MountRow, common, mount};
 use crate::geometry::{RefractionRow, object_space, refraction as refraction_of, rotation_sense};
@@ -17,11 +16,6 @@ use crate::memory::LOADED;
 use crate::observations::{Group, observations};
 use crate::options::{named_loss, named_ordering, unknown};
 use crate::trajectories::{TimedRow, TrajectoryRow, on_trajectory, trajectory};
-
-/// Adds the function to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(block_network, module)?)
-}
 
 /// Model, parameters and their standard deviations of a camera, covariance matrix of the weighted ones row by row, knots.
 type CameraRow = (String, Vec<f64>, Vec<f64>, Option<Vec<f64>>, Option<Vec<f64>>);
@@ -35,7 +29,7 @@ fn camera((model, parameters, sd, covariance, knots): CameraRow) -> PyResult<Cam
 }
 
 /// Kind; indices of common unknowns; of points, photos or cameras; numbers.
-type PassageRow<'py> = (String, Vec<usize>, Vec<usize>, PyReadonlyArrayDyn<'py, f64>);
+type PassageRow<'py> = (String, Vec<usize>, Vec<usize>, Array<'py>);
 
 fn passage((kind, commons, of, values): PassageRow<'_>) -> PyResult<Passage> {
     let values = numbers("numbers of a passage", &values)?;
@@ -48,27 +42,27 @@ fn passage((kind, commons, of, values): PassageRow<'_>) -> PyResult<Passage> {
     photo_cameras, cameras, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, observation_groups, unknowns, mounts, trajectories, timed, image_times, passages, records, spheroid, photo_to_ground, refraction, criterion, limit, max_iterations,
     covariance, loss, ordering, unit_variance, minimum, memory, points_given
 ))]
-fn block_network(
-    photo_positions: PyReadonlyArrayDyn<'_, f64>,
-    photo_attitudes: PyReadonlyArrayDyn<'_, f64>,
-    photo_positions_observed: PyReadonlyArrayDyn<'_, f64>,
-    photo_attitudes_observed: PyReadonlyArrayDyn<'_, f64>,
-    photo_position_sd: PyReadonlyArrayDyn<'_, f64>,
-    photo_attitude_sd: PyReadonlyArrayDyn<'_, f64>,
-    photo_cameras: PyReadonlyArrayDyn<'_, i64>,
+pub fn block_network(
+    photo_positions: Array<'_>,
+    photo_attitudes: Array<'_>,
+    photo_positions_observed: Array<'_>,
+    photo_attitudes_observed: Array<'_>,
+    photo_position_sd: Array<'_>,
+    photo_attitude_sd: Array<'_>,
+    photo_cameras: Indices<'_>,
     cameras: Vec<CameraRow>,
-    point_positions: PyReadonlyArrayDyn<'_, f64>,
-    point_sd: PyReadonlyArrayDyn<'_, f64>,
-    image_photos: PyReadonlyArrayDyn<'_, i64>,
-    image_points: PyReadonlyArrayDyn<'_, i64>,
-    image_xy: PyReadonlyArrayDyn<'_, f64>,
-    image_sd: PyReadonlyArrayDyn<'_, f64>,
+    point_positions: Array<'_>,
+    point_sd: Array<'_>,
+    image_photos: Indices<'_>,
+    image_points: Indices<'_>,
+    image_xy: Array<'_>,
+    image_sd: Array<'_>,
     observation_groups: Vec<Group<'_>>,
     unknowns: Vec<CommonRow>,
     mounts: Vec<MountRow>,
     trajectories: Vec<TrajectoryRow<'_>>,
     timed: Vec<TimedRow>,
-    image_times: PyReadonlyArrayDyn<'_, f64>,
+    image_times: Array<'_>,
     passages: Vec<PassageRow<'_>>,
     records: usize,
     spheroid: Option<(f64, f64)>,

@@ -1,6 +1,6 @@
 //! A block as the core has it: adjusted, taken to other datums, asked for covariances.
 
-use numpy::{PyArray1, PyReadonlyArrayDyn};
+use numpy::PyArray1;
 use photocore::Threads;
 use photocore::adjustment::{DatumColumns, DatumError};
 use photocore::network::{
@@ -14,17 +14,9 @@ use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
 use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
-use crate::arrays::{indices, numbers};
+use crate::arrays::{Array, Indices, Vector, indices, numbers};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
-
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
-
-/// Adds the classes to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<BlockNetwork>()?;
-    module.add_class::<BlockCovariances>()
-}
 
 /// A block with the options of its adjustment.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -53,7 +45,7 @@ impl BlockNetwork {
         progress: Option<Py<PyAny>>,
         start: Option<PyRef<'_, BlockState>>,
         keep: Option<Vec<usize>>,
-    ) -> PyResult<BlockSolution> {
+    ) -> PyResult<Py<BlockSolution>> {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
         let start = start.map(|start| start.state.clone());
@@ -67,7 +59,7 @@ impl BlockNetwork {
             };
             adjustment.run().map(|solution| self.told(solution, pool))
         })?;
-        BlockSolution::new(py, told.map_err(|error| refused(&error))?, 6)
+        BlockSolution::new(py, told.map_err(|error| refused(&error))?)
     }
 
     #[pyo3(signature = (state, datum, *, threads, progress))]
@@ -78,14 +70,14 @@ impl BlockNetwork {
         datum: DatumRow,
         threads: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<BlockSolution> {
+    ) -> PyResult<Py<BlockSolution>> {
         let workers = Workers::of(threads, self.network.images.len());
         let datum = datum_of(datum)?;
         let told = watched(py, workers, progress, |pool, watch| {
             let solution = self.network.in_datum(&self.options, &state.state, &datum, pool, watch);
             solution.map(|solution| self.told(solution, pool))
         })?;
-        BlockSolution::new(py, told.map_err(|error| refused(&error))?, 6)
+        BlockSolution::new(py, told.map_err(|error| refused(&error))?)
     }
 
     #[pyo3(signature = (state, *, threads, progress))]
@@ -137,8 +129,8 @@ impl BlockNetwork {
         datum: DatumRow,
         held: Vec<(usize, usize)>,
         middle: Option<[f64; 3]>,
-        names: PyReadonlyArrayDyn<'py, i64>,
-        values: PyReadonlyArrayDyn<'py, f64>,
+        names: Indices<'py>,
+        values: Array<'py>,
         threads: usize,
     ) -> PyResult<(Vector<'py>, Vector<'py>, Vector<'py>, f64, bool)> {
         let NetworkDatum::Inner(inner) = datum_of(datum)? else { return Err(unknown("datum", "relative")) };

@@ -1,6 +1,5 @@
 //! What an adjustment of a collection is given: every photo with a camera of its own, poses in vectors.
 
-use numpy::{PyArray2, PyReadonlyArrayDyn};
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::camera::ModelFacts;
 use photocore::geometry::{self, ObjectSpace, Orientation, Point as GroundPoint, PoseNumbers};
@@ -16,18 +15,10 @@ use super::state::BlockState;
 use super::tables::Told;
 use super::trial::{NetworkTrial, tried};
 use super::{CollectionError, failure, images, points, said};
-use crate::arrays::{check_lengths, rows, slices, table};
+use crate::arrays::{Array, Indices, Matrix, check_lengths, rows, slices, table};
 use crate::memory::LOADED;
 use crate::options::{named_loss, named_ordering, unknown};
 use crate::work::{Workers, watched};
-
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("CAMERAS", geometry::Camera::NAMES.to_vec())?;
-    module.add_function(wrap_pyfunction!(collection_images, module)?)?;
-    module.add_class::<CollectionNetwork>()?;
-    module.add_function(wrap_pyfunction!(collection_network, module)?)
-}
 
 /// A collection with the options of its adjustment.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -47,7 +38,7 @@ impl CollectionNetwork {
         threads: usize,
         progress: Option<Py<PyAny>>,
         start: Option<PyRef<'_, BlockState>>,
-    ) -> PyResult<CollectionSolution> {
+    ) -> PyResult<Py<CollectionSolution>> {
         let workers = Workers::of(threads, self.network.images.len());
         let start = start.map(|start| start.state.clone());
         let told = watched(py, workers, progress, |pool, watch| {
@@ -102,7 +93,7 @@ fn model(camera: &str) -> PyResult<ModelFacts> {
 fn photos(
     camera: &str,
     name: &str,
-    array: &PyReadonlyArrayDyn<'_, f64>,
+    array: &Array<'_>,
 ) -> PyResult<impl ExactSizeIterator<Item = PyResult<([f64; POSE], geometry::Camera)>>> {
     let split = move |row: Vec<f64>| {
         let (pose, own) = row.split_first_chunk().ok_or_else(|| unknown("camera", camera))?;
@@ -112,12 +103,12 @@ fn photos(
 }
 
 #[pyfunction]
-fn collection_images<'py>(
+pub fn collection_images<'py>(
     py: Python<'py>,
     camera: &str,
-    photo_parameters: PyReadonlyArrayDyn<'py, f64>,
-    points: PyReadonlyArrayDyn<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    photo_parameters: Array<'py>,
+    points: Array<'py>,
+) -> PyResult<Matrix<'py>> {
     let photos = photos(camera, "photo_parameters", &photo_parameters)?;
     let points = rows("points", &points)?;
     check_lengths(("points", points.len()), &[("photo_parameters", photos.len())])?;
@@ -135,16 +126,16 @@ fn collection_images<'py>(
     camera, photo_parameters, photo_sd, point_positions, point_sd, image_photos, image_points, image_xy, image_sd, *, decrease,
     max_iterations, covariance, loss, ordering, memory
 ))]
-fn collection_network(
+pub fn collection_network(
     camera: &str,
-    photo_parameters: PyReadonlyArrayDyn<'_, f64>,
-    photo_sd: PyReadonlyArrayDyn<'_, f64>,
-    point_positions: PyReadonlyArrayDyn<'_, f64>,
-    point_sd: PyReadonlyArrayDyn<'_, f64>,
-    image_photos: PyReadonlyArrayDyn<'_, i64>,
-    image_points: PyReadonlyArrayDyn<'_, i64>,
-    image_xy: PyReadonlyArrayDyn<'_, f64>,
-    image_sd: PyReadonlyArrayDyn<'_, f64>,
+    photo_parameters: Array<'_>,
+    photo_sd: Array<'_>,
+    point_positions: Array<'_>,
+    point_sd: Array<'_>,
+    image_photos: Indices<'_>,
+    image_points: Indices<'_>,
+    image_xy: Array<'_>,
+    image_sd: Array<'_>,
     decrease: f64,
     max_iterations: usize,
     covariance: bool,

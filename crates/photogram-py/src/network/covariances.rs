@@ -1,6 +1,6 @@
 //! Covariances of an adjusted network.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use photocore::adjustment::{GroupSquares, Probing};
 use photocore::network::{Covariances, Groups, Network, NetworkError as Failure, Of, Options};
 use pyo3::prelude::*;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use super::state::BlockState;
 use super::suspects::NetworkSuspects;
 use super::{BlockError, failure};
-use crate::arrays::{group_rows, matrix};
+use crate::arrays::{Array, Blocks, Indices, Matrix, Vector, group_rows, matrix};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
 
@@ -72,7 +72,7 @@ impl BlockCovariances {
         py: Python<'py>,
         partials: PyReadonlyArray2<'_, f64>,
         of: Vec<OfRow>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Matrix<'py>> {
         let count = partials.as_array().nrows();
         let partials: Vec<f64> = partials.as_array().iter().copied().collect();
         let of = of_rows(of)?;
@@ -92,7 +92,7 @@ impl BlockCovariances {
         columns: Option<Vec<OfRow>>,
         threads: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Matrix<'py>> {
         let (rows, columns) = (of_rows(rows)?, columns.map(of_rows).transpose()?);
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
             self.covariances.cofactors(&rows, columns.as_deref(), pool, watch)
@@ -104,11 +104,11 @@ impl BlockCovariances {
     fn propagate<'py>(
         &self,
         py: Python<'py>,
-        partials: PyReadonlyArrayDyn<'_, f64>,
+        partials: Array<'_>,
         of: Vec<OfRow>,
         threads: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Matrix<'py>> {
         let of = of_rows(of)?;
         let partials: Vec<f64> = partials.as_array().iter().copied().collect();
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
@@ -147,10 +147,10 @@ impl BlockCovariances {
     fn project_images<'py>(
         &self,
         py: Python<'py>,
-        columns: PyReadonlyArrayDyn<'_, f64>,
+        columns: Array<'_>,
         threads: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    ) -> PyResult<Blocks<'py>> {
         let count = columns.as_array().shape().first().copied().unwrap_or(0);
         let columns: Vec<f64> = columns.as_array().iter().copied().collect();
         let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
@@ -163,18 +163,10 @@ impl BlockCovariances {
 
 /// Number of groups, and the group of each coordinate of images, component of points, unknown of poses, of each camera, common unknown and
 /// other observation; -1 for none.
-type GroupsRow<'py> = (
-    usize,
-    PyReadonlyArrayDyn<'py, i64>,
-    PyReadonlyArrayDyn<'py, i64>,
-    PyReadonlyArrayDyn<'py, i64>,
-    Vec<i64>,
-    Vec<i64>,
-    Vec<i64>,
-);
+type GroupsRow<'py> = (usize, Indices<'py>, Indices<'py>, Indices<'py>, Vec<i64>, Vec<i64>, Vec<i64>);
 
 /// Equations of each group, sums of squares, and which columns of them are exact.
-type SquaresRow<'py> = (Vec<usize>, Bound<'py, PyArray1<f64>>, Vec<bool>);
+type SquaresRow<'py> = (Vec<usize>, Vector<'py>, Vec<bool>);
 
 fn groups_of(
     (count, images, points, photos, cameras, commons, observations): GroupsRow<'_>,

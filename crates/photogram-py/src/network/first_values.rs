@@ -1,6 +1,6 @@
 //! First values of photos and points; their documentation is in `_photocore.pyi`.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
+use numpy::PyArray1;
 use photocore::geometry::{Matrix3, Pose, Vector3};
 use photocore::programs::first_values::{
     FirstValues, FirstValuesError, Found, Frame, KnownPhoto, KnownPoint, Missing, Sighting, Source,
@@ -9,21 +9,17 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{
-    InputError, check_lengths, from_rows, indices, matrices, numbers, row_major, rows, squares, table,
+    Array, Blocks, Indices, InputError, Matrix, check_lengths, from_rows, indices, matrices, numbers,
+    row_major, rows, squares, table,
 };
 use crate::work::{Workers, watched};
 
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(find_first_values, module)?)
-}
-
 /// Positions, attitudes, sources and what is missing of photos; positions of points; images set aside; the frame; the misfit.
 type FoundRow<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray3<f64>>,
+    Matrix<'py>,
+    Blocks<'py>,
     Vec<(&'static str, usize, usize)>,
-    Bound<'py, PyArray2<f64>>,
+    Matrix<'py>,
     Bound<'py, PyArray1<bool>>,
     Option<usize>,
     Option<f64>,
@@ -34,18 +30,18 @@ type FoundRow<'py> = (
     photo_positions, photo_attitudes, observed_positions, observed_attitudes, point_positions, point_sd, image_photos, image_points,
     directions, direction_sd, *, threads
 ))]
-fn find_first_values<'py>(
+pub fn find_first_values<'py>(
     py: Python<'py>,
-    photo_positions: PyReadonlyArrayDyn<'py, f64>,
-    photo_attitudes: PyReadonlyArrayDyn<'py, f64>,
-    observed_positions: PyReadonlyArrayDyn<'py, f64>,
-    observed_attitudes: PyReadonlyArrayDyn<'py, f64>,
-    point_positions: PyReadonlyArrayDyn<'py, f64>,
-    point_sd: PyReadonlyArrayDyn<'py, f64>,
-    image_photos: PyReadonlyArrayDyn<'py, i64>,
-    image_points: PyReadonlyArrayDyn<'py, i64>,
-    directions: PyReadonlyArrayDyn<'py, f64>,
-    direction_sd: PyReadonlyArrayDyn<'py, f64>,
+    photo_positions: Array<'py>,
+    photo_attitudes: Array<'py>,
+    observed_positions: Array<'py>,
+    observed_attitudes: Array<'py>,
+    point_positions: Array<'py>,
+    point_sd: Array<'py>,
+    image_photos: Indices<'py>,
+    image_points: Indices<'py>,
+    directions: Array<'py>,
+    direction_sd: Array<'py>,
     threads: usize,
 ) -> PyResult<FoundRow<'py>> {
     let positions = rows::<3>("photo_positions", &photo_positions)?;

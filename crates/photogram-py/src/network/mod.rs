@@ -1,26 +1,25 @@
 //! Networks of photos: blocks and collections; their documentation is in `_photocore.pyi`.
 
-mod block;
-mod block_network;
-mod collection;
-mod covariances;
-mod first_values;
-mod node;
-mod solution;
-mod state;
-mod steps;
-mod suspects;
+pub mod block;
+pub mod block_network;
+pub mod collection;
+pub mod covariances;
+pub mod first_values;
+pub mod node;
+pub mod solution;
+pub mod state;
+pub mod steps;
+pub mod suspects;
 mod tables;
-mod trial;
+pub mod trial;
 
-use numpy::PyReadonlyArrayDyn;
 use photocore::Stopped;
 use photocore::network::{Coarse, Combination, Image, NetworkError as Failure, Point, PosePart};
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
-use crate::arrays::{check_lengths, indices_in_place, rows_in_place};
+use crate::arrays::{Array, Indices, check_lengths, indices_in_place, rows_in_place};
 
 create_exception!(
     _photocore,
@@ -35,23 +34,8 @@ create_exception!(
     "The collection cannot be adjusted: (kind, message, combinations, points, seconds)."
 );
 
-/// Adds the functions and classes to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("BlockError", module.py().get_type::<BlockError>())?;
-    module.add("CollectionError", module.py().get_type::<CollectionError>())?;
-    block::register(module)?;
-    block_network::register(module)?;
-    collection::register(module)?;
-    first_values::register(module)?;
-    node::register(module)?;
-    steps::register(module)?;
-    suspects::register(module)?;
-    trial::register(module)?;
-    solution::register(module)
-}
-
 /// Points with their standard deviations.
-fn points(positions: &PyReadonlyArrayDyn<'_, f64>, sd: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Vec<Point>> {
+fn points(positions: &Array<'_>, sd: &Array<'_>) -> PyResult<Vec<Point>> {
     let coordinates = rows_in_place("point_positions", positions)?;
     let sd = rows_in_place("point_sd", sd)?;
     check_lengths(("point_positions", coordinates.len()), &[("point_sd", sd.len())])?;
@@ -60,10 +44,10 @@ fn points(positions: &PyReadonlyArrayDyn<'_, f64>, sd: &PyReadonlyArrayDyn<'_, f
 
 /// Image points: indices of their photos and points, coordinates and standard deviations.
 fn images(
-    photos: &PyReadonlyArrayDyn<'_, i64>,
-    points: &PyReadonlyArrayDyn<'_, i64>,
-    xy: &PyReadonlyArrayDyn<'_, f64>,
-    sd: &PyReadonlyArrayDyn<'_, f64>,
+    photos: &Indices<'_>,
+    points: &Indices<'_>,
+    xy: &Array<'_>,
+    sd: &Array<'_>,
 ) -> PyResult<Vec<Image>> {
     let photos = indices_in_place("image_photos", photos)?;
     let points = indices_in_place("image_points", points)?;

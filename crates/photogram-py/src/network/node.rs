@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use photocore::Threads;
 use photocore::adjustment::{DatumOfPart, Watch};
 use photocore::network::{
@@ -19,24 +19,15 @@ use super::covariances::refused;
 use super::solution::BlockSolution;
 use super::tables::Told;
 use super::{FailureRow, failure};
-use crate::arrays::{InputError, numbers};
+use crate::arrays::{Array, InputError, Vector, numbers};
 use crate::options::unknown;
 use crate::work::{Workers, watched};
 
-/// Adds the classes to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Node>()?;
-    module.add_class::<FormedNode>()
-}
-
-type Numbers<'py> = PyReadonlyArrayDyn<'py, f64>;
-type Vector<'py> = Bound<'py, PyArray1<f64>>;
-
 /// Matrix, right-hand side and diagonal of what a node leaves.
-type ContributionRow<'py> = (Numbers<'py>, Numbers<'py>, Numbers<'py>);
+type ContributionRow<'py> = (Array<'py>, Array<'py>, Array<'py>);
 
 /// T, W and B^T W, the last step, the condition of B^T G, and unknowns that do not move: see `FormedNode.invert`.
-type TransformationRow<'py> = (Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, f64, Vec<usize>);
+type TransformationRow<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, f64, Vec<usize>);
 
 /// What a block of unknowns belongs to, and its index.
 pub type BlockRow = (String, usize);
@@ -66,7 +57,7 @@ fn indices<'py>(py: Python<'py>, places: &[usize]) -> Bound<'py, PyArray1<i64>> 
 }
 
 /// What stands together in memory: large arrays are not copied.
-fn slice<'a>(name: &str, array: &'a Numbers<'_>) -> PyResult<&'a [f64]> {
+fn slice<'a>(name: &str, array: &'a Array<'_>) -> PyResult<&'a [f64]> {
     array.as_slice().map_err(|_| InputError::new_err(format!("{name} must be contiguous")))
 }
 
@@ -158,19 +149,14 @@ impl Node {
         Ok(dict)
     }
 
-    fn advance<'py>(
-        &self,
-        py: Python<'py>,
-        state: Numbers<'py>,
-        step: Numbers<'py>,
-    ) -> PyResult<Vector<'py>> {
+    fn advance<'py>(&self, py: Python<'py>, state: Array<'py>, step: Array<'py>) -> PyResult<Vector<'py>> {
         let (state, step) = (numbers("state", &state)?, numbers("step", &step)?);
         let reached = py.detach(|| self.node.advance(&state, &step));
         reached.map(|reached| PyArray1::from_vec(py, reached)).map_err(|error| failed(&error))
     }
 
     #[pyo3(signature = (state, *, threads))]
-    fn relocate<'py>(&self, py: Python<'py>, state: Numbers<'py>, threads: usize) -> PyResult<Vector<'py>> {
+    fn relocate<'py>(&self, py: Python<'py>, state: Array<'py>, threads: usize) -> PyResult<Vector<'py>> {
         let state = numbers("state", &state)?;
         let moved = watched(py, self.workers(threads), None, |pool, _| self.node.relocate(&state, pool))?;
         moved.map(|moved| PyArray1::from_vec(py, moved)).map_err(|error| failed(&error))
@@ -180,7 +166,7 @@ impl Node {
     fn objective(
         &self,
         py: Python<'_>,
-        state: Numbers<'_>,
+        state: Array<'_>,
         threads: usize,
     ) -> PyResult<(f64, f64, f64, f64, f64)> {
         let state = numbers("state", &state)?;
@@ -193,7 +179,7 @@ impl Node {
     fn form(
         &self,
         py: Python<'_>,
-        state: Numbers<'_>,
+        state: Array<'_>,
         contributions: Vec<ContributionRow<'_>>,
         damping: f64,
         curved: bool,
@@ -230,16 +216,16 @@ impl Node {
     fn solution(
         &self,
         py: Python<'_>,
-        state: Numbers<'_>,
-        before: Numbers<'_>,
+        state: Array<'_>,
+        before: Array<'_>,
         threads: usize,
-    ) -> PyResult<BlockSolution> {
+    ) -> PyResult<Py<BlockSolution>> {
         let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
         let told = watched(py, self.workers(threads), None, |pool, _| {
             let solution = self.node.solution(&state, &before, pool)?;
             Ok(Told::without_records(solution, self.records, pool))
         })?;
-        BlockSolution::new(py, told.map_err(|error: Failure| failed(&error))?, 6)
+        BlockSolution::new(py, told.map_err(|error: Failure| failed(&error))?)
     }
 }
 
@@ -333,7 +319,7 @@ impl FormedNode {
     fn solve<'py>(
         &self,
         py: Python<'py>,
-        outer: Numbers<'py>,
+        outer: Array<'py>,
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Vector<'py>> {
@@ -353,8 +339,8 @@ impl FormedNode {
     fn reduce_chord<'py>(
         &self,
         py: Python<'py>,
-        state: Numbers<'py>,
-        left: Vec<Numbers<'py>>,
+        state: Array<'py>,
+        left: Vec<Array<'py>>,
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Option<(Vector<'py>, f64)>> {
@@ -371,7 +357,7 @@ impl FormedNode {
     fn solve_chord<'py>(
         &self,
         py: Python<'py>,
-        outer: Numbers<'py>,
+        outer: Array<'py>,
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Vector<'py>> {
@@ -386,7 +372,7 @@ impl FormedNode {
     fn reduce<'py>(
         &self,
         py: Python<'py>,
-        rights: Numbers<'py>,
+        rights: Array<'py>,
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(Vector<'py>, Vector<'py>)> {
@@ -401,7 +387,7 @@ impl FormedNode {
     fn complete<'py>(
         &self,
         py: Python<'py>,
-        outer: Numbers<'py>,
+        outer: Array<'py>,
         threads: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Vector<'py>> {
@@ -416,12 +402,12 @@ impl FormedNode {
     fn invert<'py>(
         &self,
         py: Python<'py>,
-        outer: Numbers<'py>,
-        state: Numbers<'py>,
+        outer: Array<'py>,
+        state: Array<'py>,
         threads: usize,
         datum: Option<TransformationRow<'py>>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(BlockSolution, Vec<Vector<'py>>)> {
+    ) -> PyResult<(Py<BlockSolution>, Vec<Vector<'py>>)> {
         let (given, state) = (slice("outer", &outer)?, numbers("state", &state)?);
         let datum = match &datum {
             Some((t, w, common, last, condition, staying)) => Some(DatumOfPart {
@@ -442,6 +428,6 @@ impl FormedNode {
         })?;
         let (told, below) = found.map_err(|error| failed(&error))?;
         let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();
-        Ok((BlockSolution::new(py, told, 6)?, below))
+        Ok((BlockSolution::new(py, told)?, below))
     }
 }

@@ -1,33 +1,23 @@
 //! What an adjustment of a network has found, as arrays.
 
-use std::sync::Arc;
+use std::mem::take;
+use std::sync::{Arc, Mutex};
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use photocore::network::{AdjustedCamera, AdjustedPhoto, Reason, Solution};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::state::{BlockState, Kept, kept};
-use super::tables::{Tables, Told};
+use super::state::BlockState;
+use super::tables::Told;
 use super::{FailureRow, failure};
-use crate::arrays::table;
+use crate::arrays::{Blocks, Matrix, squares, table};
 use crate::commons::{AdjustedRow as UnknownRow, adjusted_row as unknown_row};
 use crate::observations::{AdjustedRow, adjusted_row};
 use crate::solution::{IterationRow, iteration_row, operations, predictions, seconds, status_name};
 
-/// Adds the classes to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<BlockState>()?;
-    module.add_class::<BlockSolution>()?;
-    module.add_class::<CollectionSolution>()
-}
-
 /// Cofactors of so many unknowns of each photo, (n, N, N); those of held ones are zero.
-fn photo_cofactors<'py>(
-    py: Python<'py>,
-    photos: &[AdjustedPhoto],
-    unknowns: usize,
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
+fn photo_cofactors<'py>(py: Python<'py>, photos: &[AdjustedPhoto], unknowns: usize) -> PyResult<Blocks<'py>> {
     let mut all = vec![0.0; photos.len() * unknowns * unknowns];
     for (photo, matrix) in photos.iter().zip(all.chunks_exact_mut(unknowns * unknowns)) {
         let own = photo.redundancy.len();
@@ -48,7 +38,7 @@ fn photo_redundancy<'py>(
     py: Python<'py>,
     photos: &[AdjustedPhoto],
     unknowns: usize,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Matrix<'py>> {
     let mut all = vec![0.0; photos.len() * unknowns];
     for (photo, row) in photos.iter().zip(all.chunks_exact_mut(unknowns)) {
         let shown = photo.redundancy.len().min(unknowns);
@@ -60,6 +50,24 @@ fn photo_redundancy<'py>(
     PyArray1::from_vec(py, all).reshape([photos.len(), unknowns])
 }
 
+/// Six corrections of each photo in each iteration, (iterations, n, 6).
+fn photo_corrections<'py>(
+    py: Python<'py>,
+    iterations: &[Vec<f64>],
+    photos: &[AdjustedPhoto],
+) -> PyResult<Blocks<'py>> {
+    let mut values = Vec::with_capacity(6 * iterations.len() * photos.len());
+    for corrections in iterations {
+        let mut rest = corrections.as_slice();
+        for photo in photos {
+            let (own, others) = rest.split_at(photo.redundancy.len());
+            values.extend_from_slice(&own[..6]);
+            rest = others;
+        }
+    }
+    PyArray1::from_vec(py, values).reshape([iterations.len(), photos.len(), 6])
+}
+
 /// The points that were left out for a reason.
 fn left_out(solution: &Solution, reason: Reason) -> Vec<usize> {
     let own = solution.dropped.iter().filter(|dropped| dropped.reason == reason);
@@ -69,326 +77,174 @@ fn left_out(solution: &Solution, reason: Reason) -> Vec<usize> {
 /// Parameters, cofactors row by row, redundancy numbers, diagonal of the normal equations, photos and images of an adjusted camera.
 type CameraRow = (Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>, usize, usize);
 
-fn camera_row(camera: &AdjustedCamera) -> CameraRow {
-    let AdjustedCamera { parameters, cofactors, redundancy, information, photos, images } = camera.clone();
+fn camera_row(camera: AdjustedCamera) -> CameraRow {
+    let AdjustedCamera { parameters, cofactors, redundancy, information, photos, images } = camera;
     (parameters, cofactors.data.into(), redundancy, information, photos, images)
 }
 
-/// A class of adjusted networks: what all have, and what the class has besides.
-macro_rules! solution_class {
-    ($(#[$doc:meta])* $class:ident, $what:literal, { $($own:tt)* }) => {
-        $(#[$doc])*
-        #[pyclass(frozen, module = "photogram._photocore")]
-        pub struct $class {
-            pub solution: Solution,
-            /// Of a photo: its pose, and its camera where that may be unknown.
-            unknowns: usize,
-            kept: Kept,
-            tables: Tables,
-        }
-
-        impl $class {
-            /// Of so many unknowns of a photo.
-            pub fn new(py: Python<'_>, told: Told, unknowns: usize) -> PyResult<Self> {
-                let (mut solution, tables) = told.tables(py)?;
-                let kept = kept(&mut solution);
-                Ok(Self { solution, unknowns, kept, tables })
-            }
-        }
-
-        #[pymethods]
-        impl $class {
-            #[getter]
-            fn status(&self) -> &'static str {
-                status_name(self.solution.adjustment.status)
-            }
-
-            #[getter]
-            fn initial_sum_of_squares(&self) -> f64 {
-                self.solution.adjustment.initial_sum_of_squares
-            }
-
-            #[getter]
-            fn iterations(&self) -> Vec<IterationRow> {
-                self.solution.adjustment.iterations.iter().map(iteration_row).collect()
-            }
-
-            #[getter]
-            fn photo_cofactors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-                photo_cofactors(py, &self.solution.photos, self.unknowns)
-            }
-
-            #[getter]
-            fn photo_redundancy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-                photo_redundancy(py, &self.solution.photos, self.unknowns)
-            }
-
-            #[getter]
-            fn point_positions(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-                self.tables.point_positions.clone_ref(py)
-            }
-
-            #[getter]
-            fn point_cofactors(&self, py: Python<'_>) -> Py<PyArray3<f64>> {
-                self.tables.point_cofactors.clone_ref(py)
-            }
-
-            #[getter]
-            fn point_redundancy(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-                self.tables.point_redundancy.clone_ref(py)
-            }
-
-            #[getter]
-            fn point_rays(&self, py: Python<'_>) -> Py<PyArray1<i64>> {
-                self.tables.point_rays.clone_ref(py)
-            }
-
-            #[getter]
-            fn residuals(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-                self.tables.residuals.clone_ref(py)
-            }
-
-            #[getter]
-            fn redundancy(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-                self.tables.redundancy.clone_ref(py)
-            }
-
-            #[getter]
-            fn standardized(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-                self.tables.standardized.clone_ref(py)
-            }
-
-            #[getter]
-            fn image_weights(&self, py: Python<'_>) -> Py<PyArray1<f64>> {
-                self.tables.image_weights.clone_ref(py)
-            }
-
-            #[getter]
-            fn redundancy_excess(&self) -> Option<f64> {
-                self.solution.adjustment.redundancy_excess
-            }
-
-            #[getter]
-            fn undetermined(&self) -> Option<FailureRow> {
-                self.solution.undetermined.as_ref().map(|error| failure(error, $what))
-            }
-
-            #[getter]
-            fn degrees_of_freedom(&self) -> i64 {
-                self.solution.degrees_of_freedom
-            }
-
-            #[getter]
-            fn variance_of_unit_weight(&self) -> Option<f64> {
-                self.solution.variance_of_unit_weight
-            }
-
-            #[getter]
-            fn counts(&self) -> (usize, usize, usize) {
-                let counts = self.solution.adjustment.counts;
-                (counts.observations, counts.weighted, counts.unknowns)
-            }
-
-            #[getter]
-            fn ordering(&self) -> &'static str {
-                self.solution.adjustment.effort.ordering.name()
-            }
-
-            #[getter]
-            fn predictions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-                predictions(py, &self.solution.adjustment)
-            }
-
-            #[getter]
-            fn operations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-                operations(py, &self.solution.adjustment)
-            }
-
-            #[getter]
-            fn formations(&self) -> usize {
-                self.solution.adjustment.effort.formations
-            }
-
-            #[getter]
-            fn seconds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-                seconds(py, &self.solution.adjustment)
-            }
-
-            #[getter]
-            fn state(&self) -> BlockState {
-                let Solution { state, joint, .. } = &self.solution;
-                BlockState { state: state.clone(), kept: Arc::clone(&self.kept), joint: joint.clone() }
-            }
-
-            #[getter]
-            fn datum(&self) -> Vec<(usize, usize)> {
-                self.solution.datum.held.clone()
-            }
-
-            #[getter]
-            fn weak(&self) -> Vec<(usize, usize)> {
-                self.solution.weak.photos.clone()
-            }
-
-            #[getter]
-            fn weak_points(&self) -> Vec<(usize, f64, f64)> {
-                self.solution.weak.points.iter().map(|weak| (weak.point, weak.ratio, weak.distance)).collect()
-            }
-
-            $($own)*
-        }
-    };
+/// What adjusted blocks and collections have alike.
+#[pyclass(frozen, subclass, get_all, module = "photogram._photocore")]
+pub struct NetworkSolution {
+    status: &'static str,
+    initial_sum_of_squares: f64,
+    iterations: Vec<IterationRow>,
+    photo_cofactors: Py<PyArray3<f64>>,
+    photo_redundancy: Py<PyArray2<f64>>,
+    point_positions: Py<PyArray2<f64>>,
+    point_cofactors: Py<PyArray3<f64>>,
+    point_redundancy: Py<PyArray2<f64>>,
+    point_rays: Py<PyArray1<i64>>,
+    residuals: Py<PyArray2<f64>>,
+    redundancy: Py<PyArray2<f64>>,
+    standardized: Py<PyArray2<f64>>,
+    image_weights: Py<PyArray1<f64>>,
+    redundancy_excess: Option<f64>,
+    undetermined: Option<FailureRow>,
+    degrees_of_freedom: i64,
+    variance_of_unit_weight: Option<f64>,
+    counts: (usize, usize, usize),
+    ordering: &'static str,
+    predictions: Py<PyDict>,
+    operations: Py<PyDict>,
+    formations: usize,
+    seconds: Py<PyDict>,
+    state: Py<BlockState>,
+    datum: Vec<(usize, usize)>,
+    weak: Vec<(usize, usize)>,
+    weak_points: Vec<(usize, f64, f64)>,
 }
 
-solution_class! {
-    /// An adjusted block.
-    BlockSolution, "block", {
-        #[getter]
-        fn relative_error(&self) -> f64 {
-            self.solution.datum.relative_error
-        }
-
-        #[getter]
-        fn minimal_control(&self) -> bool {
-            self.solution.datum.minimal_control
-        }
-
-        #[getter]
-        fn photo_corrections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-            let (iterations, photos) = (&self.solution.photo_corrections, &self.solution.photos);
-            let mut values = Vec::with_capacity(6 * iterations.len() * photos.len());
-            for corrections in iterations {
-                let mut rest = corrections.as_slice();
-                for photo in photos {
-                    let (own, others) = rest.split_at(photo.redundancy.len());
-                    values.extend_from_slice(&own[..6]);
-                    rest = others;
-                }
-            }
-            PyArray1::from_vec(py, values).reshape([iterations.len(), photos.len(), 6])
-        }
-
-        #[getter]
-        fn photo_positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-            let position = |photo: &AdjustedPhoto| std::array::from_fn::<_, 3, _>(|k| photo.pose[k]);
-            table(py, self.solution.photos.iter().map(position).collect())
-        }
-
-        #[getter]
-        fn photo_attitudes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-            let attitude = |photo: &AdjustedPhoto| std::array::from_fn::<_, 3, _>(|k| photo.pose[3 + k]);
-            table(py, self.solution.photos.iter().map(attitude).collect())
-        }
-
-        #[getter]
-        fn point_last_corrections(&self, py: Python<'_>) -> Py<PyArray2<f64>> {
-            self.tables.point_last_corrections.clone_ref(py)
-        }
-
-        #[getter]
-        fn images_behind<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            PyArray1::from_vec(py, self.solution.unseen.behind.iter().map(|&image| image as i64).collect())
-        }
-
-        #[getter]
-        fn images_folded<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            PyArray1::from_vec(py, self.solution.unseen.folded.iter().map(|&image| image as i64).collect())
-        }
-
-        #[getter]
-        fn loose_photos(&self) -> Vec<usize> {
-            self.solution.state.loose.clone()
-        }
-
-        #[getter]
-        fn weak_unknowns(&self) -> Vec<(usize, usize)> {
-            self.solution.weak.commons.clone()
-        }
-
-        #[getter]
-        fn adjusted_unknowns(&self) -> Vec<UnknownRow> {
-            self.solution.commons.iter().map(unknown_row).collect()
-        }
-
-        #[getter]
-        fn weak_cameras(&self) -> Vec<(usize, usize)> {
-            self.solution.weak.cameras.clone()
-        }
-
-        #[getter]
-        fn cameras(&self) -> Vec<CameraRow> {
-            self.solution.cameras.iter().map(camera_row).collect()
-        }
-
-        #[getter]
-        fn dropped(&self) -> Vec<(usize, &'static str)> {
-            self.solution.dropped.iter().map(|dropped| (dropped.point, dropped.reason.name())).collect()
-        }
-
-        #[getter]
-        fn sums_of_squares(&self) -> (f64, f64, f64, f64) {
-            let sums = self.solution.sums_of_squares;
-            (sums.camera, sums.ground, sums.plates, sums.observations)
-        }
-
-        #[getter]
-        fn redundancies(&self) -> Option<(f64, f64, f64, f64)> {
-            self.solution.redundancies.map(|own| (own.camera, own.ground, own.plates, own.observations))
-        }
-
-        #[getter]
-        fn adjusted_observations(&self) -> Vec<Option<AdjustedRow>> {
-            self.solution.observations.iter().map(|own| own.as_ref().map(adjusted_row)).collect()
-        }
-
-        #[getter]
-        fn photo_order<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            let order = &self.solution.adjustment.effort.order;
-            // A camera, a point that stays or a mount is no photo.
-            let photos = order.iter().filter(|&&block| block < self.solution.photos.len());
-            PyArray1::from_vec(py, photos.map(|&photo| photo as i64).collect())
-        }
+impl NetworkSolution {
+    /// Of a block or a collection, of so many unknowns of a photo: its pose, and its camera where that may be unknown.
+    fn new(py: Python<'_>, told: &mut Told, unknowns: usize, what: &str) -> PyResult<Self> {
+        let kept = Arc::new(Mutex::new(told.solution.converged.take()));
+        let Solution { adjustment, state, joint, weak, .. } = &told.solution;
+        let effort = &adjustment.effort;
+        let weak_points = weak.points.iter().map(|weak| (weak.point, weak.ratio, weak.distance));
+        Ok(Self {
+            status: status_name(adjustment.status),
+            initial_sum_of_squares: adjustment.initial_sum_of_squares,
+            iterations: adjustment.iterations.iter().map(iteration_row).collect(),
+            photo_cofactors: photo_cofactors(py, &told.solution.photos, unknowns)?.unbind(),
+            photo_redundancy: photo_redundancy(py, &told.solution.photos, unknowns)?.unbind(),
+            point_positions: table(py, take(&mut told.point_positions))?.unbind(),
+            point_cofactors: squares(py, take(&mut told.point_cofactors))?.unbind(),
+            point_redundancy: table(py, take(&mut told.point_redundancy))?.unbind(),
+            point_rays: PyArray1::from_vec(py, take(&mut told.point_rays)).unbind(),
+            residuals: table(py, take(&mut told.residuals))?.unbind(),
+            redundancy: table(py, take(&mut told.redundancy))?.unbind(),
+            standardized: table(py, take(&mut told.standardized))?.unbind(),
+            image_weights: PyArray1::from_vec(py, take(&mut told.image_weights)).unbind(),
+            redundancy_excess: adjustment.redundancy_excess,
+            undetermined: told.solution.undetermined.as_ref().map(|error| failure(error, what)),
+            degrees_of_freedom: told.solution.degrees_of_freedom,
+            variance_of_unit_weight: told.solution.variance_of_unit_weight,
+            counts: (adjustment.counts.observations, adjustment.counts.weighted, adjustment.counts.unknowns),
+            ordering: effort.ordering.name(),
+            predictions: predictions(py, adjustment)?.unbind(),
+            operations: operations(py, adjustment)?.unbind(),
+            formations: effort.formations,
+            seconds: seconds(py, adjustment)?.unbind(),
+            state: Py::new(py, BlockState { state: state.clone(), kept, joint: joint.clone() })?,
+            datum: told.solution.datum.held.clone(),
+            weak: weak.photos.clone(),
+            weak_points: weak_points.collect(),
+        })
     }
 }
 
-solution_class! {
-    /// An adjusted collection.
-    CollectionSolution, "collection", {
-        #[getter]
-        fn photo_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-            let parameters = |photo: &AdjustedPhoto| [&photo.pose, photo.camera.as_slice()].concat();
-            let all = self.solution.photos.iter().flat_map(parameters).collect();
-            PyArray1::from_vec(py, all).reshape([self.solution.photos.len(), self.unknowns])
-        }
+/// An adjusted block.
+#[pyclass(frozen, get_all, extends = NetworkSolution, module = "photogram._photocore")]
+pub struct BlockSolution {
+    relative_error: f64,
+    minimal_control: bool,
+    photo_corrections: Py<PyArray3<f64>>,
+    photo_positions: Py<PyArray2<f64>>,
+    photo_attitudes: Py<PyArray2<f64>>,
+    point_last_corrections: Py<PyArray2<f64>>,
+    images_behind: Py<PyArray1<i64>>,
+    images_folded: Py<PyArray1<i64>>,
+    loose_photos: Vec<usize>,
+    weak_unknowns: Vec<(usize, usize)>,
+    adjusted_unknowns: Vec<UnknownRow>,
+    weak_cameras: Vec<(usize, usize)>,
+    cameras: Vec<CameraRow>,
+    dropped: Vec<(usize, &'static str)>,
+    sums_of_squares: (f64, f64, f64, f64),
+    redundancies: Option<(f64, f64, f64, f64)>,
+    adjusted_observations: Vec<Option<AdjustedRow>>,
+    photo_order: Py<PyArray1<i64>>,
+}
 
-        #[getter]
-        fn photo_images<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-            PyArray1::from_vec(py, self.solution.photos.iter().map(|photo| photo.images as i64).collect())
-        }
+impl BlockSolution {
+    pub fn new(py: Python<'_>, mut told: Told) -> PyResult<Py<Self>> {
+        let base = NetworkSolution::new(py, &mut told, 6, "block")?;
+        let Told { solution: found, point_last_corrections, .. } = told;
+        let three = |first: usize| {
+            let part = |photo: &AdjustedPhoto| std::array::from_fn::<_, 3, _>(|k| photo.pose[first + k]);
+            table(py, found.photos.iter().map(part).collect()).map(Bound::unbind)
+        };
+        let numbers = |all: &[usize]| PyArray1::from_iter(py, all.iter().map(|&own| own as i64)).unbind();
+        let sums = found.sums_of_squares;
+        // A camera, a point that stays or a mount is no photo.
+        let order = found.adjustment.effort.order.iter().filter(|&&block| block < found.photos.len());
+        let own = Self {
+            relative_error: found.datum.relative_error,
+            minimal_control: found.datum.minimal_control,
+            photo_corrections: photo_corrections(py, &found.photo_corrections, &found.photos)?.unbind(),
+            photo_positions: three(0)?,
+            photo_attitudes: three(3)?,
+            point_last_corrections: table(py, point_last_corrections)?.unbind(),
+            images_behind: numbers(&found.unseen.behind),
+            images_folded: numbers(&found.unseen.folded),
+            photo_order: numbers(&order.copied().collect::<Vec<_>>()),
+            loose_photos: found.state.loose,
+            weak_unknowns: found.weak.commons,
+            adjusted_unknowns: found.commons.into_iter().map(unknown_row).collect(),
+            weak_cameras: found.weak.cameras,
+            cameras: found.cameras.into_iter().map(camera_row).collect(),
+            dropped: found.dropped.iter().map(|dropped| (dropped.point, dropped.reason.name())).collect(),
+            sums_of_squares: (sums.camera, sums.ground, sums.plates, sums.observations),
+            redundancies: found
+                .redundancies
+                .map(|own| (own.camera, own.ground, own.plates, own.observations)),
+            adjusted_observations: found.observations.into_iter().map(|own| own.map(adjusted_row)).collect(),
+        };
+        Py::new(py, PyClassInitializer::from(base).add_subclass(own))
+    }
+}
 
-        #[getter]
-        fn point_rays_behind(&self, py: Python<'_>) -> Py<PyArray1<i64>> {
-            self.tables.point_rays_behind.clone_ref(py)
-        }
+/// An adjusted collection.
+#[pyclass(frozen, get_all, extends = NetworkSolution, module = "photogram._photocore")]
+pub struct CollectionSolution {
+    photo_parameters: Py<PyArray2<f64>>,
+    photo_images: Py<PyArray1<i64>>,
+    point_rays_behind: Py<PyArray1<i64>>,
+    collapsed: Vec<usize>,
+    beside_stations: Vec<usize>,
+    not_determined: Vec<usize>,
+    sum_of_squares: f64,
+}
 
-        #[getter]
-        fn collapsed(&self) -> Vec<usize> {
-            [Reason::RanIntoStation, Reason::AtStation].map(|why| left_out(&self.solution, why)).concat()
-        }
-
-        #[getter]
-        fn beside_stations(&self) -> Vec<usize> {
-            left_out(&self.solution, Reason::NearStation)
-        }
-
-        #[getter]
-        fn not_determined(&self) -> Vec<usize> {
-            [Reason::NotDetermined, Reason::RanOff].map(|why| left_out(&self.solution, why)).concat()
-        }
-
-        #[getter]
-        fn sum_of_squares(&self) -> f64 {
-            self.solution.sums_of_squares.total()
-        }
+impl CollectionSolution {
+    /// Of so many unknowns of a photo.
+    pub fn new(py: Python<'_>, mut told: Told, unknowns: usize) -> PyResult<Py<Self>> {
+        let base = NetworkSolution::new(py, &mut told, unknowns, "collection")?;
+        let Told { solution: found, point_rays_behind, .. } = told;
+        let parameters =
+            found.photos.iter().flat_map(|photo| [&photo.pose, photo.camera.as_slice()].concat());
+        let own = Self {
+            photo_parameters: PyArray1::from_vec(py, parameters.collect())
+                .reshape([found.photos.len(), unknowns])?
+                .unbind(),
+            photo_images: PyArray1::from_iter(py, found.photos.iter().map(|photo| photo.images as i64))
+                .unbind(),
+            point_rays_behind: PyArray1::from_vec(py, point_rays_behind).unbind(),
+            collapsed: [Reason::RanIntoStation, Reason::AtStation].map(|why| left_out(&found, why)).concat(),
+            beside_stations: left_out(&found, Reason::NearStation),
+            not_determined: [Reason::NotDetermined, Reason::RanOff].map(|why| left_out(&found, why)).concat(),
+            sum_of_squares: found.sums_of_squares.total(),
+        };
+        Py::new(py, PyClassInitializer::from(base).add_subclass(own))
     }
 }

@@ -2,11 +2,10 @@
 
 use std::sync::{Arc, Mutex};
 
-use numpy::PyArray2;
-use photocore::network::{Converged, InnerConstraints, Joint, NetworkDatum, Solution, State};
+use photocore::network::{Converged, InnerConstraints, Joint, NetworkDatum, State};
 use pyo3::prelude::*;
 
-use crate::arrays::matrix;
+use crate::arrays::{Matrix, matrix};
 use crate::options::{named_ordering, unknown};
 
 /// What a datum is: its name, points, photos, whether scale counts, photos whose attitudes count, and what makes these lengths.
@@ -42,11 +41,6 @@ type StateRow = (Vec<f64>, Vec<usize>, Vec<usize>, Vec<usize>, String, Option<Da
 /// A network where its adjustment has converged, until the first that asks takes it: its memory is that of the adjustment.
 pub type Kept = Arc<Mutex<Option<Box<Converged>>>>;
 
-/// Takes what a solution has kept.
-pub fn kept(solution: &mut Solution) -> Kept {
-    Arc::new(Mutex::new(solution.converged.take()))
-}
-
 /// Where an adjustment has ended.
 #[pyclass(frozen, module = "photogram._photocore")]
 pub struct BlockState {
@@ -80,7 +74,7 @@ impl BlockState {
         Ok(Self { state, kept: Kept::default(), joint: None })
     }
 
-    fn joint<'py>(&self, py: Python<'py>, points: Vec<usize>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    fn joint<'py>(&self, py: Python<'py>, points: Vec<usize>) -> PyResult<Option<Matrix<'py>>> {
         let joint = self.joint.as_ref().filter(|joint| joint.points == points);
         joint.map(|joint| matrix(py, joint.cofactors.clone(), true)).transpose()
     }

@@ -5,15 +5,8 @@ use std::collections::BTreeMap;
 use photocore::adjustment::{History, Iteration};
 use pyo3::prelude::*;
 
-/// Adds the functions to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(judge_full_step, module)?)?;
-    module.add_function(wrap_pyfunction!(is_chord, module)?)?;
-    module.add_function(wrap_pyfunction!(step_rules, module)?)
-}
-
 #[pyfunction]
-fn step_rules() -> BTreeMap<&'static str, f64> {
+pub fn step_rules() -> BTreeMap<&'static str, f64> {
     let mut rules = BTreeMap::from(photocore::adjustment::step_rules());
     rules.insert("least_redundancy", photocore::network::LEAST_REDUNDANCY);
     rules
@@ -22,7 +15,7 @@ fn step_rules() -> BTreeMap<&'static str, f64> {
 /// What a full step is by its length and by the damping and length of those before.
 #[pyfunction]
 #[pyo3(signature = (taken, change, *, chord, unknowns, tolerance))]
-fn judge_full_step(
+pub fn judge_full_step(
     taken: Vec<(f64, f64)>,
     change: f64,
     chord: Option<f64>,
@@ -49,6 +42,6 @@ fn judge_full_step(
 }
 
 #[pyfunction]
-fn is_chord(chord: f64, change: f64) -> bool {
+pub fn is_chord(chord: f64, change: f64) -> bool {
     History::is_chord(chord, change)
 }

@@ -2,14 +2,10 @@
 
 use std::sync::Arc;
 
+use crate::arrays::Vector;
 use numpy::PyArray1;
 use photocore::network::{Subject, Suspects};
 use pyo3::prelude::*;
-
-/// Adds the class to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<NetworkSuspects>()
-}
 
 /// The groups of observations that are tested together.
 #[pyclass(module = "photogram._photocore", frozen)]
@@ -48,7 +44,7 @@ impl NetworkSuspects {
     }
 
     #[getter]
-    fn deviations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn deviations<'py>(&self, py: Python<'py>) -> Vector<'py> {
         PyArray1::from_slice(py, self.0.deviations())
     }
 }

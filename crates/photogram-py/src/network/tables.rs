@@ -1,13 +1,9 @@
-//! What an adjustment has found of points and images, in arrays.
+//! What an adjustment has found of points and images, in columns.
 
-use numpy::{PyArray1, PyArray2, PyArray3};
 use photocore::Threads;
 use photocore::adjustment::Observed;
 use photocore::network::{AdjustedPoint, Solution};
-use pyo3::prelude::*;
 use rayon::prelude::*;
-
-use crate::arrays::{squares, table};
 
 /// Points and images that a thread takes at least.
 const TOGETHER: usize = 4096;
@@ -15,16 +11,16 @@ const TOGETHER: usize = 4096;
 /// A solution whose points and images stand in columns: made on all threads, before Python waits for it.
 pub struct Told {
     pub solution: Solution,
-    point_positions: Vec<[f64; 3]>,
-    point_cofactors: Vec<[[f64; 3]; 3]>,
-    point_redundancy: Vec<[f64; 3]>,
-    point_last_corrections: Vec<[f64; 3]>,
-    point_rays: Vec<i64>,
-    point_rays_behind: Vec<i64>,
-    residuals: Vec<[f64; 2]>,
-    redundancy: Vec<[f64; 2]>,
-    standardized: Vec<[f64; 2]>,
-    image_weights: Vec<f64>,
+    pub point_positions: Vec<[f64; 3]>,
+    pub point_cofactors: Vec<[[f64; 3]; 3]>,
+    pub point_redundancy: Vec<[f64; 3]>,
+    pub point_last_corrections: Vec<[f64; 3]>,
+    pub point_rays: Vec<i64>,
+    pub point_rays_behind: Vec<i64>,
+    pub residuals: Vec<[f64; 2]>,
+    pub redundancy: Vec<[f64; 2]>,
+    pub standardized: Vec<[f64; 2]>,
+    pub image_weights: Vec<f64>,
 }
 
 impl Told {
@@ -59,37 +55,6 @@ impl Told {
             image_weights: column(&images, f64::NAN, |image| image.weight),
         }
     }
-
-    /// The solution, and its columns as arrays.
-    pub fn tables(self, py: Python<'_>) -> PyResult<(Solution, Tables)> {
-        let tables = Tables {
-            point_positions: table(py, self.point_positions)?.unbind(),
-            point_cofactors: squares(py, self.point_cofactors)?.unbind(),
-            point_redundancy: table(py, self.point_redundancy)?.unbind(),
-            point_last_corrections: table(py, self.point_last_corrections)?.unbind(),
-            point_rays: PyArray1::from_vec(py, self.point_rays).unbind(),
-            point_rays_behind: PyArray1::from_vec(py, self.point_rays_behind).unbind(),
-            residuals: table(py, self.residuals)?.unbind(),
-            redundancy: table(py, self.redundancy)?.unbind(),
-            standardized: table(py, self.standardized)?.unbind(),
-            image_weights: PyArray1::from_vec(py, self.image_weights).unbind(),
-        };
-        Ok((self.solution, tables))
-    }
-}
-
-/// The arrays of points, (n, ...), and images, (m, ...): they are handed out as they are.
-pub struct Tables {
-    pub point_positions: Py<PyArray2<f64>>,
-    pub point_cofactors: Py<PyArray3<f64>>,
-    pub point_redundancy: Py<PyArray2<f64>>,
-    pub point_last_corrections: Py<PyArray2<f64>>,
-    pub point_rays: Py<PyArray1<i64>>,
-    pub point_rays_behind: Py<PyArray1<i64>>,
-    pub residuals: Py<PyArray2<f64>>,
-    pub redundancy: Py<PyArray2<f64>>,
-    pub standardized: Py<PyArray2<f64>>,
-    pub image_weights: Py<PyArray1<f64>>,
 }
 
 /// One part of everything that takes part; `missing` of all else.

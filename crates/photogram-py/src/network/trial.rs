@@ -1,6 +1,6 @@
 //! A network tried without some of its observations.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use photocore::adjustment::Loss;
 use photocore::network::{Moved, Network, Options, Out, Outcome, Trial, UnknownOf};
 use pyo3::prelude::*;
@@ -9,15 +9,10 @@ use pyo3::types::PyDict;
 use super::covariances::Refused;
 use super::state::BlockState;
 use super::suspects::NetworkSuspects;
-use crate::arrays::table;
+use crate::arrays::{Matrix, Vector, table};
 use crate::options::named_loss;
 use crate::solution::status_name;
 use crate::work::{Workers, watched};
-
-/// Adds the class to the extension module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<NetworkTrial>()
-}
 
 /// A network tried without some of its observations.
 #[pyclass(module = "photogram._photocore")]
@@ -91,7 +86,7 @@ impl NetworkTrial {
     }
 
     #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Matrix<'py>> {
         table(py, self.trial.points())
     }
 
@@ -126,7 +121,7 @@ impl NetworkTrial {
         scale: f64,
         iterations: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+    ) -> PyResult<Option<Vector<'py>>> {
         let Some(loss): Option<Loss> = named_loss(Some((loss, scale)))? else {
             return Ok(None);
         };
@@ -174,7 +169,7 @@ impl NetworkTrial {
         py: Python<'py>,
         points: Vec<usize>,
         gone: bool,
-    ) -> PyResult<Vec<(Vec<usize>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)>> {
+    ) -> PyResult<Vec<(Vec<usize>, Vector<'py>, Matrix<'py>)>> {
         let found = watched(py, self.workers(), None, |pool, _| match gone {
             true => self.trial.on_gone_points(&points, pool),
             false => self.trial.on_points(&points, pool),
@@ -189,12 +184,12 @@ impl NetworkTrial {
             .collect()
     }
 
-    fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Matrix<'py>> {
         let found = watched(py, self.workers(), None, |pool, _| self.trial.effects(&suspects, pool))?;
         table(py, found.map_err(|error| (self.refused)(&error))?)
     }
 
-    fn responses<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn responses<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Matrix<'py>> {
         let found = watched(py, self.workers(), None, |pool, _| self.trial.responses(&suspects, pool))?;
         let columns = found.map_err(|error| (self.refused)(&error))?;
         let rows = self.trial.suspects().row_starts().last().copied().unwrap_or_default();

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from photogram.comparator.listing.averages import averages_page
-from photogram.comparator.listing.correction import correction_table
-from photogram.comparator.listing.input import input_page, title_page
-from photogram.comparator.listing.joint import joint_page, tests_page
+from photogram.comparator.calibration import Calibration, CaseResult
+from photogram.comparator.listing.forms import residual_page
 from photogram.comparator.listing.parameters import (
     case_linear_page,
     case_polynomial_page,
     combined_linear_page,
     combined_polynomial_page,
+    correction_table,
+    joint_page,
+    summary_page,
+    tests_page,
 )
-from photogram.comparator.listing.pointing import pointing_pages
-from photogram.comparator.listing.residuals import residual_page
-from photogram.comparator.listing.summary import summary_page
-
-if TYPE_CHECKING:
-    from photogram.comparator.calibration import Calibration, CaseResult
+from photogram.comparator.listing.readings import averages_page, input_page, pointing_pages, title_page
 
 __all__ = ["listing"]
 

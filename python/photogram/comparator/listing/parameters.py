@@ -1,30 +1,34 @@
-"""Linear parameters and polynomials, of one case and of all (figures 17, 18, 21 and 22)."""
+"""Parameters of one case and of all, corrections, summary (figures 17 to 23 and 30), and what goes beyond."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.listing.forms import angle, centred, nearest, triangle
-from photogram.comparator.listing.residuals import residual_lines
-from photogram.comparator.polynomial import TERMS
+from photogram.arguments.types import Floats
+from photogram.comparator.calibration import Calibration, CaseResult
+from photogram.comparator.combined_solution import SinglePolynomial
+from photogram.comparator.joint import JointFit, JointPlate
+from photogram.comparator.listing.forms import angle, centred, nearest, number, residual_lines, triangle
+from photogram.comparator.polynomial import TERMS, Polynomial
+from photogram.comparator.tables import terms
+from photogram.comparator.variance import AxisSigma, CaseVarianceTest, PolynomialTest
 from photogram.show.angles import ARCSEC
-
-if TYPE_CHECKING:
-    from photogram.arguments.types import Floats
-    from photogram.comparator.calibration import Calibration, CaseResult
-    from photogram.comparator.combined_solution import SinglePolynomial
+from photogram.show.lines import field, table_lines
 
 __all__ = [
     "case_linear_page",
     "case_polynomial_page",
     "combined_linear_page",
     "combined_polynomial_page",
-    "linear_lines",
-    "polynomial_lines",
+    "correction_table",
+    "joint_page",
+    "summary_page",
+    "table_nodes",
+    "tests_page",
 ]
+
 
 NAMES = ("SCALE X", "SCALE Y", "ALPHA")
 LETTERS = "ABCDEFGHJ"
@@ -128,3 +132,202 @@ def combined_polynomial_page(calibration: Calibration) -> list[str]:
         f"   STANDARD ERROR OF UNIT WEIGHT = {nonlinear.sigma0_um:.4f} MICRONS"
         f"   DEGREES OF FREEDOM = {nonlinear.degrees_of_freedom}",
     ]
+
+
+STEP_UM = 25_000.0
+"""Distance of the nodes."""
+ROWS = 9
+
+
+def table_nodes(centre_um: float) -> list[Floats]:
+    """Return the nodes of the program's table: nine rows of falling x, each (9, 2) or (5, 2) with falling y.
+
+    The middle of the range of the comparator (TRANS) is theirs; they reach 0.1 m to either side.
+    """
+    steps = STEP_UM * np.arange(ROWS // 2, -(ROWS // 2) - 1, -1)
+    rows = []
+    for row, x in enumerate(steps.tolist()):
+        y = steps if row % 2 == 0 else steps[::2]
+        rows.append(centre_um + np.column_stack([np.full(len(y), x), y]))
+    return rows
+
+
+def correction_table(calibration: Calibration, case: CaseResult | None = None) -> list[str]:
+    """Return the corrections at fixed places: of a case alone, else of the combined adjustment."""
+    source = case.polynomial if case else calibration.nonlinear
+    if source is None:
+        return []
+    polynomial = source.polynomial
+    nodes = table_nodes(calibration.session.centre_um)
+    whose = f"CASE NUMBER {case.number}" if case else f"{len(calibration.cases)} CASES"
+    lines = centred(f"NONLINEAR CORRECTIONS, {whose} (MICRONS)")
+    outside = False
+    for row in nodes:
+        values = polynomial.evaluate(row)
+        gap = "" if len(row) == len(nodes) else " " * 11
+        marks = [" " if there else "*" for there in _inside(polynomial, row)]
+        outside = outside or "*" in marks
+        for axis, head in enumerate((f"X={row[0, 0] / 1e6:7.4f} M.", " " * 12)):
+            cells = [f"{value:10.3f}{mark}" for value, mark in zip(values[:, axis], marks, strict=True)]
+            lines.append(head + gap.join(cells))
+        lines.append("")
+    places = "".join(f"{y / 1e6:10.4f} " for y in nodes[0][:, 1])
+    lines += [f"Y= (METERS) {places}", "UPPER NUMBER IN X, LOWER NUMBER IN Y"]
+    return [*lines, "* OUTSIDE THE RANGE MEASURED"] if outside else lines
+
+
+def _inside(polynomial: Polynomial, places_um: Floats) -> list[bool]:
+    """Say of places (n, 2) whether both coordinates were measured; beyond, the polynomials extrapolate."""
+    furthest = np.abs(polynomial.frame.arguments(places_um)).max(axis=1)
+    return [distance <= 1 + 1e-9 for distance in furthest.tolist()]
+
+
+def summary_page(calibration: Calibration) -> list[str]:
+    """Return the summary: analysis of variance, linear parameters, polynomials."""
+    session, linear, nonlinear = calibration.session, calibration.linear, calibration.nonlinear
+    operators = ", ".join(str(operator) for operator in calibration.pointing.operators)
+    plates = ", ".join(str(plate) for plate in calibration.plates)
+    own = linear.correction
+    lines = [
+        *centred("CALIBRATION SUMMARY"),
+        f"  COMPARATOR NUMBER {session.comparator}   {len(calibration.cases)} CASES   OPERATOR {operators}"
+        f"   GRID {plates}   DATE {session.date or '-'}",
+        "",
+        *variance_lines(calibration),
+        "",
+        "LINEAR PARAMETERS",
+        *linear_lines(own.scale_x, own.scale_y, own.nonorthogonality_rad, linear.covariance),
+    ]
+    if nonlinear:
+        x, y = nonlinear.polynomial.coefficients
+        lines += ["", "NONLINEAR PARAMETERS", *polynomial_lines(x, y, nonlinear.covariance)]
+    return lines
+
+
+def variance_lines(calibration: Calibration) -> list[str]:
+    """Return the analysis of variance, standard deviations in micrometres."""
+    variance = calibration.variance
+    head = f"STATISTICAL SUMMARY (MICRONS){'X':>30}{'Y':>10}{'TOTAL':>10}"
+    sigmas = [session_sigma(calibration, plate) for plate in calibration.plates]
+    return [
+        head,
+        _line("RMS ERROR BEFORE CALIBRATION", variance.before),
+        _line("AFTER LINEAR CORRECTIONS", variance.after_linear),
+        _line("AFTER LINEAR AND NONLINEAR CORRECTIONS", variance.after_nonlinear),
+        _line("MEAN POINTING", variance.pointing),
+        *(
+            _total(f"A PRIORI GRID {plate}", sigma)
+            for plate, sigma in zip(calibration.plates, sigmas, strict=True)
+        ),
+        *(
+            _total(f"COMPUTED UNBIASED GRID {plate}", calibration.sigma_grid_um(plate))
+            for plate in calibration.plates
+        ),
+        _total("SYSTEMATIC COMPARATOR, LINEAR", variance.linear),
+        _total("SYSTEMATIC COMPARATOR, NONLINEAR", variance.nonlinear),
+        _total("RANDOM COMPARATOR", variance.random),
+    ]
+
+
+def session_sigma(calibration: Calibration, plate: int) -> float:
+    """Return the known standard deviation of a plate; NaN where there is none."""
+    sigma = calibration.session.grids[plate].sigma_um
+    return math.nan if sigma is None else sigma
+
+
+def _line(name: str, sigma: AxisSigma | None) -> str:
+    values = (sigma.x, sigma.y, sigma.total) if sigma else (None, None, None)
+    return f"  {name:<47}" + "".join(number(value, 10, 3) for value in values)
+
+
+def _total(name: str, value: float) -> str:
+    return f"  {name:<67}{number(value, 10, 3)}"
+
+
+def tests_page(calibration: Calibration) -> list[str]:
+    """Return the tests of polynomials and of case variances."""
+    lines = centred("TESTS OF SIGNIFICANCE")
+    if calibration.polynomial_tests:
+        lines += [*_polynomial(calibration.polynomial_tests), ""]
+    if calibration.case_test:
+        lines += _cases(calibration.case_test)
+    return lines
+
+
+def _polynomial(test: PolynomialTest) -> list[str]:
+    first, second = test.degrees_of_freedom
+    axis, term, _, coefficient, sd, ratio, p = terms(test.terms)
+    row = [*field(axis, 6, head="AXIS", gap="  "), *field(term, 6, head="TERM")]
+    row += [*field(coefficient, 12, ".3f", "COEFFICIENT"), *field(sd, 10, ".3f", "SIGMA")]
+    row += [*field(ratio, 10, ".2f", "T"), *field(p, 14, ".4f", "PROBABILITY")]
+    return [
+        f"ALL TERMS TOGETHER: F = {test.ratio:.2f} WITH {first} AND {second} DEGREES OF FREEDOM,"
+        f" PROBABILITY {_probability(test.probability)}",
+        "EACH TERM, ITS ARGUMENT FROM -1 TO 1 OVER THE MEASURED RANGE (MICRONS)",
+        *table_lines(row),
+    ]
+
+
+def _cases(test: CaseVarianceTest) -> list[str]:
+    lines = [
+        f"VARIANCES OF THE CASES: F-MAX = {test.f_max:.2f} (AT LEAST {test.degrees_of_freedom} DEGREES OF"
+        f" FREEDOM), LIMIT {number(test.f_max_limit, 0, 2)},"
+        f" PROBABILITY {_probability(test.f_max_probability)}",
+        f"  BARTLETT: PROBABILITY {_probability(test.bartlett_probability)}"
+        f"   LEVENE: PROBABILITY {_probability(test.levene_probability)}",
+    ]
+    if test.f_max_limit is not None:
+        equal = test.f_max <= test.f_max_limit
+        lines.append(f"  THE CASES ARE {'' if equal else 'NOT '}OF ONE POPULATION (95 PERCENT)")
+    return lines
+
+
+def _probability(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4f}"
+
+
+def joint_page(calibration: Calibration, joint: JointFit) -> list[str]:
+    """Return the joint adjustment."""
+    correction = joint.correction
+    lines = [
+        *centred("JOINT ADJUSTMENT OF CASES, COMPARATOR, POLYNOMIALS AND GRID"),
+        f"  STANDARD ERROR OF UNIT WEIGHT {joint.sigma0:.4f}   DEGREES OF FREEDOM {joint.degrees_of_freedom}",
+        f"  RANDOM COMPARATOR {joint.random_um:.3f} MICRONS (ESTIMATED)",
+        *(line for number_, plate in joint.plates.items() for line in _plate(number_, plate)),
+        "",
+        *linear_lines(
+            correction.scale_x, correction.scale_y, correction.nonorthogonality_rad, joint.covariance
+        ),
+        f"  WEIGHTED MEAN OF THE REPORT AGAINST A JOINT ADJUSTMENT UNDER ITS ASSUMPTIONS: WITHIN"
+        f" {number(calibration.joint_check, 0, 6)} SIGMA",
+    ]
+    polynomial = correction.polynomial
+    if calibration.nonlinear and polynomial is not None:
+        x, y = polynomial.coefficients
+        covariance = joint.sigma0**2 * polynomial.cofactors
+        lines += ["", *polynomial_lines(x, y, covariance)]
+    for plate, own in joint.plates.items():
+        lines += ["", f"CORRECTIONS OF GRID {plate} IN ITS OWN AXES (MICRONS)", *_grid(own)]
+    return lines
+
+
+def _plate(plate: int, own: JointPlate) -> list[str]:
+    how = "ESTIMATED" if own.estimated else "GIVEN"
+    ratio = "-" if own.variance_ratio is None else f"{own.variance_ratio:.3f}"
+    lines = [f"  GRID {plate} STANDARD DEVIATION {own.sigma_um:.3f} MICRONS ({how}), VARIANCE RATIO {ratio}"]
+    if own.test:
+        low, high = own.test.limits
+        verdict = "NOT " if own.test.rejected_high or own.test.rejected_low else ""
+        lines.append(
+            f"    TEST OF ITS STANDARD DEVIATION: VARIANCE RATIO FROM {low:.3f} TO {high:.3f} (95 PERCENT),"
+            f" PROBABILITY {own.test.probability:.4f}: {verdict}ACCEPTED"
+        )
+    return lines
+
+
+def _grid(own: JointPlate) -> list[str]:
+    sd = np.sqrt(np.diagonal(own.covariance_um2, axis1=1, axis2=2))
+    rows = zip(own.points.tolist(), own.corrections_um.tolist(), sd.tolist(), strict=True)
+    head = f"  {'POINT':>5}{'DX':>10}{'DY':>10}{'SIGMA X':>12}{'SIGMA Y':>10}"
+    lines = [f"  {point:5d}{dx:10.3f}{dy:10.3f}{sx:12.3f}{sy:10.3f}" for point, (dx, dy), (sx, sy) in rows]
+    return [head, *lines]

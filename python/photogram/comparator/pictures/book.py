@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
-from photogram.comparator.listing.joint import tests_page
-from photogram.comparator.listing.summary import summary_page
+from photogram.comparator.listing.parameters import summary_page, tests_page
 from photogram.comparator.pictures.correction import correction_surface, distorted_grid
 from photogram.comparator.pictures.ellipses import (
     operator_ellipses,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.listing.correction import table_nodes
+from photogram.comparator.listing.parameters import table_nodes
 from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, plain
 from photogram.show.pictures import new_figure, round_length
 from photogram.show.style import signed

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.orientation import exchanged
+from photogram.comparator.case import exchanged
 from photogram.comparator.pictures.style import (
     ACCENT,
     FAINT,

@@ -5,10 +5,5 @@ from photogram.comparator.years.record import RecordedCalibration, RecordedCase
 
 __all__ = ["Comparison", "RecordedCalibration", "RecordedCase", "compare"]
 
-WAYS = {
-    "document_of": ("document",),
-    "findings_of": ("findings",),
-    "page_of": ("page",),
-    "report_of": ("document",),
-}
+WAYS = dict.fromkeys(("document_of", "findings_of", "page_of", "report_of"), ("report",))
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""

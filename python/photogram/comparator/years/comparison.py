@@ -1,4 +1,11 @@
-"""Calibrations compared: histories of comparators, and the grids that all of them measured."""
+"""Calibrations compared: histories of comparators, and the grids that all of them measured.
+
+What of a comparator is compared does not depend on where polynomials are counted. Scales and cubic terms
+share what they explain, and the frames of two calibrations differ: coefficients cannot be compared. In the
+range that all calibrations measured, the whole correction is taken apart into Legendre polynomials of x and
+of y, which are orthogonal there: those of first degree are the scales and the lack of orthogonality, those of
+degrees two to four the shape that is left (docs/comparator.md, Calibrations over years).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +22,6 @@ from photogram.comparator.grid import Grid
 from photogram.comparator.gridfile import corrected
 from photogram.comparator.polynomial import Frame, Polynomial
 from photogram.comparator.years.joint import Together, adjust_together
-from photogram.comparator.years.quantities import common_range, quantities_of
 from photogram.comparator.years.record import RecordedCalibration
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -25,6 +31,138 @@ from photogram.statistics.distributions import LEVEL
 from photogram.statistics.history import History, dates_of, history
 
 __all__ = ["Comparison", "compare"]
+
+
+DEGREE = 4
+NODES = 7
+"""In each direction: what is taken apart is a polynomial of fourth degree."""
+PPM = 1e6
+ARCSEC = math.radians(1 / 3600)
+PERCENT = 100.0
+LEAST_UM = 2e-3
+"""A comparator that is estimated to be better than this is without error: its logarithm says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quantities:
+    """Values (k, m) of k calibrations with their covariance (k, m, k, m), names and units."""
+
+    values: Floats
+    covariance: Floats
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+def common_range(records: Sequence[RecordedCalibration]) -> Frame:
+    """Return the range of readings that all calibrations measured.
+
+    Raises InputError: there is none.
+    """
+    identities = [each.correction.identity for each in records]
+    low = np.max([each.low_um for each in identities if each], axis=0)
+    high = np.min([each.high_um for each in identities if each], axis=0)
+    if not (low < high).all():
+        raise InputError(f"the calibrations of {records[0].comparator} have no range of readings in common")
+    return Frame.of(np.array([low, high]))
+
+
+def quantities_of(
+    records: Sequence[RecordedCalibration],
+    corrections: Sequence[Correction],
+    covariance: Floats,
+    frame: Frame,
+) -> Quantities:
+    """Return what is compared of one comparator, over the range that its calibrations have in common.
+
+    The corrections are those that were adjusted together, with the covariance (k, 21, k, 21) of their
+    parameters.
+    """
+    bent = all(np.diag(each.covariance)[3:].any() for each in corrections)
+    taken, names, units = _figures(frame, bent)
+    nodes, apart = _apart(frame)
+    values, jacobians = [], []
+    for each in corrections:
+        by_parameters, _ = each._partials(nodes)
+        coefficients = apart @ (each.apply(nodes) - nodes)
+        values.append(taken @ coefficients.ravel())
+        jacobians.append(
+            taken @ np.einsum("tn,nap->tap", apart, by_parameters).reshape(-1, by_parameters.shape[2])
+        )
+    j = np.array(jacobians)
+    whole = np.einsum("imp,ipjq,jnq->imjn", j, covariance, j)
+    spread, variances, more = _precision(records)
+    k, m = len(records), len(names)
+    full = np.zeros((k, m + len(more), k, m + len(more)))
+    full[:, :m, :, :m] = whole
+    for column in range(len(more)):
+        full[np.arange(k), m + column, np.arange(k), m + column] = variances[:, column]
+    return Quantities(
+        np.column_stack([np.array(values), spread]), full, (*names, *more), (*units, *["percent"] * len(more))
+    )
+
+
+def _apart(frame: Frame) -> tuple[Floats, Floats]:
+    """Return nodes (n, 2) and what takes displacements there apart: (9, n) for 1, P1..P4 of x, of y."""
+    one = np.polynomial.legendre.leggauss(NODES)[0]
+    x, y = (each.ravel() for each in np.meshgrid(one, one))
+    of_x, of_y = (np.polynomial.legendre.legvander(each, DEGREE) for each in (x, y))
+    basis = np.hstack([of_x, of_y[:, 1:]])
+    nodes = np.array(frame.centre_um) + np.column_stack([x, y]) * np.array(frame.half_range_um)
+    return nodes, np.linalg.pinv(basis)
+
+
+def _figures(frame: Frame, bent: bool) -> tuple[Floats, tuple[str, ...], tuple[str, ...]]:
+    """Return the figures as linear forms of coefficients (9 of x, y: 18), with their names and units."""
+    half_x, half_y = frame.half_range_um
+
+    def at(term: int, axis: int) -> int:
+        return 2 * term + axis
+
+    # Terms: 0 is 1, 1 to 4 are P1 to P4 of x, 5 to 8 those of y.
+    rows = np.zeros((3, 18))
+    rows[0, at(1, 0)] = PPM / half_x
+    rows[1, at(5, 1)] = PPM / half_y
+    rows[2, at(5, 0)], rows[2, at(1, 1)] = 1 / half_y / ARCSEC, 1 / half_x / ARCSEC
+    names, units = ["scale x", "scale y", "lack of orthogonality"], ["um/m", "um/m", "arc seconds"]
+    if bent:
+        shapes = [(axis, along, degree) for axis in (0, 1) for along in (0, 1) for degree in (2, 3, 4)]
+        more = np.zeros((len(shapes), 18))
+        for row, (axis, along, degree) in enumerate(shapes):
+            more[row, at(degree + 4 * along, axis)] = 1.0
+            names.append(f"degree {degree} of {'xy'[axis]} along {'xy'[along]}")
+            units.append("um")
+        rows = np.vstack([rows, more])
+    return rows, tuple(names), tuple(units)
+
+
+def _precision(records: Sequence[RecordedCalibration]) -> tuple[Floats, Floats, tuple[str, ...]]:
+    """Return logarithms of standard deviations less their mean, in percent, and their variances.
+
+    A standard deviation from f degrees of freedom has a logarithm of variance 1 / (2 f). That of the
+    comparator itself is what pointings leave of the means, with the variance of both.
+    """
+    names, values, variances = [], [], []
+    if all(each.pointing_freedom > 0 and min(each.pointing_um) > 0 for each in records):
+        for axis in (0, 1):
+            names.append(f"pointing in {'xy'[axis]}")
+            values.append([math.log(each.pointing_um[axis]) for each in records])
+            variances.append([0.5 / each.pointing_freedom for each in records])
+    if all(each.random_um > LEAST_UM for each in records):
+        names.append("random comparator")
+        values.append([math.log(each.random_um) for each in records])
+        variances.append([0.5 / each.freedom * _share(each) ** 2 for each in records])
+    logs, scatter = (
+        np.array(values).reshape(-1, len(records)).T,
+        np.array(variances).reshape(-1, len(records)).T,
+    )
+    return PERCENT * (logs - logs.mean(axis=0)), PERCENT**2 * scatter, tuple(names)
+
+
+def _share(record: RecordedCalibration) -> float:
+    """Return the variance of a mean reading over that of the comparator in it."""
+    counts = np.concatenate([case.counts for case in record.cases])
+    pointing = float(np.mean(np.square(record.pointing_um)) * (1 / counts).mean())
+    return 1 + pointing / record.random_um**2
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,10 +18,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.comparator.case import exchanged
 from photogram.comparator.correction import PARAMETERS
-from photogram.comparator.decomposition import rotation_matrix
+from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.grid import Grid
-from photogram.comparator.orientation import exchanged
 from photogram.comparator.years.record import RecordedCalibration, RecordedCase
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass
@@ -87,14 +87,9 @@ class _Reduced:
 def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
     """Adjust all calibrations in one; see the module.
 
-    Raises
-    ------
-    InputError
-        Plates of one number with other points or coordinates.
-    AdjustmentError
-        The measurements do not determine the unknowns.
-    OutOfMemoryError
-        There is not enough memory for the covariance of all grid points.
+    Raises InputError: plates of one number with other points or coordinates. AdjustmentError: the
+    measurements do not determine the unknowns. OutOfMemoryError: there is not enough memory for the
+    covariance of all grid points.
     """
     grids = _grids(records)
     starts = dict(zip(grids, np.cumsum([0, *(len(grid.points) for grid in grids.values())]), strict=False))

@@ -133,10 +133,7 @@ class RecordedCalibration:
 def day_of(text: str) -> date:
     """Return the day that a date says: 1972-07-17, or 7/17/72 as the report writes it.
 
-    Raises
-    ------
-    InputError
-        It says none.
+    Raises InputError: it says none.
     """
     written = text.strip()
     if found := ISO.match(written):

@@ -1,14 +1,8 @@
 """Cameras over years: what changed."""
 
-from photogram.film.years.comparison import CameraComparison, compare_cameras
-from photogram.film.years.dated import DatedCamera
+from photogram.film.years.comparison import CameraComparison, DatedCamera, compare_cameras
 
 __all__ = ["CameraComparison", "DatedCamera", "compare_cameras"]
 
-WAYS = {
-    "document_of": ("document",),
-    "findings_of": ("findings",),
-    "page_of": ("page",),
-    "report_of": ("document",),
-}
+WAYS = dict.fromkeys(("document_of", "findings_of", "page_of", "report_of"), ("report",))
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""

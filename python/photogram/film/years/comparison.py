@@ -1,23 +1,205 @@
-"""Calibrations of cameras compared: histories of each camera that was calibrated more than once."""
+"""Calibrations of cameras compared: histories of each camera that was calibrated more than once.
+
+What is compared does not depend on the model of a camera and its balance. Principal distance and radial terms
+share what they explain, and laboratories balance curves differently: parameters cannot be compared. In the
+field that all calibrations have in common, up to the angle alpha, the images of directions are taken apart
+into fields that are orthogonal over a disc: a shift, a scale (the principal distance that suits the whole
+field), the radial shapes R_3, R_5, R_7 of Zernike, decentring, affinity and shear. With
+rho = tan(angle) / tan(alpha) each has the length 1 at the edge, where rho = 1.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from datetime import date
 
 import numpy as np
 
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.film.certificate import Certificate
-from photogram.film.years.dated import DatedCamera
-from photogram.film.years.figures import figures_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
+from photogram.network.cameras import Camera
 from photogram.show.methods import Shown
 from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.history import History, dates_of, history
 
-__all__ = ["CameraComparison", "compare_cameras"]
+__all__ = ["CameraComparison", "DatedCamera", "compare_cameras", "figures_of"]
+
+
+NODES = 9
+"""Radii, by Gauss and Legendre."""
+AZIMUTHS = 12
+STEP = 0.01
+"""Of differences, in standard deviations."""
+UM = 1e3
+"""In a millimetre."""
+LEAST = 1e-4
+"""Part of the largest of the other standard deviations below which a figure is held, not estimated."""
+ALONE = 1e-3
+"""Part of its standard deviation that the figures before it must leave a figure."""
+
+_RADIAL = ((0, 1), (-2, 3), (3, -12, 10), (-4, 30, -60, 35))
+"""Coefficients of rho, rho^3, ...: R_1, which is rho, R_3, R_5, R_7."""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraFigures:
+    """Values (k, m) of k calibrations with their covariances (k, m, m), names and units.
+
+    Attributes
+    ----------
+    values, covariances, names, units
+        Of what all calibrations estimated.
+    held
+        Names of what some calibrations estimated, and others held: it cannot be compared.
+    """
+
+    values: Floats
+    covariances: Floats
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    held: tuple[str, ...]
+
+
+def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
+    """Return the figures of cameras of one unit within an angle (rad) from the axis.
+
+    Raises InputError: cameras of several units; one that has no image within the angle.
+    """
+    units = {each.unit for each in cameras}
+    if len(units) > 1:
+        raise InputError(f"calibrations of {cameras[0].title} are in mm and in px: they cannot be compared")
+    directions, apart = _apart(angle)
+    names, factors, of_units = _named(cameras[0].unit == "mm", angle)
+    values, roots = [], []
+    for each in cameras:
+        value, root = _with_root(each, directions, apart)
+        values.append(factors * value)
+        roots.append(factors[:, np.newaxis] * root)
+    estimated = np.array([_estimated(each / factors[:, np.newaxis]) for each in roots])
+    common = estimated.all(axis=0)
+    return CameraFigures(
+        np.array(values)[:, common],
+        np.array([each[common] @ each[common].T for each in roots]),
+        tuple(np.array(names)[common].tolist()),
+        tuple(np.array(of_units)[common].tolist()),
+        tuple(np.array(names)[estimated.any(axis=0) & ~common].tolist()),
+    )
+
+
+def _estimated(root: Floats) -> Bools:
+    """Return which figures have variances of their own: those of held terms follow others, by very little."""
+    sd = np.linalg.norm(root, axis=1)
+    found: Bools = sd > LEAST * sd.max()
+    before = np.zeros((0, root.shape[1]))
+    for row in np.flatnonzero(found).tolist():
+        left = root[row] - before.T @ (before @ root[row])
+        size = np.linalg.norm(left)
+        found[row] = size > ALONE * sd[row]
+        if found[row]:
+            before = np.vstack([before, left / size])
+    return found
+
+
+def _named(metric: bool, angle: float) -> tuple[list[str], Floats, list[str]]:
+    """Return names, factors to the units in which people read them, and these, in the order of fields."""
+    names = ["principal distance", "shift x", "shift y", "radial 3", "radial 5", "radial 7"]
+    names += ["decentring x", "decentring y", "affinity", "shear"]
+    small = UM if metric else 1.0
+    factors = np.array([1 / np.tan(angle), *[small] * (len(names) - 1)])
+    return names, factors, ["mm", *["um"] * 9] if metric else ["px"] * 10
+
+
+def _apart(angle: float) -> tuple[Floats, Floats]:
+    """Return directions (n, 3), and what takes their images apart: (10, 2n), without a turn."""
+    rho = (np.polynomial.legendre.leggauss(NODES)[0] + 1) / 2
+    azimuth = np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
+    r, a = (each.ravel() for each in np.meshgrid(rho, azimuth))
+    x, y = np.cos(a), np.sin(a)
+    radial = [sum(c * r ** (2 * k + 1) for k, c in enumerate(each)) for each in _RADIAL[1:]]
+    one, none = np.ones_like(r), np.zeros_like(r)
+    fields = [
+        *((r * x, r * y), (one, none), (none, one)),
+        *((of * x, of * y) for of in radial),
+        # Of r^2 + 2 x^2, 2 x y the mean over the disc is a shift by 1.
+        *((r**2 * (1 + 2 * x**2) - 1, 2 * r**2 * x * y), (2 * r**2 * x * y, r**2 * (1 + 2 * y**2) - 1)),
+        *((r * x, -r * y), (r * y, r * x), (-r * y, r * x)),
+    ]
+    basis = np.array([np.column_stack(each).ravel() for each in fields]).T
+    tangent = r * np.tan(angle)
+    return np.column_stack([tangent * x, tangent * y, -one]), np.linalg.pinv(basis)[:-1]
+
+
+def _with_root(camera: Camera, directions: Floats, apart: Floats) -> tuple[Floats, Floats]:
+    """Return the figures of a camera, and F of their covariance F F'."""
+
+    def at(changes: dict[str, float]) -> Floats:
+        own = camera.replace(parameters={**camera.parameters, **changes}) if changes else camera
+        images = own.project(directions)
+        if not np.isfinite(images).all():
+            raise InputError(f"the camera {camera.title} has no image within the angle that is compared")
+        return apart @ (images * [1.0, -1.0 if camera.image_y == "down" else 1.0]).ravel()
+
+    assert camera.covariance is not None
+    names, matrix = camera.covariance
+    sd = np.sqrt(np.diag(np.asarray(matrix)))
+    columns = []
+    for name, step in zip(names, (STEP * sd).tolist(), strict=True):
+        value = camera.parameters[name]
+        columns.append((at({name: value + step}) - at({name: value - step})) / (2 * STEP))
+    return at({}), np.column_stack(columns) @ np.linalg.cholesky(np.asarray(matrix) / np.outer(sd, sd))
+
+
+@dataclass(frozen=True)
+class DatedCamera:
+    """A calibrated camera.
+
+    Attributes
+    ----------
+    day
+        On which it was calibrated.
+    camera
+        With its covariance; its name says which one it is.
+    angle
+        rad from the axis up to which it was calibrated; None where that is not known.
+    source
+        What it is from.
+
+    Raises
+    ------
+    InputError
+        A camera without a covariance matrix, an angle beyond the front of the camera.
+    """
+
+    day: date
+    camera: Camera
+    angle: float | None = None
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.camera.covariance is None:
+            raise InputError(f"the camera {self.camera.title} has no covariance matrix to compare by")
+        if self.angle is not None and not 0 < self.angle < math.pi / 2:
+            raise InputError(f"the angle from the axis is between 0 and 90 degrees, not {self.angle} rad")
+
+    @classmethod
+    def of(cls, certificate: Certificate, terms: int | None = None) -> DatedCamera:
+        """Return the camera of a certificate; `terms` odd ones of its curve.
+
+        Raises
+        ------
+        InputError
+            It has no date, or no focal length.
+        """
+        if certificate.day is None:
+            raise InputError(f"the certificate {certificate.name} has no date", file=certificate.file)
+        angle = None if certificate.radial is None else float(certificate.radial.angle.max())
+        source = certificate.file.stem if certificate.file else certificate.name
+        return cls(certificate.day, certificate.camera(terms=terms), angle, source)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

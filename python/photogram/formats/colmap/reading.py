@@ -13,9 +13,8 @@ from photogram.errors import InputError
 from photogram.formats.colmap.binary import read_binary
 from photogram.formats.colmap.content import CAMERA, NO_POINT, Camera, Images, Model, Pose
 from photogram.formats.colmap.text import read_text
-from photogram.formats.colours import Colours
 from photogram.formats.format import Wishes
-from photogram.formats.names import NAMES, renamed
+from photogram.formats.names import NAMES, Colours, renamed
 from photogram.formats.project import Project, Size, assembled
 from photogram.formats.rigging import FrameOf, Rig, mounted
 from photogram.formats.rotations import Y_DOWN

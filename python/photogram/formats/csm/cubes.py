@@ -19,9 +19,9 @@ from photogram.formats.csm.isd import Detector, Isd, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift
 from photogram.formats.csm.reading import from_pixels, not_zero, transformed
 from photogram.io.files import reading
+from photogram.io.json import Tree
 from photogram.io.places import at_place
 from photogram.io.pvl import Group, Quantity, Value, parsed
-from photogram.io.tree import Tree
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation, increasing, rotations

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.io.json import Tree
 from photogram.io.places import at_place
-from photogram.io.tree import Tree
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.moving_photos import Lines
 

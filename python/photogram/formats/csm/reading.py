@@ -12,8 +12,8 @@ from photogram.arguments.types import Floats
 from photogram.formats.csm.angles import of_quaternions
 from photogram.formats.csm.isd import Detector, Framelets, Isd, Jitter, Pixels, Plane, Positions, Turns
 from photogram.formats.csm.line_times import fitting, read_drift, read_lines
+from photogram.io.json import Tree, read_json, unknown
 from photogram.io.places import at_place
-from photogram.io.tree import Tree, read_json, unknown
 from photogram.network.lens import Lens, LensModel
 from photogram.network.trajectories import increasing, rotations
 

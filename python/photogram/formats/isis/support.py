@@ -17,7 +17,7 @@ from photogram.formats.csm.isd import Isd, Positions, Turns
 from photogram.formats.csm.photos import SupportedImage, to_camera, trajectory_of
 from photogram.formats.csm.reading import UNITS
 from photogram.formats.isis.contents import Image
-from photogram.io.tree import read_json
+from photogram.io.json import read_json
 from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.trajectories import AdjustedTrajectory
 

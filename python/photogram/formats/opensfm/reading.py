@@ -13,9 +13,9 @@ from photogram.formats.format import Wishes
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN
 from photogram.io.files import read_lines
+from photogram.io.json import Tree, read_json, unknown
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place, at_place
-from photogram.io.tree import Tree, read_json, unknown
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation, Position

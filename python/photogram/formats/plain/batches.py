@@ -102,7 +102,7 @@ class Streamed:
         self._folder = folder / "buckets"
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
-        self._settings, self._wishes = settings, wishes
+        self._settings = settings
         held = self._without_images()
         self.project: Project = read_tables(Tables(held, []), wishes)
         if self.project.options.datum in ("inner", "minimum"):
@@ -141,11 +141,6 @@ class Streamed:
             )
         named = {name for each in self.block.observations for name in each.points}
         self._tied = {name: row for row, name in enumerate(sorted(named))}
-
-    @cached_property
-    def _spread_out(self) -> tuple[int, Floats]:
-        """How many buckets there are, and (P,) the images of each photo."""
-        return self._spread()
 
     @property
     def images(self) -> Floats:
@@ -211,15 +206,8 @@ class Streamed:
         images, points = self._folder / "images.parquet", self._folder / "points.parquet"
         pyarrow.parquet.write_table(schema.empty_table(), images)
         tables = Tables(settings, [])
-        names = sorted(
-            {
-                name
-                for kind in TIES
-                if (table := tables.read(kind)) is not None
-                for column in ("from", "to")
-                for name in table.texts(column)
-            }
-        )
+        ties = [table for kind in TIES if (table := tables.read(kind)) is not None]
+        names = sorted({name for table in ties for end in ("from", "to") for name in table.texts(end)})
         nothing = np.full(len(names), np.nan)
         pyarrow.parquet.write_table(
             pyarrow.table({"point": pyarrow.array(names, pyarrow.string())} | dict.fromkeys("xyz", nothing)),
@@ -227,20 +215,25 @@ class Streamed:
         )
         return replace(settings, tables={**settings.tables, "images": images, "points": points})
 
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        """Rows of photos."""
+        return {name: row for row, name in enumerate(self.block.photo_ids)}
+
     @property
     def _given(self) -> dict[str, int]:
         """Rows of points that are control, or tied."""
         return {name: row for row, name in enumerate(self.block.point_ids)}
 
-    def _spread(self) -> tuple[int, Floats]:
-        """Spread images over buckets; return how many there are, and the images of each photo."""
+    @cached_property
+    def _spread_out(self) -> tuple[int, Floats]:
+        """How many buckets images are spread over, which this does, and (P,) the images of each photo."""
         import pandas as pd
         import pyarrow
         import pyarrow.parquet
 
         path = self._settings.tables["images"]
-        rows = {name: row for row, name in enumerate(self.block.photo_ids)}
-        unused = self._photos.unused
+        rows, unused = self._rows, self._photos.unused
         counts = np.zeros(len(rows))
         with pyarrow.parquet.ParquetFile(path) as file:
             buckets = max(-(-file.metadata.num_rows // BUCKET), 1)
@@ -318,7 +311,7 @@ class Streamed:
         return edges, np.array([edges[each[0]] if each else next(alone) for each in tied], dtype=np.int64)
 
     def _incidences(self) -> Iterator[Incidence]:
-        rows = {name: row for row, name in enumerate(self.block.photo_ids)}
+        rows = self._rows
         for number in range(self._spread_out[0]):
             bucket = read_arrays(self._folder / f"{number}.npz")
             edges, of_observations = self._edges(number, len(bucket["names"]))

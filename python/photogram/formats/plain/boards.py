@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from photogram.errors import InputError
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
@@ -69,10 +69,7 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
     given |= {name: lengths[name] for name in _LENGTHS[2:] if not np.isnan(lengths[name])}
     if "tag_size" not in given:
         given["spacing"] = lengths["spacing_x"], lengths["spacing_y"]
-    try:
-        return Board(**given)
-    except InputError as error:
-        raise table.error(row, error.message) from None
+    return made(table, row, lambda: Board(**given))
 
 
 def read_regularised(tables: Tables) -> str | None:

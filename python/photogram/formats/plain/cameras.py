@@ -1,35 +1,39 @@
-"""The table of cameras."""
+"""The tables of cameras, and of knots of splined ones."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, cast, get_args
+from functools import partial
+from typing import TYPE_CHECKING, Any, cast, get_args
+
+import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.plain.certificates import certified, read_certificates
+from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
-from photogram.formats.plain.knots import with_knots
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, columns_of
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, quoted
+from photogram.messages import quoted
 from photogram.network.cameras import Camera, Weights
 from photogram.network.moving_photos import LineSensor, Shutter
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-__all__ = ["Cameras", "read_cameras", "spread_over_photos"]
+__all__ = ["Cameras", "knots_table", "read_cameras", "spread_over_photos", "with_knots"]
 
 _MODELS = dict(_photocore.camera_models())
 _EACH = ("all", "photo", "group")
 OTHER_LENS = 5.0
 """Millimetres by which a principal distance that is given differs from a certificate of another lens cone."""
+_SD = ("sd_radial", "sd_tangential")
 
 
 @dataclass(frozen=True)
@@ -74,14 +78,12 @@ def read_cameras(tables: Tables) -> Cameras:
         if own.each not in _EACH:
             raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
         size = _size(table, row, own)
-        try:
-            certificate = _of_camera(tables, table, row, own, certificates)
-            if certificate is None:
-                found.cameras.append(_camera(tables, table, row, own, size))
-            else:
-                found.cameras.append(certified(tables, own.name, own.model, certificate))
-        except InputError as error:
-            raise (error if error.file else table.error(row, error.message)) from None
+        certificate = _of_camera(tables, table, row, own, certificates)
+        if certificate is None:
+            make = partial(_camera, tables, table, row, own, size)
+        else:
+            make = partial(certified, tables, own.name, own.model, certificate)
+        found.cameras.append(made(table, row, make))
         found.sizes.append(size)
         found.pixel_mm.append(own.pixel_mm)
         found.for_each.append(own.each)
@@ -106,7 +108,7 @@ def _of_camera(
             message = f"the camera {own.name} has c {c:g} mm, and its certificate {certificate.c:g} mm"
             raise ContradictionError.of(table.error(row, f"{message}: it is of another lens"))
         message = f"camera {own.name}: it is as the table has it; of its certificate marks alone are taken"
-        tables.messages.append(Message(message, table.path))
+        tables.tell(message, table.path)
         return None
     if read_covariances(tables).names("camera", own.name):
         raise table.error(row, f"the camera {own.name} has a certificate, and a covariance in covariances")
@@ -233,6 +235,9 @@ def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Siz
             values = {own["cx"]: size[0] / 2, own["cy"]: size[1] / 2} | values
     elif "cx" in own and image != "px":
         values = {own["cx"]: 0.0, own["cy"]: 0.0} | values
+    if given.weights not in get_args(Weights):
+        choices = ", ".join(get_args(Weights))
+        raise table.error(row, f"column weights: {quoted(given.weights)} is none of {choices}")
     constants = [*powers][len(powers) - _MODELS[model][2] :]
     return Camera(
         model,
@@ -244,14 +249,8 @@ def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Siz
         },
         name=given.name,
         unit="px" if image == "px" else "mm",
-        weights=_weights(table, row, given.weights),
+        weights=cast("Weights", given.weights),
     )
-
-
-def _weights(table: ColumnTable, row: int, word: str) -> Weights:
-    if word not in get_args(Weights):
-        raise table.error(row, f"column weights: {quoted(word)} is none of {', '.join(get_args(Weights))}")
-    return cast("Weights", word)
 
 
 def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:
@@ -288,3 +287,63 @@ def spread_over_photos(
             found.lines.append(cameras.lines[row])
         of_photos.append(places[row, own])
     return found, of_photos
+
+
+def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
+    """Return the columns of the knots of cameras, row by row; nothing without any."""
+    own = [(each.name, *both) for each in cameras if (both := _both(each)) is not None]
+    if not own:
+        return {}
+    places = [np.indices(knots.shape[:2]).reshape(2, -1) for _, knots, _ in own]
+    values = np.concatenate([knots.reshape(-1, 2) for _, knots, _ in own])
+    sd = np.concatenate([each.reshape(-1, 2) for _, _, each in own])
+    return {
+        "camera": [name for (name, *_), place in zip(own, places, strict=True) for _ in place[0]],
+        "i": np.concatenate([place[1] for place in places]),
+        "j": np.concatenate([place[0] for place in places]),
+        **columns_of(("dx", "dy"), values),
+        **columns_of(_SD, sd),
+    }
+
+
+def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
+    """Return cameras with the knots that the table has of them; those that are missing are 0 and held.
+
+    Raises
+    ------
+    InputError
+        Knots of a camera that has none there, or twice.
+    """
+    table = tables.read("knots")
+    if table is None:
+        return list(cameras)
+    splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
+    values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
+    seen = set[tuple[str, float, float]]()
+    given = {name: table.numbers(name, 0.0, infinite=name in _SD) for name in ("dx", "dy", *_SD)}
+    where = zip(table.texts("camera"), table.numbers("i").tolist(), table.numbers("j").tolist(), strict=True)
+    for row, (name, i, j) in enumerate(where):
+        if name not in splined:
+            raise table.error(row, f"column camera: there is no splined camera {quoted(name)}")
+        rows, columns, _ = values[name].shape
+        if not (i in range(columns) and j in range(rows)):
+            raise table.error(row, f"{name} has {columns} x {rows} knots, from 0: none is {i:g}, {j:g}")
+        if (name, i, j) in seen:
+            raise table.error(row, f"the knot {i:g}, {j:g} of {name} is there twice")
+        seen.add((name, i, j))
+        values[name][int(j), int(i)] = [given["dx"][row], given["dy"][row]]
+        sd[name][int(j), int(i)] = [given[each][row] for each in _SD]
+    try:
+        return [
+            each.replace(knots=values[each.name], knot_sd=sd[each.name]) if each.name in splined else each
+            for each in cameras
+        ]
+    except InputError as error:
+        raise InputError(error.message, file=tables.settings.path) from None
+
+
+def _both(camera: Camera) -> tuple[Floats, Floats] | None:
+    """Return (ny, nx, 2) knots and their standard deviations; None of a camera without knots."""
+    if camera.knots is None or camera.knot_sd is None:
+        return None
+    return camera.knots, camera.knot_sd

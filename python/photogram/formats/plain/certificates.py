@@ -1,8 +1,8 @@
-"""Certificates of film cameras in files of their own that a project names."""
+"""Fiducial marks of film cameras: their table, and certificates in files of their own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,21 +11,27 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
-from photogram.film.datum import with_datum
+from photogram.film.distances import with_datum
 from photogram.film.validity import age_remark, changed_remark, valid_certificate
+from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
 from photogram.io.toml import day_of
+from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, quoted
 from photogram.network.cameras import Camera
+from photogram.network.films import Mark
+from photogram.network.observations import KnownTogether, Observation
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-__all__ = ["certificate_marks", "certified", "definite", "read_certificates"]
+__all__ = ["Fiducials", "certified", "definite", "read_certificates", "read_fiducials"]
 
 _MODELS = ("brown_forward", "brown")
 _ITSELF = "a camera of another year is a camera by itself"
+SD_MARK = 0.002
+"""mm, of places in a certificate that does not say it: they are printed to 0.001."""
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
@@ -175,24 +181,6 @@ def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera
     return own.camera(chosen).replace(name=name)  # type: ignore[arg-type]
 
 
-def certificate_marks(
-    tables: Tables, camera: str, own: Certificate
-) -> tuple[dict[str, Floats], dict[str, Floats], Floats | None]:
-    """Return places of marks by name, and standard deviations or, of correlated ones, the covariance.
-
-    Raises
-    ------
-    InputError
-        There are neither coordinates nor distances, or a covariance that is none.
-    """
-    marks = own.fiducials()
-    places = dict(zip(marks.names, marks.xy, strict=True))
-    if not (marks.covariance - np.diag(np.diag(marks.covariance))).any():
-        sd = np.sqrt(np.diag(marks.covariance)).reshape(-1, 2)
-        return places, dict(zip(marks.names, sd, strict=True)), None
-    return places, {}, definite(tables, camera, marks.xy, marks.covariance, own.file)
-
-
 def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: Path | None) -> Floats:
     """Return the covariance of all marks of a camera, with the datum that distances have not.
 
@@ -206,12 +194,103 @@ def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: 
     except InputError as error:
         raise InputError(f"camera {camera}: {error.message}", file=file) from None
     if free:
-        tables.messages.append(
-            Message(
-                f"camera {camera}: its marks are known by distances, whose covariance leaves {free} movements"
-                " open: the frame is that of the marks themselves; films take shift and rotation, and the"
-                " principal point is known as it is said",
-                file,
-            )
+        tables.tell(
+            f"camera {camera}: its marks are known by distances, whose covariance leaves {free} movements"
+            " open: the frame is that of the marks themselves; films take shift and rotation, and the"
+            " principal point is known as it is said",
+            file,
         )
+    return found
+
+
+@dataclass(frozen=True)
+class Fiducials:
+    """Marks of cameras by the names of both.
+
+    Attributes
+    ----------
+    places, sd
+        (2,) mm; deviations of those that are known one by one.
+    covariances
+        (2n, 2n) of all marks of a camera, of certificates.
+    """
+
+    tables: Tables
+    places: dict[str, dict[str, Floats]] = field(default_factory=dict)
+    sd: dict[str, dict[str, Floats]] = field(default_factory=dict)
+    covariances: dict[str, Floats] = field(default_factory=dict)
+
+    def known(
+        self,
+        marks: Mapping[str, Mapping[str, Mark]],
+        read: Collection[tuple[str, str]],
+        covariances: Covariances,
+    ) -> list[Observation]:
+        """Return what is known of marks: of all of a camera together, or of each that was read by itself."""
+        found: list[Observation] = []
+        for camera, own in marks.items():
+            words = [f"{name}.{axis}".lower().replace("_", " ") for name in own for axis in "xy"]
+            covariance = self.covariances.get(camera)
+            if (given := covariances.over("fiducials", camera, words, singular=True)) is not None:
+                xy = np.array([mark.position[:2] for mark in own.values()])
+                file = self.tables.settings.tables["covariances"]
+                covariance = definite(self.tables, camera, xy, given, file)
+            if covariance is not None:
+                found.append(KnownTogether("certificate", list(own.values()), covariance=covariance))
+                continue
+            found += [
+                KnownTogether("certificate", [mark], sd=self.sd[camera][name])
+                for name, mark in own.items()
+                if (camera, name) in read
+            ]
+        return found
+
+    def take(self, certificates: Mapping[str, Certificate]) -> None:
+        """Take the marks of certificates.
+
+        Raises
+        ------
+        InputError
+            A camera that has marks already, a covariance that is none.
+        """
+        for camera, own in certificates.items():
+            if camera in self.places:
+                raise InputError(
+                    f"the camera {camera} has marks here, and others in its certificate",
+                    file=self.tables.settings.tables["fiducials"],
+                )
+            marks = own.fiducials()
+            self.places[camera] = dict(zip(marks.names, marks.xy, strict=True))
+            if (marks.covariance - np.diag(np.diag(marks.covariance))).any():
+                found = definite(self.tables, camera, marks.xy, marks.covariance, own.file)
+                self.covariances[camera] = found
+            else:
+                sd = np.sqrt(np.diag(marks.covariance)).reshape(-1, 2)
+                self.sd[camera] = dict(zip(marks.names, sd, strict=True))
+
+
+def read_fiducials(
+    tables: Tables, cameras: Collection[str], certificates: Mapping[str, Certificate]
+) -> Fiducials:
+    """Read the marks of cameras, of the table and of certificates.
+
+    Raises
+    ------
+    InputError
+        Cells that are no numbers, a mark that is there twice, marks in the table and in a certificate.
+    """
+    found, table = Fiducials(tables), tables.read("fiducials")
+    if table is not None:
+        xy = table.vectors(("x", "y"))
+        table.check_given(xy, ("x", "y"))
+        sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)
+        use, texts = table.flags("use"), [table.texts(name) for name in ("camera", "fiducial")]
+        for row, (camera, name) in enumerate(zip(*texts, strict=True)):
+            if not use[row] or camera not in cameras:
+                continue
+            if name in found.places.setdefault(camera, {}):
+                raise table.error(row, f"the camera {camera} has the fiducial {name} twice")
+            found.places[camera][name] = xy[row]
+            found.sd.setdefault(camera, {})[name] = sd[row]
+    found.take(certificates)
     return found

@@ -11,15 +11,15 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.images import from_tables, in_unit, to_tables
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.image_axes import from_tables, in_unit, to_tables
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.moving_photos import Direction, LineSensor, Shutter, Timed
+from photogram.network.moving_photos import Direction, LineSensor, Shutter
 from photogram.network.trajectories import Readout
 
 __all__ = ["LINE", "OF_LINES", "Exposure", "exposure_columns", "line_sensors", "of_cameras", "shutters"]
@@ -169,19 +169,14 @@ def of_cameras(block: Block, cameras: Sequence[Camera], which: Sequence[int]) ->
     of_photos = {each.photo: each for each in block.timed}
     found: dict[int, Exposure] = {}
     for photo, row in zip(block.photo_ids, which, strict=True):
-        own = _exposure(of_photos.get(photo))
+        timed = of_photos.get(photo)
+        own = None if timed is None else timed.shutter if timed.line_sensor is None else timed.line_sensor
         if found.setdefault(row, own) != own:
             raise InputError(
                 f"the photos of the camera {cameras[row].title} have several shutters or lines of sensors, or"
                 " some have none: in tables these are the camera's; give each a camera of its own"
             )
     return [found.get(row) for row in range(len(cameras))]
-
-
-def _exposure(timed: Timed | None) -> Exposure:
-    if timed is None:
-        return None
-    return timed.shutter if timed.line_sensor is None else timed.line_sensor
 
 
 def exposure_columns(
@@ -230,7 +225,7 @@ def _shutter_columns(
 ) -> dict[str, Any]:
     """Return the columns of rolling shutters."""
     found: dict[str, Any] = {}
-    readouts = [None if each is None else _readout(each) for each in own]
+    readouts = [each.readout if each and isinstance(each.readout, Readout) else None for each in own]
     found["readout"] = [None if each is None else each.value for each in readouts]
     found["sd_readout"] = [None if each is None else float(each.deviations[0]) for each in readouts]
     found["readout_direction"] = ["" if each is None else each.direction for each in own]
@@ -244,11 +239,6 @@ def _shutter_columns(
     if any(each and each.name != camera.name for each, camera in zip(readouts, cameras, strict=True)):
         found["shutter"] = ["" if each is None else each.name for each in readouts]
     return found
-
-
-def _readout(shutter: Shutter) -> Readout:
-    assert isinstance(shutter.readout, Readout)
-    return shutter.readout
 
 
 def _edges_written(

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.interior import conformal
-from photogram.film.mark_identity import DECIDED, which_mark
+from photogram.film.marks import DECIDED, which_mark
 from photogram.formats.plain.film_readings import ScannedPhoto
 from photogram.messages import listed
 from photogram.network.cameras import Camera

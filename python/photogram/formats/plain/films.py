@@ -17,12 +17,11 @@ from photogram.film.interior import (
     interior_orientation,
 )
 from photogram.formats.plain.cameras import Cameras
+from photogram.formats.plain.certificates import read_fiducials
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
-from photogram.formats.plain.fiducials import read_fiducials
 from photogram.formats.plain.film_mistakes import beyond_message, mark_remarks, scale_message
-from photogram.formats.plain.film_readings import MarkReadings, ScannedPhoto
-from photogram.formats.plain.film_sides import Lying, Seen
+from photogram.formats.plain.film_readings import Lying, MarkReadings, ScannedPhoto, Seen
 from photogram.formats.plain.films_written import INSIDE
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.scanners import Machine, read_films, read_scanners
@@ -61,17 +60,14 @@ class Scanned:
     scans, observations
         What images pass, and what was observed.
     inside
-        The same where films are fitted before, with all that was read of them: tables are written of it.
+        For the details of a project whose films are fitted before: the same with all that was read of them,
+        of which tables are written.
     """
 
     photos: Bools
     scans: list[Scan] = field(default_factory=list)
     observations: list[Observation] = field(default_factory=list)
-    inside: list[tuple[list[Scan], list[Observation]]] = field(default_factory=list)
-
-    def details(self) -> dict[str, object]:
-        """Return what writing tables needs beside the block, for the details of a project."""
-        return {INSIDE: self.inside[0]} if self.inside else {}
+    inside: dict[str, tuple[list[Scan], list[Observation]]] = field(default_factory=dict)
 
 
 def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanned:
@@ -105,7 +101,7 @@ def read_scanned(tables: Tables, seen: Seen, covariances: Covariances) -> Scanne
             inside = Scanned(scanned)
             silent = replace(tables, messages=[])
             _Reader(silent, seen, covariances, films, before=False).read(inside)
-            found.inside.append((inside.scans, inside.observations))
+            found.inside[INSIDE] = inside.scans, inside.observations
     return found
 
 
@@ -125,6 +121,7 @@ class _Reader:
         self.seen = seen
         self.tables, self.table, self.covariances = tables, photos.table, covariances
         self.before = before
+        self._held: dict[int, Machine] = {}
         machines = read_scanners(tables, covariances)
         self.comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
         self.kinds = read_films(tables, list(dict.fromkeys(filter(None, films))), tables.settings.film)
@@ -151,11 +148,6 @@ class _Reader:
         else:
             own = machines[name]
         return self._held.setdefault(id(own), own.held()) if self.before else own
-
-    @property
-    def _held(self) -> dict[int, Machine]:
-        own: dict[int, Machine] = self.__dict__.setdefault("_held_machines", {})
-        return own
 
     def read(self, found: Scanned) -> None:
         """Put the scans and observations of all photos in their place."""
@@ -201,18 +193,16 @@ class _Reader:
                     sd.append(photo.machine.readings.pitch * self.seen.deviations(photo.name))
             said = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
             if said:
-                self.tables.messages.append(Message(said, own.file))
+                self.tables.tell(said, own.file)
 
     def _remark(self, photo: ScannedPhoto) -> None:
         """Say it where a film stands on what is known of it beforehand."""
         model = self.kinds[photo.film].model
         if len(photo.marks) < LEAST[model]:
-            self.tables.messages.append(
-                Message(
-                    f"photo {photo.name}: {len(photo.marks)} fiducials, fewer than the {LEAST[model]} of the"
-                    f" {model} film: its unknowns stand on what is known of films beforehand, and on images"
-                    + ("" if len(photo.marks) > 1 else "; where it lay, its images know as far as its pose")
-                )
+            self.tables.tell(
+                f"photo {photo.name}: {len(photo.marks)} fiducials, fewer than the {LEAST[model]} of the"
+                f" {model} film: its unknowns stand on what is known of films beforehand, and on images"
+                + ("" if len(photo.marks) > 1 else "; where it lay, its images know as far as its pose")
             )
 
     def _starts(self) -> list[tuple[bool, Floats]]:
@@ -250,11 +240,9 @@ class _Reader:
             start = found[other][1]
             same = self.photos[other].film == photo.film and self.photos[other].machine is photo.machine
             if start is not None and same and found[other][0] == mirrored:
-                self.tables.messages.append(
-                    Message(
-                        f"photo {photo.name}: fewer than two fiducials; its film starts where that of"
-                        f" {self.photos[other].name} lies"
-                    )
+                self.tables.tell(
+                    f"photo {photo.name}: fewer than two fiducials; its film starts where that of"
+                    f" {self.photos[other].name} lies"
                 )
                 return start
         raise self.table.error(

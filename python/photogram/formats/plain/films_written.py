@@ -10,6 +10,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.plain.scanners import BENDS, CURVES, GRID, LOCAL, Machine
+from photogram.formats.plain.schema import deviation_columns
+from photogram.formats.plain.tables import columns_of
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.films import Film, Mark, Reseau, Scan
@@ -106,14 +108,14 @@ class WrittenFilms:
         films = [self.films.get(photo) for photo in self.photos]
         starts = np.array([self._start(photo) for photo in self.photos])
         return {
-            "film": ["" if film is None else self.rolls[photo] for photo, film in self._rows()],
+            "film": [
+                "" if film is None else self.rolls[photo]
+                for photo, film in zip(self.photos, films, strict=True)
+            ],
             "scanner": ["" if film is None else film.scanner.name for film in films],
             "mirrored": [None if film is None else film.mirrored for film in films],
             **{f"start_{name}": starts[:, k] for k, name in enumerate(FILM[:3])},
         }
-
-    def _rows(self) -> Iterator[tuple[str, Film | None]]:
-        return ((photo, self.films.get(photo)) for photo in self.photos)
 
     def _start(self, photo: str) -> Floats:
         """Return where a film starts: what was observed of it, where it was."""
@@ -226,8 +228,8 @@ class WrittenFilms:
             "rows_down": [each.down for each in readings],
             "hx": [each.half_range[0] for each in readings],
             "hy": [each.half_range[1] for each in readings],
-            **dict(zip(names, values.T, strict=True)),
-            **{f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)},
+            **columns_of(names, values),
+            **columns_of(deviation_columns(names), sd),
         }
 
     def _certificates(self) -> dict[str, _Marks]:
@@ -262,10 +264,7 @@ class WrittenFilms:
         return {
             "camera": [row[0] for row in rows],
             "fiducial": [row[1] for row in rows],
-            "x": places[:, 0],
-            "y": places[:, 1],
-            "sd_x": sd[:, 0],
-            "sd_y": sd[:, 1],
+            **columns_of(("x", "y", "sd_x", "sd_y"), np.hstack([places, sd])),
         }
 
     def _images(self) -> dict[str, Any]:
@@ -278,8 +277,8 @@ class WrittenFilms:
         return {
             "photo": [each.photo for each in self.readings],
             "fiducial": [self.by_mark[id(each.mark)] for each in self.readings],
-            **dict(zip(names, found.T, strict=True)),
-            **{f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)},
+            **columns_of(names, found),
+            **columns_of(deviation_columns(names), sd),
         }
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.common_unknowns import called, word_of
 from photogram.formats.plain.schema import ANGLES, AXES, BIAS, ROTATIONS, deviation_columns
-from photogram.formats.plain.tables import Tables, angles_of
+from photogram.formats.plain.subjects import scalar_columns, scalars
+from photogram.formats.plain.tables import Tables, angles_of, columns_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -103,7 +103,7 @@ def antennas(tables: Tables) -> dict[str, Antenna]:
     epochs = [None if math.isnan(each) else float(each) for each in table.numbers("drift_epoch")]
     names = table.texts("group")
     titles = [name or "GNSS" for name in names]
-    own = clocks(tables, table, titles)
+    own = scalars(tables, table, Clock, titles)
     words = [table.texts(column) for column in ("lever", "shift", "drift")]
     found: dict[str, Antenna] = {}
     for row, (name, title, lever, shift, drift) in enumerate(zip(names, titles, *words, strict=True)):
@@ -142,7 +142,7 @@ def inertials(tables: Tables) -> dict[str, Inertial]:
     bias_sd = table.vectors(deviation_columns(BIAS), math.inf, infinite=True)
     names = table.texts("group")
     titles = [name or "IMU" for name in names]
-    own = clocks(tables, table, titles)
+    own = scalars(tables, table, Clock, titles)
     words = table.texts("boresight", "true"), table.texts("bias", "false")
     found: dict[str, Inertial] = {}
     for row, (name, title, turned, bias) in enumerate(zip(names, titles, *words, strict=True)):
@@ -180,18 +180,18 @@ def antenna_columns(groups: Mapping[Antenna, str]) -> dict[str, Any]:
         "drift": [word_of(each.drift) for each in groups],
     }
     given = [each.lever.position if isinstance(each.lever, LeverArm) else each.lever for each in groups]
-    found |= zip([f"lever_{axis}" for axis in AXES], np.array(given).T, strict=True)
-    found |= zip([f"sd_lever_{axis}" for axis in AXES], _of(levers, "deviations", 0.0).T, strict=True)
+    found |= columns_of([f"lever_{axis}" for axis in AXES], np.array(given))
+    found |= columns_of([f"sd_lever_{axis}" for axis in AXES], _of(levers, "deviations", 0.0))
     for what in ("shift", "drift"):
         unknowns = [getattr(each, what) for each in groups]
-        found |= zip([f"{what}_{axis}" for axis in AXES], _of(unknowns, "position", np.nan).T, strict=True)
+        found |= columns_of([f"{what}_{axis}" for axis in AXES], _of(unknowns, "position", np.nan))
         found |= zip(
             [f"sd_{what}_{axis}" for axis in AXES], _of(unknowns, "deviations", np.nan).T, strict=True
         )
     epochs = [None if each.drift is None else each.drift.epoch for each in groups]
     if any(each is not None for each in epochs):
         found["drift_epoch"] = np.array([np.nan if each is None else each for each in epochs])
-    return found | clock_columns([each.clock for each in groups])
+    return found | scalar_columns(Clock, [each.clock for each in groups])
 
 
 def _of(unknowns: Sequence[Unknown | None], what: str, missing: float) -> Floats:
@@ -238,17 +238,17 @@ def inertial_columns(groups: Mapping[str, Inertial], block: Block) -> dict[str, 
     angles = angles_of(matrices, block)
     angles[[each is None or (isinstance(each, Boresight) and each.is_open) for each in boresights]] = np.nan
     sd = np.array([each.deviations if isinstance(each, Boresight) else np.zeros(3) for each in boresights])
-    found: dict[str, Any] = {"group": list(groups), **dict(zip(_ANGLES, angles.T, strict=True))}
-    found |= zip(_ROTATIONS, np.degrees(sd).T, strict=True)
+    found: dict[str, Any] = {"group": list(groups), **columns_of(_ANGLES, angles)}
+    found |= columns_of(_ROTATIONS, np.degrees(sd))
     words = [_boresight_word(name, each) for name, each in zip(groups, boresights, strict=True)]
     if set(words) != {"true"}:
         found["boresight"] = words
     biases = [each.bias for each in own]
     if any(biases):
         found["bias"] = [word_of(each) for each in biases]
-        found |= zip(BIAS, _of(biases, "position", np.nan).T, strict=True)
-        found |= zip(deviation_columns(BIAS), _of(biases, "deviations", np.nan).T, strict=True)
-    return found | clock_columns([each.clock for each in own])
+        found |= columns_of(BIAS, _of(biases, "position", np.nan))
+        found |= columns_of(deviation_columns(BIAS), _of(biases, "deviations", np.nan))
+    return found | scalar_columns(Clock, [each.clock for each in own])
 
 
 def _matrix(boresight: Any) -> Floats:

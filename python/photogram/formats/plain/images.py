@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.formats.images import from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.image_axes import from_tables, in_unit
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import Message
 
 __all__ = ["Images", "image_coordinates", "read_images", "sd_is_given"]
 
@@ -51,7 +50,7 @@ def read_images(tables: Tables, photos: Photos) -> Images:
         return Images(table, rows, names.rows, names.names, xy, sd)
     left = int(np.count_nonzero(~keep))
     if left:
-        tables.messages.append(Message(f"{left} images are not used", table.path))
+        tables.tell(f"{left} images are not used", table.path)
     whole = Images(table, rows, names.rows, names.names, xy, sd)
     return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))))
 

@@ -11,15 +11,15 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.photos import Photos
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
-from photogram.formats.plain.tables import Tables, indices_of
+from photogram.formats.plain.subjects import scalar_columns, scalars
+from photogram.formats.plain.tables import Tables, columns_of, indices_of
 from photogram.formats.rigging import Rig
 from photogram.io.delimited import ColumnTable
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import replace
 from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, Spheroid
@@ -57,27 +57,39 @@ def read_timed(
     InputError
         Names that are not there, line scanners without lines or times, what contradicts itself.
     """
-    own = _Columns.read(tables, photos, trajectories, rigs)
+    table = photos.table
+    on, lines = _trajectories(table, trajectories), _line_times(tables, photos)
+    motions = _motions(tables, table)
+    clocks = scalars(tables, table, Clock, table.texts("photo"))
+    rates = scalars(tables, table, Readout, table.texts("photo"), 1.0)
+    on_rigs, as_sensors = table.texts("rig"), table.texts("sensor")
     found: list[Timed] = []
     for place, row in enumerate(photos.rows.tolist()):
-        camera = photos.cameras[place]
-        given = own.of(row, photos.names[place], photos.taken[place])
-        given |= {"shutter": cameras.shutters[camera], "line_sensor": cameras.lines[camera]}
-        given |= {"lines": own.lines.get(photos.names[place])}
-        given = {name: value for name, value in given.items() if value is not None}
+        name, camera, time = photos.names[place], photos.cameras[place], float(photos.times[place])
+        sensor, clock = _on_rig(table, row, on_rigs[row], as_sensors[row], photos.taken[place], rigs)
+        said = {
+            "trajectory": on[row],
+            "offset": clocks[row] or clock,
+            "rate": rates[row],
+            "sensor": sensor,
+            **motions[row],
+            "shutter": cameras.shutters[camera],
+            "line_sensor": cameras.lines[camera],
+            "lines": lines.get(name),
+        }
+        given: dict[str, Any] = {field: value for field, value in said.items() if value is not None}
         if not given:
             continue
-        time = float(photos.times[place])
         if not math.isnan(time):
             given["time"] = time
-        _check(own.table, row, given)
+        _check(table, row, given)
         sd = photos.attitude_sd[place]
         if "trajectory" not in given and np.isfinite(sd).any() and sd.any():
-            raise own.table.error(
+            raise table.error(
                 row,
                 "the photo moves by itself: weigh its attitude by sd_rotation_x .., or in a table attitudes",
             )
-        found.append(made(own.table, row, partial(Timed, photos.names[place], **given)))
+        found.append(made(table, row, partial(Timed, name, **given)))
     return found
 
 
@@ -98,101 +110,44 @@ def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
         raise table.error(row, "line_rate is of line scanners, which the table line_times has")
 
 
-@dataclass(frozen=True)
-class _Columns:
-    """What the table of photos says of motion, by its rows; None where it says nothing.
-
-    Attributes
-    ----------
-    table
-        The table.
-    trajectories
-        What each photo is on.
-    motion, motion_sd
-        (rows, 6) velocities and rates, and their standard deviations; NaN where they are empty.
-    clocks, rates
-        Of each photo.
-    lines
-        Times of lines by the names of photos.
-    rigs
-        By their names.
-    """
-
-    table: ColumnTable
-    trajectories: Sequence[Trajectory | None]
-    motion: Floats
-    motion_sd: Floats
-    clocks: Sequence[Any]
-    rates: Sequence[Readout | None]
-    lines: Mapping[str, Lines]
-    rigs: Mapping[str, Rig]
-
-    @classmethod
-    def read(
-        cls, tables: Tables, photos: Photos, trajectories: Mapping[str, Trajectory], rigs: Mapping[str, Rig]
-    ) -> _Columns:
-        """Read the columns; errors as of :func:`read_timed`."""
-        table = photos.table
-        on: list[Trajectory | None] = []
-        for row, name in enumerate(table.texts("trajectory")):
-            if name and name not in trajectories:
-                raise table.error(row, f"column trajectory: there is no trajectory {quoted(name)}")
-            on.append(trajectories[name] if name else None)
-        return cls(
-            table,
-            on,
-            table.vectors(_MOTION) * np.concatenate([np.ones(3), np.diag(tables.flip)]),
-            table.vectors(_SD, infinite=True),
-            clocks(tables, table, table.texts("photo")),
-            _rates(tables, table),
-            _line_times(tables, photos),
-            rigs,
-        )
-
-    def of(self, row: int, photo: str, camera: str) -> dict[str, Any]:
-        """Return what a row says, as arguments of :class:`Timed`."""
-        sensor, clock = self._place(row, camera)
-        found: dict[str, Any] = {
-            "trajectory": self.trajectories[row],
-            "offset": self.clocks[row] or clock,
-            "rate": self.rates[row],
-            "sensor": sensor,
-        }
-        values, sd = self.motion[row], self.motion_sd[row]
-        if not (np.isnan(values).all() and np.isnan(sd).all()):
-            values, sd = np.nan_to_num(values), np.where(np.isnan(sd), np.inf, sd)
-            found |= {"velocity": values[:3], "rotation_rate": values[3:]}
-            found |= {"sd_velocity": sd[:3], "sd_rate": sd[3:]}
-        return found
-
-    def _place(self, row: int, camera: str) -> tuple[Sensor | None, Clock | None]:
-        """Return pose and clock of a photo's camera on what moves; None: those of the trajectory."""
-        name, own = self.table.texts("rig")[row], self.table.texts("sensor")[row]
-        if not name and not own:
-            return None, None
-        if not name and len(self.rigs) != 1:
-            raise self.table.error(row, f"column rig: is empty, and there are {len(self.rigs)} rigs")
-        if name and name not in self.rigs:
-            raise self.table.error(row, f"column rig: there is no rig {quoted(name)}")
-        rig = self.rigs[name] if name else next(iter(self.rigs.values()))
-        sensor = own or camera
-        if sensor != rig.reference and sensor not in rig.sensors:
-            what = "sensor" if own else "camera"
-            raise self.table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
-        return rig.sensors.get(sensor), rig.clocks.get(sensor)
+def _trajectories(table: ColumnTable, trajectories: Mapping[str, Trajectory]) -> list[Trajectory | None]:
+    """Return what the photo of each row is on; None where nothing is said."""
+    names = table.texts("trajectory")
+    for row, name in enumerate(names):
+        if name and name not in trajectories:
+            raise table.error(row, f"column trajectory: there is no trajectory {quoted(name)}")
+    return [trajectories.get(name) for name in names]
 
 
-def _rates(tables: Tables, table: ColumnTable) -> list[Readout | None]:
-    """Return the factors of the line rates of photos."""
-    values, sd = table.numbers("line_rate", 1.0), table.numbers("sd_line_rate", 0.0, infinite=True)
-    found: list[Readout | None] = []
-    for row, (name, photo) in enumerate(zip(table.texts("scan"), table.texts("photo"), strict=True)):
-        if not (name or sd[row]) and values[row] == 1.0:
-            found.append(None)
-            continue
-        given = name or photo, float(values[row]), float(sd[row])
-        found.append(tables.shared.one(table, row, "scan", Readout, *given))
-    return found
+def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
+    """Return velocity and rate of each row, as arguments of :class:`Timed`; none where nothing is said."""
+    values = table.vectors(_MOTION) * np.concatenate([np.ones(3), np.diag(tables.flip)])
+    sd = table.vectors(_SD, infinite=True)
+    silent = np.isnan(values).all(axis=1) & np.isnan(sd).all(axis=1)
+    values, sd = np.nan_to_num(values), np.where(np.isnan(sd), np.inf, sd)
+    fields = ("velocity", "rotation_rate", "sd_velocity", "sd_rate")
+    rows = np.hstack([values, sd]).reshape(-1, 4, 3)
+    return [
+        {} if none else dict(zip(fields, own, strict=True)) for none, own in zip(silent, rows, strict=True)
+    ]
+
+
+def _on_rig(
+    table: ColumnTable, row: int, name: str, own: str, camera: str, rigs: Mapping[str, Rig]
+) -> tuple[Sensor | None, Clock | None]:
+    """Return pose and clock of a photo's camera on what moves; None: those of the trajectory."""
+    if not name and not own:
+        return None, None
+    if not name and len(rigs) != 1:
+        raise table.error(row, f"column rig: is empty, and there are {len(rigs)} rigs")
+    if name and name not in rigs:
+        raise table.error(row, f"column rig: there is no rig {quoted(name)}")
+    rig = rigs[name] if name else next(iter(rigs.values()))
+    sensor = own or camera
+    if sensor != rig.reference and sensor not in rig.sensors:
+        what = "sensor" if own else "camera"
+        raise table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+    return rig.sensors.get(sensor), rig.clocks.get(sensor)
 
 
 def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
@@ -256,12 +211,10 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
             found[column] = ["" if each is None else each[k] for each in places]
     found["time"] = [None if each is None else each.time for each in own]
     found |= _motion_columns(own)
-    found |= clock_columns([None if each is None or rigs.clock(each.sensor) else each.offset for each in own])
-    rates = [None if each is None else each.rate for each in own]
-    if any(rates):
-        found["scan"] = ["" if each is None else each.name for each in rates]
-        found["line_rate"] = [None if each is None else each.value for each in rates]
-        found["sd_line_rate"] = [None if each is None else float(each.deviations[0]) for each in rates]
+    found |= scalar_columns(
+        Clock, [None if each is None or rigs.clock(each.sensor) else each.offset for each in own]
+    )
+    found |= scalar_columns(Readout, [None if each is None else each.rate for each in own])
     return {name: column for name, column in found.items() if any(each not in (None, "") for each in column)}
 
 
@@ -286,4 +239,4 @@ def line_times_table(block: Block) -> dict[str, Any]:
     tables = [np.asarray(each.lines.table) for each in own if each.lines is not None]
     rows = np.vstack(tables)
     names = [each.photo for each, table in zip(own, tables, strict=True) for _ in table]
-    return {"photo": names, **dict(zip(("line", "time", "seconds_per_line"), rows.T, strict=True))}
+    return {"photo": names, **columns_of(("line", "time", "seconds_per_line"), rows)}

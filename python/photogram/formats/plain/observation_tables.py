@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.formats.plain.clocks import clock_columns, clocks
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
-from photogram.formats.plain.subjects import Subjects, clocked, subject_columns
+from photogram.formats.plain.subjects import Subjects, clocked, scalar_columns, scalars, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
+    columns_of,
     correlations,
     covariances_of,
     different,
@@ -39,6 +39,7 @@ from photogram.network.observations import (
     OnPlumbLine,
     Range,
 )
+from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine, Unknown
 
 __all__ = ["kind_tables", "read_kinds"]
@@ -175,7 +176,7 @@ def _of_photos(
 ) -> list[dict[str, Any] | None]:
     """Return what each row is of, with its clock, None of those that are left out; adds lever arms."""
     given["lever_arm"] = list(tables.vectors(table, _LEVER, 0.0))
-    own_clocks = clocks(tables, table, [kind.table] * table.count)
+    own_clocks = scalars(tables, table, Clock, [kind.table] * table.count)
     return [
         None if own is None else clocked(table, row, own, own_clocks[row])
         for row, own in enumerate(subjects.of(tables, table))
@@ -270,7 +271,7 @@ def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
         first |= {column: [getattr(each, name) for each in own] for name, column in kind.points.items()}
         for name, names in kind.values.items():
             values = np.array([getattr(each, name) for each in own], dtype=float)
-            first |= zip(names, values.reshape(len(own), -1).T, strict=True)
+            first |= columns_of(names, values.reshape(len(own), -1))
         table = {kind.table: first | _deviations(own, kind) | last}
         found |= table | common if last else common | table
     return found
@@ -278,10 +279,10 @@ def kind_tables(block: Block) -> dict[str, dict[str, Any]]:
 
 def _photo_columns(own: list[Any], block: Block) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the columns that say what observations are of; those of their lever arms and clocks."""
-    last = clock_columns([None if each.moment is None else each.clock for each in own])
+    last = scalar_columns(Clock, [None if each.moment is None else each.clock for each in own])
     levers = np.array([each.observed[1:4] for each in own])
     if levers.any():
-        last = dict(zip(_LEVER, levers.T, strict=True)) | last
+        last = columns_of(_LEVER, levers) | last
     return subject_columns(own, block), last
 
 
@@ -294,7 +295,7 @@ def _deviations(own: list[Observation], kind: _Kind) -> dict[str, Any]:
         # What stands in a matrix for components that were not observed counts for nothing.
         covariances = np.where(seen[:, :, np.newaxis] & seen[:, np.newaxis, :], covariances, np.nan)
     sd = np.sqrt(np.einsum("nii->ni", covariances))
-    return dict(zip(kind.sd_columns, sd.T, strict=True)) | correlations(covariances, kind.sd)
+    return columns_of(kind.sd_columns, sd) | correlations(covariances, kind.sd)
 
 
 def _common_columns(block: Block, common: _Common) -> dict[str, Any]:
@@ -312,7 +313,7 @@ def _common_columns(block: Block, common: _Common) -> dict[str, Any]:
             given = (getattr(each, name) for each in there)
             values = [nothing if own is None else np.ravel(own) for own in given]
         array = np.array(values, dtype=float)
-        columns |= zip(names, (places_written(block, array) if name == _THROUGH else array).T, strict=True)
+        columns |= columns_of(names, places_written(block, array) if name == _THROUGH else array)
     units = np.array([DEGREE if each in _TILTS else 1.0 for each in common.sd])
     sd = np.array([each.deviations for each in there]).reshape(len(there), -1) * units
-    return columns | dict(zip(common.sd, sd.T, strict=True))
+    return columns | columns_of(common.sd, sd)

@@ -35,17 +35,18 @@ from photogram.formats.plain.schema import (
     VELOCITY,
     deviation_columns,
 )
-from photogram.formats.plain.smoothness import read_smoothness
 from photogram.formats.plain.subjects import Subjects, clocked, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
     Tables,
     angles_of,
+    columns_of,
     correlations,
     covariances_of,
     indices_of,
     places_written,
 )
+from photogram.formats.plain.trajectories import read_smoothness
 from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
 from photogram.io.delimited import ColumnTable
@@ -93,14 +94,10 @@ def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Obse
     if table is None:
         return []
     of = subjects.of(tables, table)
-    positions = table.vectors(AXES)
-    table.check_given(positions, AXES)
-    sd = tables.deviations(table, "gnss", [f"sd_{axis}" for axis in AXES])
-    table.check_given(sd, [f"sd_{axis}" for axis in AXES], "is empty: give it, or gnss under [sd]")
-    positions, covariances = transform.positions("gnss", positions, covariances_of(sd, table), table)
-    groups, times = antennas(tables), table.numbers("time")
+    measured = transform.positions("gnss", *_measured(tables, table, "gnss", AXES), table)
+    groups, times = grouped(tables, table, antennas(tables), "gnss_groups"), table.numbers("time")
     found: list[Observation] = []
-    for row, group, given in _timed(table, of, grouped(tables, table, groups, "gnss_groups"), Antenna()):
+    for row, group, given in _used(table, of, groups, Antenna(), "position", *measured):
         if given["photo"] is not None:
             time = times[row]
             if math.isnan(time):
@@ -108,8 +105,7 @@ def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Obse
             if group.drift is not None and math.isnan(time):
                 raise table.error(row, "the group has a drift, and the photo no time")
             given["time"] = 0.0 if math.isnan(time) else float(time)
-        given |= {"position": positions[row], "covariance": covariances[row], "lever_arm": group.lever}
-        given |= {"shift": group.shift, "drift": group.drift}
+        given |= {"lever_arm": group.lever, "shift": group.shift, "drift": group.drift}
         found.append(made(table, row, partial(Position, **given)))
     return found
 
@@ -119,30 +115,33 @@ def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
     if table is None:
         return []
     of = subjects.of(tables, table)
-    values, covariances = _motions(tables, table, "velocities", VELOCITY)
+    measured = _measured(tables, table, "velocities", VELOCITY)
     groups = grouped(tables, table, antennas(tables), "gnss_groups")
-    found: list[Observation] = []
-    for row, group, given in _timed(table, of, groups, Antenna()):
-        given |= {"velocity": values[row], "covariance": covariances[row], "lever_arm": group.lever}
-        found.append(made(table, row, partial(Velocity, **given)))
-    return found
+    return [
+        made(table, row, partial(Velocity, **given, lever_arm=group.lever))
+        for row, group, given in _used(table, of, groups, Antenna(), "velocity", *measured)
+    ]
 
 
-def _timed(
+def _used(
     table: ColumnTable,
     of: Sequence[dict[str, Any] | None],
     groups: Sequence[_Group | None],
     alone: _Group,
+    what: str,
+    values: Floats,
+    covariances: Floats,
 ) -> Iterator[tuple[int, _Group, dict[str, Any]]]:
-    """Give the rows that are used, with their groups, and by name what they observe, when, by which clock."""
+    """Yield the rows that are used, with their groups, and by name what they are of and what was observed."""
     for row, (own, group) in enumerate(zip(of, groups, strict=True)):
         if own is not None:
             group = group or alone
-            yield row, group, clocked(table, row, own, group.clock)
+            given = clocked(table, row, own, group.clock)
+            yield row, group, given | {what: values[row], "covariance": covariances[row]}
 
 
-def _motions(tables: Tables, table: ColumnTable, name: str, columns: Sequence[str]) -> tuple[Floats, Floats]:
-    """Return (rows, 3) velocities or rates, and (rows, 3, 3) covariances."""
+def _measured(tables: Tables, table: ColumnTable, name: str, columns: Sequence[str]) -> tuple[Floats, Floats]:
+    """Return (rows, 3) what was observed, and (rows, 3, 3) covariances."""
     values = table.vectors(columns)
     table.check_given(values, columns)
     names = deviation_columns(columns)
@@ -156,16 +155,14 @@ def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
     if table is None:
         return []
     of = subjects.of(tables, table)
-    values, covariances = _motions(tables, table, "rates", RATE)
+    values, covariances = _measured(tables, table, "rates", RATE)
     # About axes that point as those of photos do.
-    values, covariances = values @ tables.flip, tables.flip @ covariances @ tables.flip
+    measured = values @ tables.flip, tables.flip @ covariances @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
-    found: list[Observation] = []
-    for row, group, given in _timed(table, of, groups, Inertial()):
-        given |= {"rate": values[row], "covariance": covariances[row]}
-        given |= {"boresight": group.boresight, "bias": group.bias}
-        found.append(made(table, row, partial(Rate, **given)))
-    return found
+    return [
+        made(table, row, partial(Rate, **given, boresight=group.boresight, bias=group.bias))
+        for row, group, given in _used(table, of, groups, Inertial(), "rate", *measured)
+    ]
 
 
 def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
@@ -177,19 +174,17 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
     given_sd = tables.settings.sd.get("attitudes")
     sd = table.vectors(_ROTATIONS, read=tables.angle)
     if given_sd is not None:
-        defaults = np.broadcast_to([tables.angle(repr(each)) for each in given_sd], 3)
-        sd = np.where(np.isnan(sd), defaults, sd)
+        sd = np.where(np.isnan(sd), [tables.angle(repr(each)) for each in given_sd], sd)
     table.check_given(sd, _ROTATIONS, "is empty: give it, or attitudes under [sd]")
     unknown = np.isnan(matrices).any(axis=(1, 2))
     if unknown.any():
         raise table.error(int(np.argmax(unknown)), "there is no attitude")
     covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
-    found: list[Observation] = []
-    for row, group, given in _timed(table, of, groups, Inertial()):
-        given |= {"attitude": matrices[row], "covariance": covariances[row], "boresight": group.boresight}
-        found.append(made(table, row, partial(Attitude, **given)))
-    return found
+    return [
+        made(table, row, partial(Attitude, **given, boresight=group.boresight))
+        for row, group, given in _used(table, of, groups, Inertial(), "attitude", matrices, covariances)
+    ]
 
 
 def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observation]:
@@ -200,27 +195,17 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
     first, second = (indices_of(table, column, photos, "photo").tolist() for column in ("from", "to"))
     vectors, turns = tables.vectors(table, AXES), tables.turns(table)
     table.check_given(vectors, AXES)
-    lengths = tables.deviations(table, "relative_poses", [f"sd_{axis}" for axis in AXES])
+    lengths = tables.deviations(table, "relative_poses", deviation_columns(AXES))
     angles = table.vectors(_ROTATIONS, read=tables.angle)
     sd = np.column_stack([lengths, angles])
-    table.check_given(sd, [f"sd_{name}" for name in POSE])
+    table.check_given(sd, deviation_columns(POSE))
     covariances = tables.pose_covariances(table, sd)
     for row in np.flatnonzero(np.isnan(turns).any(axis=(1, 2))).tolist():
         raise table.error(row, "there are no angles")
+    given = zip(first, second, vectors, turns, covariances, strict=True)
     return [
-        made(
-            table,
-            row,
-            partial(
-                Relative,
-                names[first[row]],
-                names[second[row]],
-                vectors[row],
-                turns[row],
-                covariance=covariances[row],
-            ),
-        )
-        for row in range(table.count)
+        made(table, row, partial(Relative, names[one], names[other], vector, turn, covariance=covariance))
+        for row, (one, other, vector, turn, covariance) in enumerate(given)
     ]
 
 
@@ -241,23 +226,21 @@ def _all(block: Block, kind: type[_Kind]) -> list[_Kind]:
     return [each for each in block.observations if isinstance(each, kind)]
 
 
-def _columns(names: Sequence[str], values: Floats) -> dict[str, Any]:
-    return dict(zip(names, values.T, strict=True))
-
-
-def _deviations(observations: Sequence[Observation]) -> Floats:
-    """Return (n, k) standard deviations of observations."""
-    found: Floats = np.sqrt(np.array([np.diag(each.precision) for each in observations]))
-    return found
-
-
-def _measured(observations: Sequence[Observation], columns: Sequence[str], values: Floats) -> dict[str, Any]:
-    """Return the columns of what was observed, with deviations and covariances of components."""
+def _written(
+    observations: Sequence[Observation],
+    names: Sequence[str],
+    values: Floats,
+    components: Sequence[str] = (),
+    units: Sequence[float] | None = None,
+) -> dict[str, Any]:
+    """Return the columns of what was observed, with deviations and covariances of its components."""
+    components = components or names
     precisions = np.array([each.precision for each in observations])
+    sd = np.sqrt(np.einsum("nii->ni", precisions)) * (1.0 if units is None else units)
     return {
-        **_columns(columns, values),
-        **_columns(deviation_columns(columns), _deviations(observations)),
-        **correlations(precisions, columns),
+        **columns_of(names, values),
+        **columns_of(deviation_columns(components), sd),
+        **correlations(precisions, components, units),
     }
 
 
@@ -271,10 +254,10 @@ def _antenna_tables(block: Block) -> _Columns:
     found: _Columns = {}
     if positions:
         places = places_written(block, np.array([each.observed[:3] for each in positions]))
-        found["gnss"] = subject_columns(positions, block) | _measured(positions, AXES, places)
+        found["gnss"] = subject_columns(positions, block) | _written(positions, AXES, places)
     if velocities:
         values = np.array([each.observed[:3] for each in velocities])
-        found["velocities"] = subject_columns(velocities, block) | _measured(velocities, VELOCITY, values)
+        found["velocities"] = subject_columns(velocities, block) | _written(velocities, VELOCITY, values)
     if list(groups) == [Antenna()]:
         return found
     names = [groups[key] for key in keys]
@@ -291,16 +274,11 @@ def _inertial_tables(block: Block) -> _Columns:
     found: _Columns = {}
     if attitudes:
         angles = angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)
-        covariances = np.array([each.precision for each in attitudes])
-        found["attitudes"] = {
-            **subject_columns(attitudes, block),
-            **_columns(_ANGLES, angles),
-            **_columns(_ROTATIONS, np.degrees(_deviations(attitudes))),
-            **correlations(covariances, ROTATIONS, (DEGREE,) * 3),
-        }
+        turned = _written(attitudes, _ANGLES, angles, ROTATIONS, (DEGREE,) * 3)
+        found["attitudes"] = subject_columns(attitudes, block) | turned
     if rates:
         values = np.array([each.observed[:3] for each in rates])
-        found["rates"] = subject_columns(rates, block) | _measured(rates, RATE, values)
+        found["rates"] = subject_columns(rates, block) | _written(rates, RATE, values)
     if not groups:
         return found
     for table, own in (("attitudes", names[: len(attitudes)]), ("rates", names[len(attitudes) :])):
@@ -313,14 +291,12 @@ def _pose_tables(block: Block) -> _Columns:
     poses = _all(block, Relative)
     if not poses:
         return {}
+    values = np.hstack(
+        [
+            np.array([np.asarray(each.translation) for each in poses]),
+            angles_of(np.array([np.asarray(each.rotation) for each in poses]), block),
+        ]
+    )
     units = (1.0,) * 3 + (DEGREE,) * 3
-    return {
-        "relative_poses": {
-            "from": [each.first for each in poses],
-            "to": [each.second for each in poses],
-            **_columns(AXES, np.array([np.asarray(each.translation) for each in poses])),
-            **_columns(_ANGLES, angles_of(np.array([np.asarray(each.rotation) for each in poses]), block)),
-            **_columns([f"sd_{name}" for name in POSE], _deviations(poses) * units),
-            **correlations(np.array([each.precision for each in poses]), POSE, units),
-        }
-    }
+    ends = {"from": [each.first for each in poses], "to": [each.second for each in poses]}
+    return {"relative_poses": ends | _written(poses, (*AXES, *_ANGLES), values, POSE, units)}

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.schema import ANGLES, AXES, deviation_columns
+from photogram.formats.plain.common_unknowns import made
+from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, deviation_columns
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.transform import Transform
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, listed, quoted
+from photogram.messages import listed, quoted
 from photogram.network.observations import Attitude, Observation
 
 __all__ = ["Photos", "read_photos"]
@@ -72,7 +74,7 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
             raise table.error(row, "the photo is on a trajectory, whose pose it has: it has no sd of its own")
     kept = np.flatnonzero(use)
     if len(kept) < table.count:
-        tables.messages.append(Message(f"{table.count - len(kept)} photos are not used", table.path))
+        tables.tell(f"{table.count - len(kept)} photos are not used", table.path)
     which, groups = _camera_of(table, cameras), table.texts("group")
     unused = frozenset(name for name, used in zip(texts, use.tolist(), strict=True) if not used)
     return Photos(
@@ -117,7 +119,7 @@ def _attitude_weights(
     """Return standard deviations of omega, phi, kappa, and observations of attitudes given otherwise."""
     settings = tables.settings
     own = f"sd_{ANGLES[settings.attitude][0]}", *(f"sd_{name}" for name in ANGLES[settings.attitude][1:])
-    steps = ("sd_rotation_x", "sd_rotation_y", "sd_rotation_z")
+    steps = deviation_columns(ROTATIONS)
     free = np.full((table.count, 3), np.inf)
     columns = steps if any(each in table for each in steps) else own
     if not any(each in table for each in columns):
@@ -139,10 +141,7 @@ def _attitude_weights(
         if not sd[row].any():
             fixed[row] = 0.0
         elif columns is steps and np.isfinite(sd[row]).all():
-            try:
-                observed.append(Attitude(names[row], matrices[row], sd=sd[row]))
-            except InputError as error:
-                raise table.error(row, error.message) from None
+            observed.append(made(table, row, partial(Attitude, names[row], matrices[row], sd=sd[row])))
         else:
             raise table.error(
                 row,

@@ -24,13 +24,13 @@ from photogram.formats.plain.boards import (
 )
 from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
 from photogram.formats.plain.covariances import read_covariances
-from photogram.formats.plain.film_sides import Seen
+from photogram.formats.plain.film_readings import Seen
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving_photos import placed, read_timed
 from photogram.formats.plain.observed_poses import read_observations
 from photogram.formats.plain.photos import Photos, read_photos
-from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames
+from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
@@ -88,7 +88,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     transform = Transform(settings, tables.messages)
     cameras = read_cameras(tables if wishes.cameras is None else _with_cameras(tables, wishes.cameras))
     trajectories = read_trajectories(tables)
-    control = _control_table(tables)
+    control = tables.read("control")
     # The frame is settled by control where it has no origin: it is the first that is carried over.
     given = None if control is None else read_control(tables, control, transform)
     photos = read_photos(tables, transform, cameras)
@@ -156,8 +156,8 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
             "settings": settings,
             ASSUMED: assumed,
             REGULARISED: read_regularised(tables),
-            TIMES: times_of_frames(tables) | _times(photos),
-            **scanned.details(),
+            TIMES: times_of_frames(tables) | times_said(photos.names, photos.times),
+            **scanned.inside,
         },
     ).replace(
         sd_taken=True,
@@ -173,12 +173,6 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         rows = np.array([places[name] for name in given.names], dtype=np.int64)
         check_systems(project, settings, control, rows, control.vectors(AXES), free=False)
     return project
-
-
-def _times(photos: Photos) -> dict[str, float]:
-    """Return when photos were taken, of those that say it."""
-    pairs = zip(photos.names, photos.times.tolist(), strict=True)
-    return {photo: time for photo, time in pairs if not math.isnan(time)}
 
 
 def _unused(
@@ -258,10 +252,6 @@ class _Given:
     vegetated: frozenset[str]
 
 
-def _control_table(tables: Tables) -> ColumnTable | None:
-    return tables.read("control")
-
-
 def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _Given:
     """Read a table of control and check points.
 
@@ -307,8 +297,10 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
         if use != "control":
             held[row] = np.inf
             continue
+        # Turning changes nothing of such a covariance matrix.
+        isotropic = (covariances[row] == covariances[row][0, 0] * np.eye(3)).all()
         correlated = (turned[row] - np.diag(np.diag(turned[row]))).any()
-        if correlated and np.isfinite(sd[row]).all() and not _isotropic(covariances[row]):
+        if correlated and np.isfinite(sd[row]).all() and not isotropic:
             if not is_covariance(turned[row]):
                 raise table.error(row, "its covariances cannot be: the matrix is not positive definite")
             observed.append(Control(names[row], values[row], covariance=(turned[row] + turned[row].T) / 2))
@@ -317,11 +309,6 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     values = np.where(np.array([row in off for row in range(len(uses))])[:, np.newaxis], np.nan, values)
     vegetated = read_cover(table, names, uses)
     return _Given(table, names, values, held, check_sd, observed, vegetated)
-
-
-def _isotropic(covariance: Floats) -> bool:
-    """Whether turning changes nothing of a covariance matrix."""
-    return bool((covariance == covariance[0, 0] * np.eye(3)).all())
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from photogram.formats.plain.clocks import clock_columns, clocks
+from photogram.arguments.types import Floats
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
-from photogram.formats.plain.tables import Tables, angles_of, indices_of
+from photogram.formats.plain.subjects import scalar_columns, scalars
+from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.messages import quoted
 from photogram.network.block import Block
@@ -21,7 +22,7 @@ from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
-__all__ = ["Rigs", "read_bases", "read_frames", "read_rigs", "times_of_frames"]
+__all__ = ["Rigs", "read_bases", "read_frames", "read_rigs", "times_of_frames", "times_said"]
 
 _ANGLES = ANGLES["omega_phi_kappa"]
 FRAME = "frame itself"
@@ -47,7 +48,7 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
     found: dict[str, tuple[str, dict[str, Sensor]]] = {}
     clocked: dict[str, dict[str, Clock]] = {}
     rows = list(zip(*(table.texts(column) for column in ("rig", "camera", "sensor")), strict=True))
-    dated = clocks(tables, table, [own or f"{rig}/{camera}" for rig, camera, own in rows])
+    dated = scalars(tables, table, Clock, [own or f"{rig}/{camera}" for rig, camera, own in rows])
     for row, (rig, camera, own) in enumerate(rows):
         if camera and camera not in cameras:
             raise table.error(row, f"column camera: there is no camera {quoted(camera)}")
@@ -126,9 +127,12 @@ def read_frames(
 def times_of_frames(tables: Tables) -> dict[str, float]:
     """Return when photos on frames were taken, of those that say it."""
     table = tables.read("frames")
-    if table is None:
-        return {}
-    pairs = zip(table.texts("photo"), table.numbers("time").tolist(), strict=True)
+    return {} if table is None else times_said(table.texts("photo"), table.numbers("time"))
+
+
+def times_said(photos: Sequence[str], times: Floats) -> dict[str, float]:
+    """Return when photos were taken, of those that say it."""
+    pairs = zip(photos, times.tolist(), strict=True)
     return {photo: time for photo, time in pairs if not math.isnan(time)}
 
 
@@ -285,7 +289,7 @@ class Rigs:
                 "rig": [row[0] for row in rows],
                 what: [row[1] for row in rows],
                 **_poses([row[2] for row in rows], block),
-                **clock_columns([self.clock(row[2]) for row in rows]),
+                **scalar_columns(Clock, [self.clock(row[2]) for row in rows]),
             },
         }
         if frames:
@@ -321,7 +325,7 @@ def _poses(sensors: Sequence[Sensor | None], block: Block) -> dict[str, Any]:
     sd = np.array([np.zeros(6) if each is None else each.deviations for each in sensors])
     sd[:, 3:] = np.degrees(sd[:, 3:])
     return {
-        **dict(zip(AXES, values.T, strict=True)),
-        **dict(zip(_ANGLES, angles.T, strict=True)),
-        **dict(zip(deviation_columns(POSE), sd.T, strict=True)),
+        **columns_of(AXES, values),
+        **columns_of(_ANGLES, angles),
+        **columns_of(deviation_columns(POSE), sd),
     }

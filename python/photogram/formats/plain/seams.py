@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram.formats.plain.tables import Tables
-from photogram.io.delimited import ColumnTable, Names
+from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, fields, replace
 from photogram.network.moving_photos import Timed
 from photogram.network.rigs import Mount
@@ -93,32 +93,22 @@ def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
         if np.isnan(place):
             raise table.error(row, f"the photo {photo} has a seam, and this reading no {seam.line}")
         texts[row] = seam.half if place >= seam.at else photo
-    return _with_texts(table, "photo", texts)
+    return table.with_texts("photo", texts)
 
 
 def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
     """Return the table of photos with a row for each second half, of whose pose nothing is known."""
     texts = table.texts("photo")
     more = [row for row, name in enumerate(texts) if name in seams]
-    rows = [*range(table.count), *more]
-    cells = {name: [own[row] for row in rows] for name, own in table.cells.items()}
-    ready = {
-        name: own[rows] if isinstance(own, np.ndarray) else Names(own.names, own.rows[rows])
-        for name, own in table.ready.items()
-    }
+    found = table.some([*range(table.count), *more])
+    cells = dict(found.cells)
     for name in (each for each in table.columns if each.startswith("sd_")):
         if name in cells:
-            cells[name][table.count :] = [""] * len(more)
+            cells[name] = [*cells[name][: table.count], *[""] * len(more)]
         else:
-            ready[name][table.count :] = np.nan  # type: ignore[index]
-    records = [table.records[row] for row in rows]
-    found = replace(table, count=len(rows), cells=cells, ready=ready, records=records)
-    return _with_texts(found, "photo", [*texts, *(seams[texts[row]].half for row in more)])
-
-
-def _with_texts(table: ColumnTable, column: str, texts: Sequence[str]) -> ColumnTable:
-    ready = {name: own for name, own in table.ready.items() if name != column}
-    return replace(table, cells={**table.cells, column: texts}, ready=ready)
+            found.ready[name][table.count :] = np.nan  # type: ignore[index]
+    halves = [seams[texts[row]].half for row in more]
+    return replace(found, cells=cells).with_texts("photo", [*texts, *halves])
 
 
 def mounted_halves(

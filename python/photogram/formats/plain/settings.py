@@ -15,10 +15,9 @@ from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes
 from photogram.formats.plain.schema import TABLES
-from photogram.formats.plain.sections import Sections
 from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
-from photogram.io.toml import day_of
+from photogram.io.toml import Sections, day_of
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition

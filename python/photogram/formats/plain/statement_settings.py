@@ -6,17 +6,16 @@ import datetime
 import math
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from photogram.arguments.arrays import shown
 from photogram.errors import InputError
-from photogram.formats.plain.sections import Sections
-from photogram.formats.sentences import read_sentences
-from photogram.io.toml import quoted_text
+from photogram.io.toml import Sections, TomlFile, quoted_text
 from photogram.results.statement.request import Asked, length_of
 from photogram.results.statement.texts import Texts
 
-__all__ = ["KEYS", "asked_files", "asked_lines", "read_asked"]
+__all__ = ["KEYS", "asked_files", "asked_lines", "read_asked", "read_sentences"]
 
 KEYS: Mapping[str, tuple[str, ...]] = {
     "check": ("survey_common_sd", "survey_common_in_control", "independent"),
@@ -186,3 +185,30 @@ def asked_files(asked: Mapping[str, Any]) -> dict[str, bytes]:
         return {}
     lines = [f"{quoted_text(key)} = {quoted_text(sentence)}\n" for key, sentence in sentences.items()]
     return {SENTENCES: "".join(lines).encode()}
+
+
+def read_sentences(path: Path) -> dict[str, str]:
+    """Return the sentences of a file by their keys (section 5 of the specification of the statement).
+
+    Parameters
+    ----------
+    path
+        A file of TOML, flat, with keys in quotation marks: `"asprs.tested.h" = "Tested with {n} points."`.
+
+    Raises
+    ------
+    InputError
+        It cannot be read or is no TOML; a key that there is not, with the nearest one; what is no sentence,
+        or has fields that the sentence of the program does not have.
+    """
+    file = TomlFile(path)
+    for key, sentence in file.content.items():
+        if isinstance(sentence, dict):
+            raise file.error(key, f'{key} is no key: keys stand in quotation marks, "asprs.tested.h" = "..."')
+        if not isinstance(sentence, str):
+            raise file.error(key, f"{key} is no sentence: {shown(sentence)}")
+        try:
+            Texts(own={key: sentence})
+        except InputError as error:
+            raise file.error(key, error.message) from None
+    return dict(file.content)

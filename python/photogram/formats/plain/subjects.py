@@ -1,20 +1,24 @@
-"""What rows of observations are of: photos, or trajectories at times."""
+"""What rows of observations are of: photos, or trajectories at times; and the clocks that date them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, counted, quoted
+from photogram.messages import counted, quoted
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Range, Rate, Velocity
-from photogram.network.trajectories import Clock, Trajectory
+from photogram.network.trajectories import Clock, Readout, Trajectory
 
-__all__ = ["Subjects", "clocked", "subject_columns"]
+__all__ = ["Subjects", "clocked", "scalar_columns", "scalars", "subject_columns"]
+
+_Scalar = TypeVar("_Scalar", Clock, Readout)
+_COLUMNS: Mapping[type, tuple[str, str]] = {Clock: ("clock", "time_offset"), Readout: ("scan", "line_rate")}
+"""What names clocks, and line rates of scans, and their numbers."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ class Subjects:
             found.append(own if inside else None)
         if out := sum(each is None for each in found):
             text = f"{counted(out, 'record')} at times that their trajectory does not reach are left out"
-            tables.messages.append(Message(text, table.path))
+            tables.tell(text, table.path)
         return found
 
 
@@ -104,4 +108,38 @@ def subject_columns(
         **({"photo": photos} if any(photos) else {}),
         "trajectory": [None if each is None else each.trajectory.name for each in moments],
         "time": [each.time for each in observations],
+    }
+
+
+def scalars(
+    tables: Tables, table: ColumnTable, kind: type[_Scalar], titles: Sequence[str], usual: float = 0.0
+) -> list[_Scalar | None]:
+    """Return the clock of each row, or the factor of its line rate, as a rule 1; None where nothing is said.
+
+    One without a name is called by its title.
+
+    Raises
+    ------
+    InputError
+        Values that are no numbers, another value of what a row before has of the same name.
+    """
+    word, number = _COLUMNS[kind]
+    values, sd = table.numbers(number, usual), table.numbers(f"sd_{number}", 0.0, infinite=True)
+    return [
+        tables.shared.one(table, row, word, kind, name or title, float(values[row]), float(sd[row]))
+        if name or sd[row] or values[row] != usual
+        else None
+        for row, (name, title) in enumerate(zip(table.texts(word), titles, strict=True))
+    ]
+
+
+def scalar_columns(kind: type[Clock | Readout], own: Sequence[Clock | Readout | None]) -> dict[str, Any]:
+    """Return the columns of clocks, or of factors of line rates; none where there are none."""
+    if not any(own):
+        return {}
+    word, number = _COLUMNS[kind]
+    return {
+        word: ["" if each is None else each.name for each in own],
+        number: [None if each is None else each.value for each in own],
+        f"sd_{number}": [None if each is None else float(each.deviations[0]) for each in own],
     }

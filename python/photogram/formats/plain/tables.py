@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,6 +28,7 @@ __all__ = [
     "DEGREE",
     "Tables",
     "angles_of",
+    "columns_of",
     "correlations",
     "covariances_of",
     "different",
@@ -94,6 +96,10 @@ class Tables:
         metre = 1.0 / UNITS[self.settings.length]
         required = schema.needed(table.columns)
         return settled(table, given, known, metre, required, self.names, name, self.messages)
+
+    def tell(self, text: str, path: Path | None = None) -> None:
+        """Add a remark, on a file."""
+        self.messages.append(Message(text, path))
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""
@@ -205,7 +211,7 @@ def matrices_of(settings: Settings, values: Floats) -> Floats:
     """Return (n, 3, 3) attitudes A, photo to object, from the numbers of the representation of a project."""
     kind = settings.attitude
     given = values.reshape(-1, 3, 3) if kind == "matrix" else values
-    found = Attitudes.of(_own(kind), given).matrices
+    found = Attitudes.of(cast("Representation", kind), given).matrices
     if kind in ("yaw_pitch_roll", "azimuth_tilt_swing"):
         return found
     # Of these kinds the numbers are read as a matrix Q, and the settings say what Q is.
@@ -215,10 +221,6 @@ def matrices_of(settings: Settings, values: Floats) -> Floats:
         to_photo = Y_DOWN @ to_photo
     photo_to_object: Floats = to_photo.transpose(0, 2, 1)
     return photo_to_object
-
-
-def _own(kind: str) -> Representation:
-    return kind  # type: ignore[return-value]
 
 
 def covariances_of(
@@ -288,6 +290,11 @@ def correlations(
     if not any(np.nan_to_num(covariances[:, i, j]).any() for i, j in columns.values()):
         return {}
     return {name: covariances[:, i, j] * (scales[i] * scales[j]) for name, (i, j) in columns.items()}
+
+
+def columns_of(names: Sequence[str], values: Floats) -> dict[str, Any]:
+    """Return (rows, k) numbers as columns by their names."""
+    return dict(zip(names, values.T, strict=True))
 
 
 def places_written(block: Block, values: Floats) -> Floats:

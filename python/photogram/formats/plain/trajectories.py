@@ -1,4 +1,4 @@
-"""The tables of trajectories: records, what corrections are made of, knots, coefficients."""
+"""The tables of trajectories: records, what corrections are made of, knots, coefficients, their sums."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import AXES, BASES, VELOCITY, deviation_columns
-from photogram.formats.plain.tables import Tables, indices_of, vectors_of
+from photogram.formats.plain.schema import AXES, BASES, FACTORS, VELOCITY, deviation_columns
+from photogram.formats.plain.tables import Tables, covariances_of, indices_of, vectors_of
 from photogram.io.delimited import ColumnTable
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import replace
 from photogram.messages import quoted
+from photogram.network.observations import Observation, Smoothness
 from photogram.network.trajectories import (
     Angles,
     Basis,
@@ -28,7 +29,7 @@ from photogram.network.trajectories import (
     Trajectory,
 )
 
-__all__ = ["read_trajectories", "trajectory_rows"]
+__all__ = ["read_smoothness", "read_trajectories"]
 
 _SD = deviation_columns(AXES)
 _OTHERS = (
@@ -56,14 +57,14 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
         return {}
     names = table.names_once("trajectory")
     places = {name: row for row, name in enumerate(names)}
-    records = _Records.read(tables, table, places)
-    bases = [_Bases.read(tables, table, of, places) for of in BASES]
+    records = _records(tables, table, places)
+    bases = [_Bases(tables, table, of, places) for of in BASES]
     bodies = _turned(tables, "body_rotations", places, tables.flip)
     along = cast("list[PositionAxes]", _words(table, "position_axes", get_args(PositionAxes)))
     angles = cast("list[Angles]", _words(table, "angles", get_args(Angles)))
     found: dict[str, Trajectory] = {}
     for row, name in enumerate(names):
-        own = records.of(row, name)
+        own = records[row]
         position, rotation = (each.of(row, name, own) for each in bases)
         body = bodies.get(name)
         if body is not None:
@@ -74,7 +75,7 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
     return found
 
 
-def trajectory_rows(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
+def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = False) -> Groups:
     """Return the rows of each trajectory or, with `bases`, of each of its bases.
 
     Raises
@@ -116,7 +117,7 @@ def _turned(
     table = tables.read(name)
     if table is None:
         return {}
-    groups = trajectory_rows(table, places)
+    groups = _rows_of(table, places)
     times, matrices = _times(table, groups), tables.matrices(table)
     unknown = np.isnan(matrices).any(axis=(1, 2))
     if unknown.any():
@@ -126,64 +127,35 @@ def _turned(
     return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
 
 
-@dataclass(frozen=True)
-class _Records:
-    """What is known of each trajectory beforehand.
-
-    Attributes
-    ----------
-    table
-        Of trajectories.
-    positions, attitudes
-        (k,) times, and (k, 6) positions with velocities; (m,) times and (m, 3, 3) attitudes.
-    joined, turned
-        How positions and attitudes are interpolated, by the rows of the table.
-    """
-
-    table: ColumnTable
-    positions: Mapping[str, tuple[Floats, Floats]]
-    attitudes: Mapping[str, tuple[Floats, Floats]]
-    joined: Sequence[Interpolation]
-    turned: Sequence[Interpolation]
-
-    @classmethod
-    def read(cls, tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> _Records:
-        """Read the tables; errors as of :func:`read_trajectories`."""
-        found = {}
-        if (own := tables.read("trajectory_positions")) is not None:
-            groups = trajectory_rows(own, places)
-            times, values = _times(own, groups), own.vectors(AXES)
-            own.check_given(values, AXES)
-            values = np.column_stack([values, vectors_of(own, VELOCITY)])
-            found = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
-        joined, turned = (
-            cast("list[Interpolation]", _words(table, f"{of}interpolation", get_args(Interpolation)))
-            for of in ("", "attitude_")
-        )
-        return cls(table, found, _turned(tables, "trajectory_attitudes", places), joined, turned)
-
-    def of(self, row: int, name: str) -> Table:
-        """Return what is known of the trajectory of a row."""
-        for own, what in ((self.positions, "positions"), (self.attitudes, "attitudes")):
-            if name not in own:
-                raise self.table.error(row, f"{quoted(name)} has no rows in the table trajectory_{what}")
-        (times, values), (attitude_times, matrices) = self.positions[name], self.attitudes[name]
-        hermite = self.joined[row] == "hermite"
+def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> list[Table]:
+    """Return what is known beforehand of the trajectory of each row."""
+    positions = {}
+    if (own := tables.read("trajectory_positions")) is not None:
+        groups = _rows_of(own, places)
+        times, values = _times(own, groups), own.vectors(AXES)
+        own.check_given(values, AXES)
+        values = np.column_stack([values, vectors_of(own, VELOCITY)])
+        positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
+    attitudes = _turned(tables, "trajectory_attitudes", places)
+    kinds = [
+        cast("list[Interpolation]", _words(table, f"{of}interpolation", get_args(Interpolation)))
+        for of in ("", "attitude_")
+    ]
+    found = []
+    for name, row in places.items():
+        for what, known in (("positions", positions), ("attitudes", attitudes)):
+            if name not in known:
+                raise table.error(row, f"{quoted(name)} has no rows in the table trajectory_{what}")
+        times, values = positions[name]
+        hermite = kinds[0][row] == "hermite"
         if hermite and np.isnan(values).any():
-            raise self.table.error(
+            raise table.error(
                 row, "column interpolation: hermite needs vx, vy, vz of all its rows in trajectory_positions"
             )
-        make = partial(
-            Table,
-            times,
-            values[:, :3],
-            attitude_times,
-            matrices,
-            values[:, 3:] if hermite else None,
-            self.joined[row],
-            self.turned[row],
-        )
-        return made(self.table, row, make)
+        velocities = values[:, 3:] if hermite else None
+        given = times, values[:, :3], *attitudes[name], velocities, kinds[0][row], kinds[1][row]
+        found.append(made(table, row, partial(Table, *given)))
+    return found
 
 
 def _words(table: ColumnTable, column: str, words: Sequence[str]) -> list[str]:
@@ -205,57 +177,32 @@ _ALL = tuple(dict.fromkeys(name for names in _COLUMNS.values() for name in names
 _WITH_SD = ("smooth", "correlation")
 
 
-@dataclass(frozen=True)
 class _Bases:
-    """What corrections of positions, or of rotations, are made of: a basis for each trajectory.
+    """What corrections of positions, or of rotations (`kind`), are made of: a basis for each trajectory."""
 
-    Attributes
-    ----------
-    table, kind
-        Of trajectories, and which corrections these are.
-    unit, signs
-        What a number of the tables is in that of the coefficients, and (rows, 3) which way their axes point.
-    words, numbers
-        (rows,) which basis it is, and what the columns say of it; `sd` of coefficients.
-    knots
-        Of each trajectory that has some, in seconds.
-    coefficients, rows
-        The table of coefficients, and its rows of each basis.
-    """
-
-    table: ColumnTable
-    kind: str
-    unit: float
-    signs: Floats
-    words: Sequence[str]
-    numbers: Mapping[str, Floats]
-    knots: Mapping[str, Floats]
-    coefficients: ColumnTable | None
-    rows: Groups
-
-    @classmethod
-    def read(cls, tables: Tables, table: ColumnTable, kind: str, places: Mapping[str, int]) -> _Bases:
-        """Read the tables; errors as of :func:`read_trajectories`."""
-        unit = tables.radians if kind == "rotation" else 1.0
-        given = tables.settings.sd.get("trajectories", (math.inf,) * 2)
-        numbers = {what: table.numbers(f"{kind}_{what}") for what in _ALL}
-        numbers |= {f"sd_{what}": table.numbers(f"sd_{kind}_{what}") * unit for what in _WITH_SD}
-        numbers["sd"] = table.numbers(f"sd_{kind}", given[BASES.index(kind)], infinite=True) * unit
-        if (negative := numbers["sd"] < 0).any():
+    def __init__(self, tables: Tables, table: ColumnTable, kind: str, places: Mapping[str, int]) -> None:
+        self.table, self.kind = table, kind
+        self.unit = tables.radians if kind == "rotation" else 1.0
+        given = tables.settings.sd.get("trajectories", (math.inf,) * 2)[BASES.index(kind)]
+        self.numbers = {what: table.numbers(f"{kind}_{what}") for what in _ALL}
+        self.numbers |= {f"sd_{what}": table.numbers(f"sd_{kind}_{what}") * self.unit for what in _WITH_SD}
+        self.numbers["sd"] = table.numbers(f"sd_{kind}", given, infinite=True) * self.unit
+        if (negative := self.numbers["sd"] < 0).any():
             raise table.error(int(np.argmax(negative)), f"column sd_{kind}: is negative")
-        knots: dict[str, Floats] = {}
+        self.knots: dict[str, Floats] = {}
         if (own := tables.read("trajectory_knots")) is not None:
-            groups = trajectory_rows(own, places, bases=True)
+            groups = _rows_of(own, places, bases=True)
             values = _times(own, groups, "knot", multiple=True)
-            knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
-        coefficients = tables.read("trajectory_coefficients")
-        rows = {} if coefficients is None else trajectory_rows(coefficients, places, bases=True)
-        signs = np.ones((len(table.texts(kind, "none")), 3))
+            self.knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
+        self.coefficients = tables.read("trajectory_coefficients")
+        self.rows: Groups = {}
+        if self.coefficients is not None:
+            self.rows = _rows_of(self.coefficients, places, bases=True)
+        self.words = [each.lower() for each in table.texts(kind, "none")]
+        self.signs = np.ones((table.count, 3))  # which way the axes of coefficients point
         if kind == "rotation":
             about_photo = [each != "zxz" for each in _words(table, "angles", get_args(Angles))]
-            signs[about_photo] = np.diag(tables.flip)
-        words = [each.lower() for each in table.texts(kind, "none")]
-        return cls(table, kind, unit, signs, words, numbers, knots, coefficients, rows)
+            self.signs[about_photo] = np.diag(tables.flip)
 
     def of(self, row: int, name: str, known: Table) -> Basis | None:
         """Return the basis of the trajectory of a row; None for no corrections."""
@@ -337,3 +284,39 @@ class _Bases:
             values[int(number)] = value * self.unit
             deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
         return values, deviations
+
+
+def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> list[Observation]:
+    """Read sums of neighbouring coefficients.
+
+    Raises
+    ------
+    InputError
+        Trajectories and coefficients that are not there, standard deviations that give no weight.
+    """
+    table = tables.read("smoothness")
+    if table is None:
+        return []
+    groups = _rows_of(table, {name: row for row, name in enumerate(trajectories)}, bases=True)
+    sd = tables.deviations(table, "smoothness", _SD)
+    table.check_given(sd, _SD)
+    observed, covariances = table.vectors(AXES, 0.0), covariances_of(sd, table)
+    factors, first = table.vectors(FACTORS), table.numbers("k")
+    found: dict[int, Observation] = {}
+    for (name, of), rows in groups.items():
+        own = trajectories[name].coefficients[BASES.index(of)]
+        # Rotations are about the axes of photos, in the unit of angles.
+        turn = tables.flip * tables.radians if of == "rotation" else np.eye(3)
+        for row in rows.tolist():
+            given = factors[row][~np.isnan(factors[row])]
+            if np.isnan(factors[row][: len(given)]).any():
+                raise table.error(row, f"{', '.join(FACTORS)}: there is one behind an empty cell")
+            if first[row] not in range(len(own) - len(given) + 1):
+                raise table.error(row, f"column k: the {of} of {name} has no such coefficients")
+            k = int(first[row])
+            own_sum, precision = turn @ observed[row], turn @ covariances[row] @ turn.T
+            make = partial(
+                Smoothness, own[k : k + len(given)], given, own_sum, covariance=(precision + precision.T) / 2
+            )
+            found[row] = made(table, row, make)
+    return [found[row] for row in sorted(found)]

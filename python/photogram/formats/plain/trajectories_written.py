@@ -1,4 +1,4 @@
-"""The tables of trajectories of a block."""
+"""The tables of trajectories of a block, and of sums of their coefficients that were observed."""
 
 from __future__ import annotations
 
@@ -8,17 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.plain.schema import ANGLES, AXES, BASES, VELOCITY, deviation_columns
-from photogram.formats.plain.tables import DEGREE, angles_of
+from photogram.formats.plain.schema import ANGLES, AXES, BASES, FACTORS, VELOCITY, deviation_columns
+from photogram.formats.plain.tables import DEGREE, angles_of, columns_of, correlations
 from photogram.network.block import Block
-from photogram.network.observations import all_trajectories
+from photogram.network.observations import Observation, Smoothness, all_trajectories
+from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
 
-__all__ = ["shared_trajectories", "trajectory_tables"]
+__all__ = ["lost_smoothness", "shared_trajectories", "smoothness_table", "trajectory_tables"]
 
 _ANGLES = ANGLES["omega_phi_kappa"]
 _SD = deviation_columns(AXES)
+Place = tuple[str, str, int]
+"""Trajectory, position or rotation, and the number of a coefficient."""
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
@@ -130,8 +134,8 @@ def _coefficient_rows(own: Trajectory, which: int) -> dict[str, Any]:
         "trajectory": [own.name] * len(coefficients),
         "of": [BASES[which]] * len(coefficients),
         "k": np.arange(len(coefficients)),
-        **dict(zip(AXES, values.T, strict=True)),
-        **dict(zip(_SD, sd.T, strict=True)),
+        **columns_of(AXES, values),
+        **columns_of(_SD, sd),
     }
 
 
@@ -155,8 +159,8 @@ def _position_records(own: Sequence[Trajectory]) -> dict[str, Any]:
             {
                 "trajectory": [each.name] * len(table.times),
                 "time": table.times,
-                **dict(zip(AXES, table.positions.T, strict=True)),
-                **dict(zip(VELOCITY, velocities.T, strict=True)),
+                **columns_of(AXES, table.positions),
+                **columns_of(VELOCITY, velocities),
             }
         )
     found = _joined(parts)
@@ -169,7 +173,7 @@ def _turned_records(records: Sequence[tuple[str, Any, Any]], block: Block) -> di
             {
                 "trajectory": [name] * len(times),
                 "time": np.asarray(times),
-                **dict(zip(_ANGLES, angles_of(np.asarray(matrices), block).T, strict=True)),
+                **columns_of(_ANGLES, angles_of(np.asarray(matrices), block)),
             }
             for name, times, matrices in records
         ]
@@ -185,3 +189,58 @@ def _knots(own: Sequence[Trajectory]) -> dict[str, Any]:
         for knots in [np.asarray(basis.knots, dtype=float)]
     ]
     return _joined(parts) if parts else {}
+
+
+def smoothness_table(block: Block) -> dict[str, Any]:
+    """Return the table of sums of neighbouring coefficients; none where splines say all themselves."""
+    own = [(each, place) for each, place in _beside(block) if place is not None]
+    if not own:
+        return {}
+    units = np.array([DEGREE if place[1] == "rotation" else 1.0 for _, place in own])[:, np.newaxis]
+    factors = np.full((len(own), len(FACTORS)), np.nan)
+    for row, (each, _) in enumerate(own):
+        factors[row, : len(each.coefficients)] = each.factors
+    sums = np.array([each.observed[:3] for each, _ in own]) * units
+    covariances = np.array([each.precision for each, _ in own]) * units[:, :, np.newaxis] ** 2
+    sd: Floats = np.sqrt(np.einsum("nii->ni", covariances))
+    found: dict[str, Any] = {
+        name: [place[k] for _, place in own] for k, name in enumerate(("trajectory", "of", "k"))
+    }
+    numbers = columns_of((*FACTORS, *AXES, *_SD), np.hstack([factors, sums, sd]))
+    found |= {name: column for name, column in numbers.items() if not _is_empty(column)}
+    return found | correlations(covariances, AXES)
+
+
+def lost_smoothness(block: Block) -> int:
+    """Return how many sums of coefficients the table has no place for: not of neighbours, or of too many."""
+    return sum(place is None for _, place in _beside(block))
+
+
+def _beside(block: Block) -> list[tuple[Smoothness, Place | None]]:
+    """Return sums that no spline says itself, each with the place of its first coefficient, if it has one."""
+    shared = shared_trajectories(block)
+    places = {
+        id(each): (trajectory.name, of, k)
+        for trajectory in shared
+        for of, own in zip(BASES, trajectory.coefficients, strict=True)
+        for k, each in enumerate(own)
+    }
+    made_by_splines = {_content(each) for trajectory in shared for each in smoothness_of(trajectory)}
+    own = [each for each in block.observations if isinstance(each, Smoothness)]
+    return [
+        (each, _first(each.coefficients, places)) for each in own if _content(each) not in made_by_splines
+    ]
+
+
+def _content(each: Observation) -> tuple[object, ...]:
+    return (*map(id, each.unknowns), each.observed.tobytes(), each.precision.tobytes())
+
+
+def _first(coefficients: Sequence[object], places: Mapping[int, Place]) -> Place | None:
+    """Return the place of the first of neighbours; None of others."""
+    found = [places.get(id(each)) for each in coefficients]
+    first = found[0]
+    if first is None or len(found) > len(FACTORS):
+        return None
+    expected = [(*first[:2], first[2] + k) for k in range(len(found))]
+    return first if found == expected else None

@@ -10,21 +10,20 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
+from photogram.formats.images import to_tables
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
+from photogram.formats.plain.cameras import knots_table
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
 from photogram.formats.plain.films_written import WrittenFilms
-from photogram.formats.plain.image_axes import to_tables
-from photogram.formats.plain.knots import knots_table
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
 from photogram.formats.plain.observed_poses import observed_tables
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.schema import AXES
+from photogram.formats.plain.schema import AXES, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
-from photogram.formats.plain.smoothness import lost_smoothness, smoothness_table
 from photogram.formats.plain.statement_settings import asked_files, asked_lines
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
-from photogram.formats.plain.tables import correlations
-from photogram.formats.plain.trajectories_written import trajectory_tables
+from photogram.formats.plain.tables import columns_of, correlations
+from photogram.formats.plain.trajectories_written import lost_smoothness, smoothness_table, trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.io.toml import quoted_text
@@ -274,11 +273,11 @@ def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
         positions = np.column_stack([np.degrees(positions[:, :2]), positions[:, 2]])
     attitudes, angle_sd = _given(block, "attitude")
     columns: dict[str, Any] = {"photo": block.photo_ids, "camera": cameras}
-    columns |= zip(AXES, positions.T, strict=True)
-    columns |= zip(_ANGLES, np.degrees(attitudes).T, strict=True)
+    columns |= columns_of(AXES, positions)
+    columns |= columns_of(_ANGLES, np.degrees(attitudes))
     for names, values in ((AXES, sd), (_ANGLES, np.degrees(angle_sd))):
         if np.isfinite(values).any():
-            columns |= {f"sd_{name}": column for name, column in zip(names, values.T, strict=True)}
+            columns |= columns_of(deviation_columns(names), values)
     drifts = any(isinstance(each, Position) and each.drift is not None for each in block.observations)
     times: Mapping[Any, float | None] = _times_of(project)
     if drifts:
@@ -330,7 +329,7 @@ def _images(
     elif (sd[:, 0] == sd[:, 1]).all():
         columns["sd"] = sd[:, 0]
     else:
-        columns |= {f"sd_{name}": column for name, column in zip(names, sd.T, strict=True)}
+        columns |= columns_of(deviation_columns(names), sd)
     if kept:
         columns["use"] = [""] * len(block.image_xy) + ["off"] * len(kept)
     return columns
@@ -361,7 +360,7 @@ def control_table(project: Project) -> dict[str, Any]:
     if block.geographic:
         positions[:, :2] = np.degrees(positions[:, :2])
     columns: dict[str, Any] = {"point": [block.point_ids[row] for row in order]}
-    columns |= zip(AXES, positions.T, strict=True)
+    columns |= columns_of(AXES, positions)
     columns |= {
         f"sd_{axis}": np.where(np.isinf(own), np.nan, own) for axis, own in zip(AXES, sd.T, strict=True)
     }
@@ -387,4 +386,4 @@ def _points(project: Project) -> dict[str, Any]:
     starts = project.starts[own]
     if block.geographic:
         starts = np.column_stack([np.degrees(starts[:, :2]), starts[:, 2]])
-    return {"point": [block.point_ids[row] for row in own], **dict(zip(AXES, starts.T, strict=True))}
+    return {"point": [block.point_ids[row] for row in own], **columns_of(AXES, starts)}

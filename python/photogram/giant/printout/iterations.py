@@ -1,15 +1,18 @@
-"""Corrections of the camera stations, a page for each iteration (sample, page 25)."""
+"""The adjustment: corrections of stations by iterations (sample, page 25), residuals (pages 26 to 29)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 from photogram.arguments.types import Floats
-from photogram.giant.printout.formats import Space, Values, fixed
-from photogram.giant.printout.pages import Page, headed, paginate
+from photogram.giant.printout.forms import Page, Space, Values, fixed, headed, paginate
+from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
+from photogram.results.result import SumsOfSquares
 
-__all__ = ["iteration_pages"]
+__all__ = ["PointResiduals", "iteration_pages", "residual_pages", "statistics"]
+
 
 TITLE = "CAMERA STATIONS CORRECTIONS"
 
@@ -23,20 +26,9 @@ def iteration_pages(
     *,
     as_published: bool = False,
 ) -> list[Page]:
-    """Return the pages of the iterations.
+    """Return the pages of k iterations with their corrections (k, P, 6) of position and attitude (radians).
 
-    Parameters
-    ----------
-    space
-        The units of the positions.
-    names
-        The P stations.
-    iterations, corrections
-        k iterations, and (k, P, 6) their corrections of position and attitude (radians).
-    notice
-        What is said below the last one, if anything.
-    as_published
-        Without the line of the units.
+    The notice stands below the last one; as published there is no line of the units.
     """
     if not iterations:
         return [[*headed(TITLE), notice]]
@@ -65,3 +57,69 @@ def _line(name: str, row: Sequence[float]) -> str:
 
 def _numbers(values: Values) -> str:
     return "".join(fixed(value, 16, 9) for value in values)
+
+
+ACROSS = 10
+"""Frames on a line."""
+
+
+@dataclass(frozen=True)
+class PointResiduals:
+    """The residuals (k, 2) of a point, observed minus computed in mm, on its k frames."""
+
+    name: str
+    frames: Sequence[str]
+    residuals: Floats
+
+    def listed(self, limit: float) -> bool:
+        """Whether COMMON columns 41-50 (millimetres) ask for this point."""
+        return limit == 0 or (limit > 0 and bool((abs(self.residuals) > limit).any()))
+
+
+def residual_pages(
+    points: Iterable[PointResiduals], limit: float, closing: Sequence[str], *, as_published: bool = False
+) -> list[Page]:
+    """Return the pages of the residuals in processing order, with `closing` (:func:`statistics`) below.
+
+    The limit is that of COMMON columns 41-50; as published there is no line that says what the residuals are.
+    """
+    meaning = "OBSERVED MINUS COMPUTED, MICROMETERS; X ABOVE Y".center(132).rstrip()
+    heading = headed("TRIANGULATED POINTS RESIDUALS", *([] if as_published else [meaning]))
+    entries = (entry for point in points if point.listed(limit) for entry in _entries(point))
+    return paginate(heading, entries, closing=closing)
+
+
+def _entries(point: PointResiduals) -> list[list[str]]:
+    entries = []
+    micrometres = (1000 * point.residuals).round().astype(int).tolist()
+    for row in range(0, len(point.frames), ACROSS):
+        frames, values = point.frames[row : row + ACROSS], micrometres[row : row + ACROSS]
+        entries.append(
+            [
+                f"{'' if row else point.name:<10}" + "".join(f"{frame:>12}" for frame in frames),
+                f"{'':10}" + "".join(f"{x:>12d}" for x, _ in values),
+                f"{'':10}" + "".join(f"{y:>12d}" for _, y in values),
+                "",
+            ]
+        )
+    return entries
+
+
+def statistics(sums: SumsOfSquares, degrees_of_freedom: float, variance: float | None) -> list[str]:
+    """Return the weighted sums of squares and the estimates for unit weight; `variance` None is undefined."""
+    parts = {"CAMERA": sums.camera, "GROUND": sums.ground, "PLATES": sums.plates, "TOTAL": sums.total}
+    lines = [
+        f"{f'WEIGHTED SUM OF SQUARES ({name})':<40} ={fixed(size, 16, 3)}" for name, size in parts.items()
+    ]
+    estimates = {"VARIANCE": variance, "ST. DEV.": None if variance is None else math.sqrt(variance)}
+    return [
+        "",
+        *lines,
+        f"{'DEGREES OF FREEDOM':.<40} ={degrees_of_freedom:>12.0f}",
+        "",
+        "A POSTERIORI ESTIMATES FOR UNIT WEIGHT",
+        *(
+            f"{name:>40} ={'UNDEFINED'.rjust(16) if value is None else fixed(value, 16, 3)}"
+            for name, value in estimates.items()
+        ),
+    ]

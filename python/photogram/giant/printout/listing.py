@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.types import Bools
+from photogram.giant.contents import Contents
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.fields import printed_order
-from photogram.giant.printout.control import control_pages
-from photogram.giant.printout.corrections import correction_pages
-from photogram.giant.printout.formats import Space
-from photogram.giant.printout.frames import Station, frame_pages
-from photogram.giant.printout.iterations import iteration_pages
-from photogram.giant.printout.options import options_page
-from photogram.giant.printout.pages import Page, printout
-from photogram.giant.printout.points import point_pages, propagated_point_pages
-from photogram.giant.printout.residuals import PointResiduals, residual_pages, statistics
-from photogram.giant.printout.stations import station_pages
-from photogram.giant.printout.warnings import warning_pages
+from photogram.giant.limits import Limits
+from photogram.giant.printout.forms import Page, Space, printout
+from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
+from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
+from photogram.giant.printout.results import (
+    correction_pages,
+    point_pages,
+    propagated_point_pages,
+    station_pages,
+)
+from photogram.network.block import Block
 from photogram.results.result import Result
-
-if TYPE_CHECKING:
-    from photogram.giant.contents import Contents
-    from photogram.giant.limits import Limits
-    from photogram.network.block import Block
 
 __all__ = ["listing"]
 
@@ -174,7 +169,7 @@ def _corrections(
     if not names:
         return []
     rows = [index[name] for name in names]
-    held: NDArray[np.bool_] = np.isfinite(block.point_sd[rows])
+    held: Bools = np.isfinite(block.point_sd[rows])
     corrections = result.point_differences[rows]
     if as_published:
         corrections = np.where(held, corrections, result.point_last_corrections[rows])

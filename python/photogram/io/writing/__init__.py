@@ -3,7 +3,7 @@
 How it looks from outside stands in `docs/command-line.md`.
 """
 
-from photogram.io.writing.guard import check_outputs
 from photogram.io.writing.outputs import Content, OutputSet, write_whole
+from photogram.io.writing.targets import check_outputs
 
 __all__ = ["Content", "OutputSet", "check_outputs", "write_whole"]

@@ -5,30 +5,39 @@ from __future__ import annotations
 import errno
 import io
 import os
+import signal
 import stat
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, BinaryIO, Self
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
-from photogram.io.writing.guard import Guard
-from photogram.io.writing.interruption import deferred
-from photogram.io.writing.markers import clear_marks, mark, unmark
-from photogram.io.writing.staging import NEW, Staging, remove_leftovers, sync_directory
-from photogram.io.writing.targets import Target, naming
+from photogram.io.writing.staging import (
+    NEW,
+    Staging,
+    clear_marks,
+    mark,
+    remove_leftovers,
+    sync_directory,
+    unmark,
+)
+from photogram.io.writing.targets import Guard, Target, naming
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-__all__ = ["Content", "OutputSet", "abandon_all", "write_whole"]
+__all__ = ["ENDING", "Content", "OutputSet", "abandon_all", "deferred", "write_whole"]
 
 Content = bytes | Callable[[BinaryIO], None]
 """What goes into a file: bytes, or what writes them piece by piece to the file that it is given."""
 
 PERMISSIONS = 0o777
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""The signals that ask a process to end."""
 
 
 class _Raw(io.RawIOBase):
@@ -229,7 +238,9 @@ class OutputSet:
                     mark(staging, places)
             for staged in self._staged:
                 staged.place()
-            self._sync()
+            for directory in {*self._stagings, *(os.path.dirname(made) for made in self._made)}:
+                with naming(Path(directory)):
+                    sync_directory(directory)
         except BaseException:
             restored = [staged.restore() for staged in self._staged]
             if all(restored):
@@ -238,11 +249,6 @@ class OutputSet:
         self._made.clear()
         self._unmark()
         clear_marks(places)
-
-    def _sync(self) -> None:
-        for directory in {*self._stagings, *(os.path.dirname(made) for made in self._made)}:
-            with naming(Path(directory)):
-                sync_directory(directory)
 
     def _unmark(self) -> None:
         for staging in self._stagings.values():
@@ -274,24 +280,17 @@ def abandon_all() -> None:
         _live[-1].abandon()
 
 
-def write_whole(files: Mapping[Path, Content], inputs: Iterable[Path] = ()) -> None:
-    """Write files so that all are there, or none; see :class:`OutputSet`.
-
-    Parameters
-    ----------
-    files
-        Contents by path.
-    inputs
-        Files that are read: none is written over.
+def write_whole(files: Mapping[Path, Content]) -> None:
+    """Write contents by path so that all are there, or none.
 
     Raises
     ------
     InputError
-        An output is an input, a directory, or another output.
+        An output is a directory, or another output.
     OSError
         A file cannot be written; what was there has not changed.
     """
-    with OutputSet(inputs) as outputs:
+    with OutputSet() as outputs:
         for path, content in files.items():
             outputs.write(path, content)
 
@@ -330,3 +329,30 @@ def _keep_owner(descriptor: int, status: os.stat_result, mode: int) -> None:
         with suppress(OSError):
             os.fchown(descriptor, status.st_uid, status.st_gid)
     os.fchmod(descriptor, mode)
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Let the signals that ask to end wait until the block is done; then they do what they did before.
+
+    Only the main thread runs handlers of signals: in any other nothing is to be deferred.
+    """
+    caught: list[int] = []
+    former: dict[int, Any] = {}
+
+    def wait(number: int, _frame: FrameType | None) -> None:
+        caught.append(number)
+
+    try:
+        if threading.current_thread() is threading.main_thread():
+            for number in ENDING:
+                handler = signal.getsignal(number)
+                if handler is not None and handler != signal.SIG_IGN:
+                    former[number] = handler
+                    signal.signal(number, wait)
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)
+        for number in dict.fromkeys(caught):
+            signal.raise_signal(number)

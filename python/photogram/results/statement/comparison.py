@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from photogram.arguments.naming import natural_order
+from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace

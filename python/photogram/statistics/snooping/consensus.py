@@ -15,12 +15,10 @@ import numpy as np
 
 from photogram.arguments.types import Indices
 from photogram.messages import counted
-from photogram.statistics.snooping.factors import ENOUGH, robust_factor, values
 from photogram.statistics.snooping.log import Removal
-from photogram.statistics.snooping.returning import log_probability
-from photogram.statistics.snooping.settings import Settings
+from photogram.statistics.snooping.robust_start import ENOUGH, robust_factor, values
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Tests, Trial
-from photogram.statistics.snooping.taking_out import TakingOut
+from photogram.statistics.snooping.taking_out import Settings, TakingOut, log_probability
 from photogram.statistics.snooping.whole_photos import log_photo, take_photo
 
 __all__ = ["begun"]
@@ -170,15 +168,14 @@ def _predicted(work: TakingOut, groups: Indices) -> tuple[list[Removal], int]:
                     group,
                     rows,
                     0,
-                    own.statistic,
-                    own.statistic,
-                    len(rows),
-                    own.statistic / len(rows) / variance if variance > 0 else math.nan,
-                    float(log_p[0]),
-                    np.array(own.error),
-                    np.array(own.error_sd),
-                    level,
-                    (),
+                    first_statistic=own.statistic,
+                    statistic=own.statistic,
+                    dimension=len(rows),
+                    fisher=own.statistic / len(rows) / variance if variance > 0 else math.nan,
+                    log_probability=float(log_p[0]),
+                    error=np.array(own.error),
+                    error_sd=np.array(own.error_sd),
+                    limit=level,
                 )
             )
     return entries, len(groups) - len(entries)

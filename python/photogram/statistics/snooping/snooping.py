@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.statistics.snooping.choosing import Choice
 from photogram.statistics.snooping.consensus import begun
-from photogram.statistics.snooping.factors import scales
 from photogram.statistics.snooping.log import Removal, Round
-from photogram.statistics.snooping.returning import agreeing, note_return, take_back, with_prediction
-from photogram.statistics.snooping.robust_start import needs_robust_start, start_robustly
-from photogram.statistics.snooping.settings import Settings
+from photogram.statistics.snooping.robust_start import needs_robust_start, scales, start_robustly
 from photogram.statistics.snooping.suspects import Aside, Out, Standing, Tests, Trial
-from photogram.statistics.snooping.taking_out import TakingOut
+from photogram.statistics.snooping.taking_out import (
+    Settings,
+    TakingOut,
+    agreeing,
+    note_return,
+    take_back,
+    with_prediction,
+)
 from photogram.statistics.snooping.whole_photos import take_bad_photos_out, take_photos_out
 
 __all__ = ["Outcome", "Settings", "snooped"]
@@ -103,17 +106,10 @@ def _round(work: TakingOut, number: int) -> tuple[list[int], list[int]]:
     remarks: list[str] = []
     # In a large network what went before returns in the adjustment that takes others out.
     returned = [] if work.trial.whole else agreeing(work)
-    removed = _take_out(work, choices, number, remarks, returned)
+    removed = work.apply(work.entries(choices, number), remarks, returned)
+    note_return(work, returned, number)
     if work.trial.whole:
         returned = take_back(work, number)
     removed += take_photos_out(work, number)
     work.note_round(number, standing, removed, returned, out=count, remarks=remarks)
     return removed, returned
-
-
-def _take_out(
-    work: TakingOut, choices: list[Choice], number: int, remarks: list[str], returning: list[int]
-) -> list[int]:
-    removed = work.apply(work.entries(choices, number), remarks, returning)
-    note_return(work, returning, number)
-    return removed

@@ -1,17 +1,19 @@
-"""A network that is being snooped: what is out, how the rest stands, and the log."""
+"""A network that is being snooped: what is out, how the rest stands, and the log; what agrees comes back."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.lazy_dataclasses import dataclass
+from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
 from photogram.statistics.snooping.choosing import Choice, Choosing, Level
 from photogram.statistics.snooping.conditioning import UnitWeight
 from photogram.statistics.snooping.log import Removal, Rival, Round
-from photogram.statistics.snooping.settings import Settings
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
     Out,
@@ -22,7 +24,41 @@ from photogram.statistics.snooping.suspects import (
     Trial,
 )
 
-__all__ = ["TakingOut"]
+__all__ = [
+    "Settings",
+    "TakingOut",
+    "agreeing",
+    "log_probability",
+    "note_return",
+    "take_back",
+    "with_prediction",
+]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to snoop.
+
+    Attributes
+    ----------
+    level
+        Family level of all tests together, or the false discovery rate.
+    fdr
+        Whether it is the latter.
+    known
+        Whether the unit weight is known: chi-square decides, else F.
+    robust
+        Whether to start robustly; None where many observations are wrong.
+    max_rounds
+        Rounds at the most.
+    """
+
+    level: float = LEVEL
+    fdr: bool = False
+    known: bool = True
+    robust: bool | None = None
+    max_rounds: int = 20
+
 
 RESCUES = 5
 """Attempts to leave a round with everything determined."""
@@ -121,15 +157,14 @@ class TakingOut:
             group,
             rows,
             0,
-            statistic,
-            statistic,
-            dimension,
-            self.unit().fisher(statistic, dimension),
-            math.nan,
-            tests.error[rows],
-            tests.error_sd[rows],
-            self.level.limit(0),
-            (),
+            first_statistic=statistic,
+            statistic=statistic,
+            dimension=dimension,
+            fisher=self.unit().fisher(statistic, dimension),
+            log_probability=math.nan,
+            error=tests.error[rows],
+            error_sd=tests.error_sd[rows],
+            limit=self.level.limit(0),
         )
 
     def entries(self, choices: list[Choice], number: int) -> list[Removal]:
@@ -147,57 +182,37 @@ class TakingOut:
                     choice.group,
                     own.rows,
                     number,
-                    choice.first_statistic,
-                    own.statistic,
-                    own.dimension,
-                    own.fisher,
-                    own.log_probability,
-                    own.error * deviations,
-                    np.sqrt(np.diagonal(own.cofactors)) * deviations,
-                    choice.limit,
-                    rivals,
+                    first_statistic=choice.first_statistic,
+                    statistic=own.statistic,
+                    dimension=own.dimension,
+                    fisher=own.fisher,
+                    log_probability=own.log_probability,
+                    error=own.error * deviations,
+                    error_sd=np.sqrt(np.diagonal(own.cofactors)) * deviations,
+                    limit=choice.limit,
+                    rivals=rivals,
                 )
             )
         return entries
 
     def entry(
-        self,
-        group: int,
-        rows: np.ndarray,
-        number: int,
-        first: float,
-        statistic: float,
-        dimension: int,
-        fisher: float,
-        log_probability: float,
-        error: Floats,
-        error_sd: Floats,
-        limit: float,
-        rivals: tuple[Rival, ...],
+        self, group: int, rows: Indices, number: int, *, error: Floats, error_sd: Floats, **values: Any
     ) -> Removal:
-        """Return the entry of a group, or of some of its rows; see :class:`Removal`."""
+        """Return the entry of a group, or of some of its rows, in a round; see :class:`Removal`."""
         suspects = self.suspects
-        name = suspects.name(group)
-        if len(rows) < len(suspects.rows(group)):
-            name = f"{', '.join(suspects.row_name(int(row)) for row in rows)} of {name}"
+        name, components = suspects.name(group), tuple(map(suspects.row_name, rows.tolist()))
         return Removal(
             round=number,
             group=group,
             kind=suspects.kind(group),
-            name=name,
+            name=name if len(rows) == len(suspects.rows(group)) else f"{', '.join(components)} of {name}",
             rows=tuple(rows.tolist()),
-            components=tuple(suspects.row_name(int(row)) for row in rows),
-            units=tuple(suspects.unit(int(row)) for row in rows),
-            dimension=dimension,
-            first_statistic=first,
-            statistic=statistic,
-            fisher=fisher,
-            log_probability=log_probability,
-            limit=limit,
+            components=components,
+            units=tuple(map(suspects.unit, rows.tolist())),
             error=tuple(error.tolist()),
             error_sd=tuple(error_sd.tolist()),
             redundancy=float(self.tests.least[group]),
-            rivals=rivals,
+            **values,
         )
 
     def apply(self, entries: list[Removal], remarks: list[str], returning: Sequence[int] = ()) -> list[int]:
@@ -275,3 +290,90 @@ class TakingOut:
         self.standing = self.trial.adjust(out)
         self.out = out
         self.tests = self.trial.tests()
+
+
+def note_return(work: TakingOut, places: list[int], number: int) -> None:
+    """Say in the log that entries, by their places there, have come back in a round."""
+    for place in places:
+        work.returns.add(work.log[place].group)
+        work.log[place] = with_prediction(work, place).with_(returned=number)
+
+
+def take_back(work: TakingOut, number: int) -> list[int]:
+    """Take back what agrees with the rest, one adjustment after the other."""
+    returning = agreeing(work)
+    if not returning:
+        return []
+    out = work.out.copy()
+    for place in returning:
+        out.rows[list(work.log[place].rows)] = False
+    try:
+        work.adjust(out)
+    except LostSupportError:
+        return []
+    note_return(work, returning, number)
+    return returning + take_back(work, number)
+
+
+def agreeing(work: TakingOut) -> list[int]:
+    """Test what is out against the rest, and return what agrees: the best, or all that are apart."""
+    places = [place for place, each in enumerate(work.log) if each.is_out and each.rows]
+    if not places:
+        return []
+    predictions = work.trial.predictions([work.log[place].group for place in places])
+    known = [(place, own) for place, own in zip(places, predictions, strict=True) if own is not None]
+    log_p = log_probability(
+        work,
+        np.array([own.statistic for _, own in known]),
+        np.array([len(own.rows) for _, own in known]),
+        np.array([work.log[place].group for place, _ in known], dtype=np.int64),
+    ).tolist()
+    work.predicted = {place: (own, value) for (place, own), value in zip(known, log_p, strict=True)}
+    limit = math.log(work.level.limit(0))
+    agreeing = sorted(
+        (-value, place)
+        for place, (_, value) in work.predicted.items()
+        if value >= limit and work.log[place].group not in work.returns
+    )
+    return _apart(work, [place for _, place in agreeing])
+
+
+def _apart(work: TakingOut, places: list[int]) -> list[int]:
+    """Return the first where every one is tested alone, else those that have no photo in common."""
+    if work.trial.whole:
+        return places[:1]
+    taken: set[int] = set()
+    apart = []
+    for place in places:
+        group = work.log[place].group
+        photo = int(work.suspects.photos[group])
+        photos = {photo} if photo >= 0 else set(work.suspects.loads(group).tolist())
+        if not photos & taken:
+            taken |= photos
+            apart.append(place)
+    return apart
+
+
+def with_prediction(work: TakingOut, place: int) -> Removal:
+    """Return an entry of the log with what the rest says of it."""
+    if place not in work.predicted:
+        return work.log[place]
+    prediction, log_p = work.predicted[place]
+    # Another entry may have taken out other components of the same group.
+    errors = dict(zip(prediction.rows, prediction.error, strict=True))
+    return work.log[place].with_(
+        prediction=prediction.statistic,
+        prediction_log_probability=log_p,
+        prediction_error=tuple(errors.get(row, math.nan) for row in work.log[place].rows),
+    )
+
+
+def log_probability(work: TakingOut, statistic: Floats, dimension: Indices, groups: Indices) -> Floats:
+    """Return log-probabilities of what is out as observations of the network without it."""
+    if work.settings.known:
+        return log_chi_square(statistic / work.scales[groups], dimension)
+    f = work.standing.degrees_of_freedom
+    if not (f > 0 and work.standing.weighted_sum_of_squares > 0):
+        return np.zeros(len(statistic))
+    s2 = work.standing.weighted_sum_of_squares / f
+    return log_fisher(statistic / dimension / s2, dimension, f)

@@ -7,16 +7,16 @@ from types import MappingProxyType
 
 from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
+from photogram.io import json
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.output.kalibr import kalibr_camchain
-from photogram.targets.output.mrcal import mrcal_models
+from photogram.targets.output.mrcal import mrcal_models, valid_region
 from photogram.targets.output.opencv import opencv_yaml
 from photogram.targets.output.rig import Rig, rig_of
 from photogram.targets.output.ros import ros_camera_info
-from photogram.targets.output.valid import valid_region
 from photogram.targets.uncertainty import uncertainty_map
 
-__all__ = ["CAMERA_FORMATS", "camera_files"]
+__all__ = ["CAMERA_FORMATS", "FILE", "camera_files", "cameras_covariance"]
 
 CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyType(
     {
@@ -61,3 +61,27 @@ def camera_files(calibrated: Calibrated, to: str, need: float | None = None) -> 
         raise InputError(f"need: {to} has no region of a camera that is known well enough; mrcal has")
     maps = (uncertainty_map(calibrated, row) for row in range(len(rig.cameras)))
     return mrcal_models(rig, {row: valid_region(each, need) for row, each in enumerate(maps)})
+
+
+FILE = "cameras_covariance.json"
+
+
+def cameras_covariance(calibrated: Calibrated) -> bytes:
+    """Return the file: parameters of cameras, then dt, w of sensors (R <- Exp(w) R, t <- t + dt)."""
+    names, cofactors = calibrated.cofactors(("cameras", "sensors"))
+    scale = calibrated.result.covariance_scale
+    return json.to_json(
+        {
+            "kind": "covariance of cameras",
+            "cameras": [
+                {"name": each.name, "model": each.camera.model, "parameters": dict(each.camera.parameters)}
+                for each in calibrated.cameras
+            ],
+            "sensors": calibrated.sensors.tolist(),
+            "names": names,
+            "covariance": (scale * cofactors).tolist(),
+            "datum": "axes",
+            "pixel_origin": "center",
+            "sigma0": None if scale is None else scale**0.5,
+        }
+    )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from photogram.targets.output.rig import Rig
-from photogram.targets.output.terms import Terms, terms_of
-from photogram.targets.output.yaml import figures
+from photogram.targets.output.rig import Rig, Terms, figures, terms_of
 
 __all__ = ["kalibr_camchain"]
 
@@ -16,12 +14,8 @@ def kalibr_camchain(rig: Rig) -> dict[str, bytes]:
     """Return the file.
 
     `radtan` has k1, k2, p1, p2; `equidistant` k1 to k4. `T_cn_cnm1` takes points from the axes of the camera
-    before to those of this one.
-
-    Raises
-    ------
-    InputError
-        A lens with other terms, pictures of unknown size, cameras that are not tied to each other.
+    before to those of this one. InputError: a lens with other terms, pictures of unknown size, cameras that
+    are not tied to each other.
     """
     lines = []
     for row in range(len(rig.cameras)):

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.results.cameras import AdjustedCamera
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.output.rig import Rig
-from photogram.targets.output.terms import TERMS, Terms, terms_of
-from photogram.targets.output.yaml import matrix
+from photogram.targets.output.rig import TERMS, Rig, Terms, matrix, terms_of
 from photogram.targets.vision import cross_matrices
 
 __all__ = ["opencv_yaml"]
 
 TITLE = "YAML of OpenCV"
+_matrix = partial(matrix, opencv=True)
 COUNTS = (4, 5, 8, 12)
 FEWEST = 5
 """Terms that OpenCV writes at the least, where they are not those of a fisheye."""
@@ -26,12 +27,7 @@ def opencv_yaml(rig: Rig) -> dict[str, bytes]:
     """Return a file a camera.
 
     Pixels count from 0 at the centre of the first. `avg_reprojection_error` is as OpenCV has it: the root of
-    the mean of dx^2 + dy^2 over points.
-
-    Raises
-    ------
-    InputError
-        A lens that OpenCV has not, pictures of unknown size.
+    the mean of dx^2 + dy^2 over points. InputError: a lens that OpenCV has not, pictures of unknown size.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     return {
@@ -52,11 +48,11 @@ def _camera(rig: Rig, row: int, lenses: list[Terms]) -> list[str]:
     terms = lens.first(4) if lens.fisheye else lens.fewest(COUNTS[COUNTS.index(FEWEST) :])
     lines = [f"image_width: {width}", f"image_height: {height}"]
     lines += ["fisheye_model: 1"] if lens.fisheye else []
-    lines += matrix("camera_matrix", lens.matrix)
-    lines += matrix("distortion_coefficients", np.reshape(terms or [], (-1, 1)))
+    lines += _matrix("camera_matrix", lens.matrix)
+    lines += _matrix("distortion_coefficients", np.reshape(terms or [], (-1, 1)))
     if rig.calibrated is not None:
         lines += _errors(rig.calibrated, row)
-        lines += matrix("std_deviations_intrinsics", _deviations(rig.calibrated.cameras[row]))
+        lines += _matrix("std_deviations_intrinsics", _deviations(rig.calibrated.cameras[row]))
     if row and rig.tied(row):
         lines += _stereo(rig.sensors[row], lenses[0].matrix, lens.matrix)
     return lines
@@ -72,7 +68,7 @@ def _errors(calibrated: Calibrated, row: int) -> list[str]:
     average = squares[corners.cameras[pictures] == row].mean()
     return [
         f"avg_reprojection_error: {float(np.sqrt(average))!r}",
-        *matrix("per_view_reprojection_errors", np.sqrt(mean).reshape(-1, 1)),
+        *_matrix("per_view_reprojection_errors", np.sqrt(mean).reshape(-1, 1)),
     ]
 
 
@@ -92,4 +88,4 @@ def _stereo(sensor: Floats, before: Floats, own: Floats) -> list[str]:
     if fundamental[2, 2]:
         fundamental = fundamental / fundamental[2, 2]
     named = (("R", rotation), ("T", shift.reshape(3, 1)), ("E", essential), ("F", fundamental))
-    return [line for name, values in named for line in matrix(name, values)]
+    return [line for name, values in named for line in _matrix(name, values)]

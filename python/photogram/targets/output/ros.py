@@ -6,9 +6,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.targets.output.rig import Rig
-from photogram.targets.output.terms import Terms, terms_of
-from photogram.targets.output.yaml import quoted, ros_matrix
+from photogram.targets.output.rig import Rig, Terms, matrix, terms_of
 
 __all__ = ["ros_camera_info"]
 
@@ -21,12 +19,8 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
     """Return a file a camera.
 
     Of two cameras that are tied the rectification turns both so that a point has one row in both; the
-    projection of the second has -fx b, b the base. All others are not rectified.
-
-    Raises
-    ------
-    InputError
-        A lens that ROS has not, pictures of unknown size.
+    projection of the second has -fx b, b the base. All others are not rectified. InputError: a lens that ROS
+    has not, pictures of unknown size.
     """
     lenses = [_lens(rig, row) for row in range(len(rig.cameras))]
     rectified = [(np.eye(3), np.column_stack([each.matrix, np.zeros(3)])) for each in lenses]
@@ -34,17 +28,18 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
         rectified = _rectified(rig.sensors[1], lenses)
     found = {}
     for row, (lens, (turn, projection)) in enumerate(zip(lenses, rectified, strict=True)):
+        name = rig.names[row].replace("\\", "\\\\").replace('"', '\\"')
         width, height = rig.size(row)
         model, terms = _distortion(lens)
         lines = [
             f"image_width: {width}",
             f"image_height: {height}",
-            f"camera_name: {quoted(rig.names[row])}",
-            *ros_matrix("camera_matrix", lens.matrix),
+            f'camera_name: "{name}"',
+            *matrix("camera_matrix", lens.matrix),
             f"distortion_model: {model}",
-            *ros_matrix("distortion_coefficients", [terms]),
-            *ros_matrix("rectification_matrix", turn),
-            *ros_matrix("projection_matrix", projection),
+            *matrix("distortion_coefficients", [terms]),
+            *matrix("rectification_matrix", turn),
+            *matrix("projection_matrix", projection),
         ]
         found[f"{rig.files[row]}.yaml"] = "\n".join([*lines, ""]).encode()
     return found

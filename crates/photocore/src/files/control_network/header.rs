@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::fault::{Fault, Reason};
-use super::wire::{LARGEST, Message, Packed, Packet, put_bytes, put_number, put_whole};
+use super::messages::{LARGEST, Message, Packed, Packet, put_bytes, put_number, put_whole};
 
 /// What a binary network says of itself, before its points.
 #[derive(Debug, Clone, Default, PartialEq)]

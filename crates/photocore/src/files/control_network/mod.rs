@@ -5,26 +5,19 @@
 //! (who measured, when, by which program; fields and keys that nobody knows) is kept with its point or measure, and written back.
 
 mod columns;
-mod decode;
-mod encode;
 mod fault;
 pub mod fields;
 mod header;
-mod read_text;
+mod messages;
 mod scan;
+mod text;
 mod values;
-mod watch;
-mod wire;
-mod write_text;
 
 pub use columns::{Column, Names, Points, Rest, Sparse, Table, Texts};
-pub use decode::{Framing, decoded};
-pub use encode::encoded;
 pub use fault::{Fault, Place, Reason};
 pub use header::Header;
-pub use read_text::read_text;
-pub use watch::Watch;
-pub use write_text::text;
+pub use messages::{Framing, Watch, decoded, encoded};
+pub use text::{read_text, text};
 
 #[cfg(test)]
 mod tests;

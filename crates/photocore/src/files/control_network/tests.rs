@@ -3,7 +3,7 @@ use std::ops::ControlFlow;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use super::wire::{Message, put_bytes, put_number, put_varint, put_whole};
+use super::messages::{Message, put_bytes, put_number, put_varint, put_whole};
 use super::{Fault, Framing, Header, Place, Points, Reason, decoded, encoded, read_text, text};
 use crate::Stopped;
 

@@ -2,7 +2,7 @@
 
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
-use super::model::Unit;
+use super::model::{Unit, parameters};
 use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};
 
 /// Radial and tangential corrections, affinity and shear, backward: functions of measured coordinates, which they are added to.
@@ -92,19 +92,10 @@ impl<const AFTER: bool> BackwardModel for BrownCorrection<AFTER> {
     type Parameters = [f64; 11];
 
     const NAME: &'static str = if AFTER { "brown_affinity_after" } else { "brown" };
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("c", Unit::Image),
-        ("xp", Unit::Image),
-        ("yp", Unit::Image),
-        ("K1", Unit::PerImage(2)),
-        ("K2", Unit::PerImage(4)),
-        ("K3", Unit::PerImage(6)),
-        ("P1", Unit::PerImage(1)),
-        ("P2", Unit::PerImage(1)),
-        ("b1", Unit::One),
-        ("b2", Unit::One),
-        ("r0", Unit::Image),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "c" "xp" "yp"; Unit::PerImage(2) => "K1"; Unit::PerImage(4) => "K2"; Unit::PerImage(6) => "K3";
+        Unit::PerImage(1) => "P1" "P2"; Unit::One => "b1" "b2"; Unit::Image => "r0";
+    };
     const CONSTANTS: usize = 1;
     const IN_LANES: bool = !AFTER;
     const FORMULA: &'static str = if AFTER {

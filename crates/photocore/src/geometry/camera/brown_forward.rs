@@ -3,7 +3,7 @@
 use super::brown::BrownTerms;
 use super::inverse::Matrix2;
 use super::inverse::{RadialLimit, from_radial, times};
-use super::model::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit, parameters};
 use super::perspective::Perspective;
 use super::radial_tangential::Bent;
 use crate::geometry::Vector3;
@@ -48,19 +48,10 @@ impl CameraModel for BrownForward {
     type Parameters = [f64; 11];
 
     const NAME: &'static str = "brown_forward";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("c", Unit::Image),
-        ("xp", Unit::Image),
-        ("yp", Unit::Image),
-        ("A1", Unit::PerImage(2)),
-        ("A2", Unit::PerImage(4)),
-        ("A3", Unit::PerImage(6)),
-        ("B1", Unit::PerImage(1)),
-        ("B2", Unit::PerImage(1)),
-        ("C1", Unit::One),
-        ("C2", Unit::One),
-        ("r0", Unit::Image),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "c" "xp" "yp"; Unit::PerImage(2) => "A1"; Unit::PerImage(4) => "A2"; Unit::PerImage(6) => "A3";
+        Unit::PerImage(1) => "B1" "B2"; Unit::One => "C1" "C2"; Unit::Image => "r0";
+    };
     const CONSTANTS: usize = 1;
     const FORMULA: &'static str = "(X, Y) = c (P1, P2) / P3, r^2 = X^2 + Y^2, R = A1 (r^2 - r0^2) + A2 (r^4 - r0^4) + A3 (r^6 - r0^6), \
          image = (xp + X + X R + B1 (r^2 + 2 X^2) + 2 B2 X Y + C1 X + C2 Y, yp + Y + Y R + B2 (r^2 + 2 Y^2) + 2 B1 X Y)";

@@ -1,7 +1,7 @@
 //! The camera of JPL whose lens has an axis of its own: CAHVOR (Gennery 2006, "Generalized camera calibration including fish-eye lenses").
 
 use super::inverse::{RadialFactor, RadialLimit};
-use super::model::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit, parameters};
 use crate::geometry::{Matrix3, Vector3};
 
 /// Rays bend about the unit vector o, which the angles a and b (radians) turn off the axis of the picture, to the right and down:
@@ -76,17 +76,9 @@ impl CameraModel for Cahvor {
     type Parameters = [f64; 9];
 
     const NAME: &'static str = "cahvor";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("fx", Unit::Image),
-        ("fy", Unit::Image),
-        ("cx", Unit::Image),
-        ("cy", Unit::Image),
-        ("axis_x", Unit::One),
-        ("axis_y", Unit::One),
-        ("r0", Unit::One),
-        ("r1", Unit::One),
-        ("r2", Unit::One),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "fx" "fy" "cx" "cy"; Unit::One => "axis_x" "axis_y" "r0" "r1" "r2";
+    };
     const DOWN: bool = true;
     const FORMULA: &'static str = "v = (P1, -P2, -P3), o = (cos(axis_y) sin(axis_x), sin(axis_y), cos(axis_y) cos(axis_x)), w = v . o, \
          t = |v|^2 / w^2 - 1, mu = r0 + r1 t + r2 t^2, V = (1 + mu) v - mu w o, image = (fx V1/V3 + cx, fy V2/V3 + cy)";

@@ -296,6 +296,14 @@ fn from_limited(
     target: [f64; 2],
     lens: impl Fn([f64; 2]) -> ([f64; 2], Matrix2),
 ) -> Option<[f64; 2]> {
+    way_back_of_any(radial, target, &lens)
+}
+
+fn way_back_of_any(
+    radial: RadialFactor,
+    target: [f64; 2],
+    lens: &dyn Fn([f64; 2]) -> ([f64; 2], Matrix2),
+) -> Option<[f64; 2]> {
     let distorted = target[0].hypot(target[1]);
     let ratio = if distorted > 0.0 { radial.invert(distorted)? / distorted } else { 1.0 };
     way_back(target.map(|value| ratio * value), target, lens)

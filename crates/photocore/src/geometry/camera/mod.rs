@@ -9,7 +9,6 @@ mod knots;
 mod model;
 mod projections;
 mod radial_tangential;
-mod table;
 
 use std::sync::Arc;
 

@@ -137,6 +137,14 @@ pub struct ModelFacts {
     pub down: bool,
 }
 
+/// What parameters are called and measured in: names by their unit, in their order.
+macro_rules! parameters {
+    ($($unit:expr => $($name:literal)+;)+) => {
+        &[$($(($name, $unit),)+)+]
+    };
+}
+pub(super) use parameters;
+
 /// What a parameter of a camera is measured in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {

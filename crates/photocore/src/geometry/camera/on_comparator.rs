@@ -3,7 +3,7 @@
 use super::backward::{BackwardModel, Corrected};
 use super::brown::BrownTerms;
 use super::inverse::{RadialLimit, from_radial, times};
-use super::model::Unit;
+use super::model::{Unit, parameters};
 use crate::geometry::correction::{Correction, PARAMETERS};
 
 const COUNT: usize = 33;
@@ -55,41 +55,11 @@ impl BackwardModel for OnComparator {
     type Parameters = [f64; COUNT];
 
     const NAME: &'static str = "on_comparator";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("c", Unit::Image),
-        ("xp", Unit::Image),
-        ("yp", Unit::Image),
-        ("K1", Unit::PerImage(2)),
-        ("K2", Unit::PerImage(4)),
-        ("K3", Unit::PerImage(6)),
-        ("P1", Unit::PerImage(1)),
-        ("P2", Unit::PerImage(1)),
-        ("mx", Unit::One),
-        ("my", Unit::One),
-        ("lean", Unit::One),
-        ("xA", Unit::Image),
-        ("xB", Unit::Image),
-        ("xC", Unit::Image),
-        ("xD", Unit::Image),
-        ("xE", Unit::Image),
-        ("xF", Unit::Image),
-        ("xG", Unit::Image),
-        ("xH", Unit::Image),
-        ("xJ", Unit::Image),
-        ("yA", Unit::Image),
-        ("yB", Unit::Image),
-        ("yC", Unit::Image),
-        ("yD", Unit::Image),
-        ("yE", Unit::Image),
-        ("yF", Unit::Image),
-        ("yG", Unit::Image),
-        ("yH", Unit::Image),
-        ("yJ", Unit::Image),
-        ("x0", Unit::Image),
-        ("y0", Unit::Image),
-        ("hx", Unit::Image),
-        ("hy", Unit::Image),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "c" "xp" "yp"; Unit::PerImage(2) => "K1"; Unit::PerImage(4) => "K2"; Unit::PerImage(6) => "K3";
+        Unit::PerImage(1) => "P1" "P2"; Unit::One => "mx" "my" "lean";
+        Unit::Image => "xA" "xB" "xC" "xD" "xE" "xF" "xG" "xH" "xJ" "yA" "yB" "yC" "yD" "yE" "yF" "yG" "yH" "yJ" "x0" "y0" "hx" "hy";
+    };
     const CONSTANTS: usize = 4;
     const FORMULA: &'static str = "(X, Y) = (x - x0, y - y0), d = ((1 + mx) X + (1 + my) sin(lean) Y, (1 + my) cos(lean) Y), (s, t) = (d1/hx, d2/hy), Px = xA s^4 + xB t^4 + xC s^3 + \
          xD t^3 + xE s^2 + xF t^2 + xG s + xH t + xJ, Py likewise, (p, q) = d + (Px, Py) - (xp, yp), r^2 = p^2 + q^2, R = K1 r^2 + \

@@ -1,7 +1,7 @@
 //! The camera of OpenCV whose sensor is tilted (Scheimpflug).
 
 use super::inverse::{Matrix2, RadialLimit};
-use super::model::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit, parameters};
 use super::vision::OpencvPinhole;
 use crate::geometry::{Matrix3, Vector3};
 
@@ -77,26 +77,10 @@ impl CameraModel for OpencvTilted {
     type Parameters = [f64; 18];
 
     const NAME: &'static str = "opencv_tilted";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("fx", Unit::Image),
-        ("fy", Unit::Image),
-        ("cx", Unit::Image),
-        ("cy", Unit::Image),
-        ("k1", Unit::One),
-        ("k2", Unit::One),
-        ("p1", Unit::One),
-        ("p2", Unit::One),
-        ("k3", Unit::One),
-        ("k4", Unit::One),
-        ("k5", Unit::One),
-        ("k6", Unit::One),
-        ("s1", Unit::One),
-        ("s2", Unit::One),
-        ("s3", Unit::One),
-        ("s4", Unit::One),
-        ("tau_x", Unit::One),
-        ("tau_y", Unit::One),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "fx" "fy" "cx" "cy";
+        Unit::One => "k1" "k2" "p1" "p2" "k3" "k4" "k5" "k6" "s1" "s2" "s3" "s4" "tau_x" "tau_y";
+    };
     const DOWN: bool = true;
     const FORMULA: &'static str = "(A, B) of opencv_pinhole, R = Ry(tau_y) Rx(tau_x), h = [R33 0 -R13; 0 R33 -R23; 0 0 1] R (A, B, 1), \
          image = (fx h1/h3 + cx, fy h2/h3 + cy)";

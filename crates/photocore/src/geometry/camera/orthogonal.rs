@@ -2,13 +2,20 @@
 
 use super::backward::{BackwardModel, Corrected};
 use super::inverse::{RadialLimit, way_back};
-use super::model::Unit;
+use super::model::{Unit, parameters};
 
 /// P_0 to P_4 of one coordinate, and their derivatives.
 type Basis = [(f64, f64); 5];
 
 /// A parameter times a number is the factor of the product P_i(Y) P_j(X) in one component: (parameter, component, number, i, j).
 type Term = (usize, usize, f64, usize, usize);
+
+/// The terms of each component: the parameter, i and j, and the number where it is not one.
+macro_rules! terms {
+    ($($component:literal: $($parameter:literal($i:literal $j:literal) $(* $number:expr)?),+;)+) => {
+        &[$($(($parameter, $component, 1.0 $(* $number)?, $i, $j),)+)+]
+    };
+}
 
 /// A set of orthogonal corrections.
 pub trait OrthogonalSet<const N: usize>: Copy {
@@ -65,45 +72,17 @@ pub struct Gruen44;
 
 impl OrthogonalSet<16> for Ebner12 {
     const NAME: &'static str = "ebner";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("c", Unit::Image),
-        ("xp", Unit::Image),
-        ("yp", Unit::Image),
-        ("e1", Unit::One),
-        ("e2", Unit::One),
-        ("e3", Unit::PerImage(1)),
-        ("e4", Unit::PerImage(1)),
-        ("e5", Unit::PerImage(1)),
-        ("e6", Unit::PerImage(1)),
-        ("e7", Unit::PerImage(2)),
-        ("e8", Unit::PerImage(2)),
-        ("e9", Unit::PerImage(2)),
-        ("e10", Unit::PerImage(2)),
-        ("e11", Unit::PerImage(3)),
-        ("e12", Unit::PerImage(3)),
-        ("b", Unit::Image),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "c" "xp" "yp"; Unit::One => "e1" "e2"; Unit::PerImage(1) => "e3" "e4" "e5" "e6";
+        Unit::PerImage(2) => "e7" "e8" "e9" "e10"; Unit::PerImage(3) => "e11" "e12"; Unit::Image => "b";
+    };
     const FORMULA: &'static str = "X = x - xp, Y = y - yp, k = X^2 - 2 b^2/3, l = Y^2 - 2 b^2/3, corrected = (X + e1 X + e2 Y - 2 e3 k + \
          e4 X Y + e5 l + e7 X l + e9 Y k + e11 k l, Y - e1 Y + e2 X + e3 X Y - 2 e4 l + e6 k + e8 Y k + e10 X l + e12 k l), \
          residual = corrected - image, image = c (u1, u2) / u3";
-    const TERMS: &'static [Term] = &[
-        (0, 0, 1.0, 0, 1),
-        (1, 0, 1.0, 1, 0),
-        (2, 0, -2.0, 0, 2),
-        (3, 0, 1.0, 1, 1),
-        (4, 0, 1.0, 2, 0),
-        (6, 0, 1.0, 2, 1),
-        (8, 0, 1.0, 1, 2),
-        (10, 0, 1.0, 2, 2),
-        (0, 1, -1.0, 1, 0),
-        (1, 1, 1.0, 0, 1),
-        (2, 1, 1.0, 1, 1),
-        (3, 1, -2.0, 2, 0),
-        (5, 1, 1.0, 0, 2),
-        (7, 1, 1.0, 1, 2),
-        (9, 1, 1.0, 2, 1),
-        (11, 1, 1.0, 2, 2),
-    ];
+    const TERMS: &'static [Term] = terms! {
+        0: 0(0 1), 1(1 0), 2(0 2) * -2.0, 3(1 1), 4(2 0), 6(2 1), 8(1 2), 10(2 2);
+        1: 0(1 0) * -1.0, 1(0 1), 2(1 1), 3(2 0) * -2.0, 5(0 2), 7(1 2), 9(2 1), 11(2 2);
+    };
 
     #[inline(always)]
     fn basis(x: f64, b: f64) -> Basis {
@@ -113,110 +92,27 @@ impl OrthogonalSet<16> for Ebner12 {
 
 impl OrthogonalSet<48> for Gruen44 {
     const NAME: &'static str = "gruen";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("c", Unit::Image),
-        ("xp", Unit::Image),
-        ("yp", Unit::Image),
-        ("a12", Unit::One),
-        ("a21", Unit::One),
-        ("a22", Unit::PerImage(1)),
-        ("a31", Unit::PerImage(1)),
-        ("a14", Unit::PerImage(2)),
-        ("a23", Unit::PerImage(2)),
-        ("a32", Unit::PerImage(2)),
-        ("a41", Unit::PerImage(2)),
-        ("a15", Unit::PerImage(3)),
-        ("a24", Unit::PerImage(3)),
-        ("a33", Unit::PerImage(3)),
-        ("a42", Unit::PerImage(3)),
-        ("a51", Unit::PerImage(3)),
-        ("a25", Unit::PerImage(4)),
-        ("a34", Unit::PerImage(4)),
-        ("a43", Unit::PerImage(4)),
-        ("a52", Unit::PerImage(4)),
-        ("a35", Unit::PerImage(5)),
-        ("a44", Unit::PerImage(5)),
-        ("a53", Unit::PerImage(5)),
-        ("a45", Unit::PerImage(6)),
-        ("a54", Unit::PerImage(6)),
-        ("a55", Unit::PerImage(7)),
-        ("b13", Unit::PerImage(1)),
-        ("b22", Unit::PerImage(1)),
-        ("b14", Unit::PerImage(2)),
-        ("b23", Unit::PerImage(2)),
-        ("b32", Unit::PerImage(2)),
-        ("b41", Unit::PerImage(2)),
-        ("b15", Unit::PerImage(3)),
-        ("b24", Unit::PerImage(3)),
-        ("b33", Unit::PerImage(3)),
-        ("b42", Unit::PerImage(3)),
-        ("b51", Unit::PerImage(3)),
-        ("b25", Unit::PerImage(4)),
-        ("b34", Unit::PerImage(4)),
-        ("b43", Unit::PerImage(4)),
-        ("b52", Unit::PerImage(4)),
-        ("b35", Unit::PerImage(5)),
-        ("b44", Unit::PerImage(5)),
-        ("b53", Unit::PerImage(5)),
-        ("b45", Unit::PerImage(6)),
-        ("b54", Unit::PerImage(6)),
-        ("b55", Unit::PerImage(7)),
-        ("b", Unit::Image),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "c" "xp" "yp"; Unit::One => "a12" "a21"; Unit::PerImage(1) => "a22" "a31";
+        Unit::PerImage(2) => "a14" "a23" "a32" "a41"; Unit::PerImage(3) => "a15" "a24" "a33" "a42" "a51";
+        Unit::PerImage(4) => "a25" "a34" "a43" "a52"; Unit::PerImage(5) => "a35" "a44" "a53";
+        Unit::PerImage(6) => "a45" "a54"; Unit::PerImage(7) => "a55"; Unit::PerImage(1) => "b13" "b22";
+        Unit::PerImage(2) => "b14" "b23" "b32" "b41"; Unit::PerImage(3) => "b15" "b24" "b33" "b42" "b51";
+        Unit::PerImage(4) => "b25" "b34" "b43" "b52"; Unit::PerImage(5) => "b35" "b44" "b53";
+        Unit::PerImage(6) => "b45" "b54"; Unit::PerImage(7) => "b55"; Unit::Image => "b";
+    };
     const FORMULA: &'static str = "X = x - xp, Y = y - yp, k = X^2 - b^2/2, p = X^2 - 17 b^2/20, r = X^2 (X^2 - 31 b^2/28) + 9 b^4/70, \
          l, q, s of Y as k, p, r of X, T_ij = (1, Y, l, Y q, s)_i (1, X, k, X p, r)_j, corrected = (X + a12 X + a21 Y + a22 X Y + a31 l \
          - (10/7) b22 k + sum a_ij T_ij, Y - a12 Y + a21 X - (10/7) a22 l + b13 k + b22 X Y + sum b_ij T_ij), residual = corrected - \
          image, image = c (u1, u2) / u3";
-    const TERMS: &'static [Term] = &[
-        (0, 0, 1.0, 0, 1),
-        (1, 0, 1.0, 1, 0),
-        (2, 0, 1.0, 1, 1),
-        (3, 0, 1.0, 2, 0),
-        (24, 0, -10.0 / 7.0, 0, 2),
-        (4, 0, 1.0, 0, 3),
-        (5, 0, 1.0, 1, 2),
-        (6, 0, 1.0, 2, 1),
-        (7, 0, 1.0, 3, 0),
-        (8, 0, 1.0, 0, 4),
-        (9, 0, 1.0, 1, 3),
-        (10, 0, 1.0, 2, 2),
-        (11, 0, 1.0, 3, 1),
-        (12, 0, 1.0, 4, 0),
-        (13, 0, 1.0, 1, 4),
-        (14, 0, 1.0, 2, 3),
-        (15, 0, 1.0, 3, 2),
-        (16, 0, 1.0, 4, 1),
-        (17, 0, 1.0, 2, 4),
-        (18, 0, 1.0, 3, 3),
-        (19, 0, 1.0, 4, 2),
-        (20, 0, 1.0, 3, 4),
-        (21, 0, 1.0, 4, 3),
-        (22, 0, 1.0, 4, 4),
-        (0, 1, -1.0, 1, 0),
-        (1, 1, 1.0, 0, 1),
-        (2, 1, -10.0 / 7.0, 2, 0),
-        (23, 1, 1.0, 0, 2),
-        (24, 1, 1.0, 1, 1),
-        (25, 1, 1.0, 0, 3),
-        (26, 1, 1.0, 1, 2),
-        (27, 1, 1.0, 2, 1),
-        (28, 1, 1.0, 3, 0),
-        (29, 1, 1.0, 0, 4),
-        (30, 1, 1.0, 1, 3),
-        (31, 1, 1.0, 2, 2),
-        (32, 1, 1.0, 3, 1),
-        (33, 1, 1.0, 4, 0),
-        (34, 1, 1.0, 1, 4),
-        (35, 1, 1.0, 2, 3),
-        (36, 1, 1.0, 3, 2),
-        (37, 1, 1.0, 4, 1),
-        (38, 1, 1.0, 2, 4),
-        (39, 1, 1.0, 3, 3),
-        (40, 1, 1.0, 4, 2),
-        (41, 1, 1.0, 3, 4),
-        (42, 1, 1.0, 4, 3),
-        (43, 1, 1.0, 4, 4),
-    ];
+    const TERMS: &'static [Term] = terms! {
+        0: 0(0 1), 1(1 0), 2(1 1), 3(2 0), 24(0 2) * (-10.0 / 7.0), 4(0 3), 5(1 2), 6(2 1), 7(3 0), 8(0 4), 9(1 3),
+            10(2 2), 11(3 1), 12(4 0), 13(1 4), 14(2 3), 15(3 2), 16(4 1), 17(2 4), 18(3 3), 19(4 2), 20(3 4),
+            21(4 3), 22(4 4);
+        1: 0(1 0) * -1.0, 1(0 1), 2(2 0) * (-10.0 / 7.0), 23(0 2), 24(1 1), 25(0 3), 26(1 2), 27(2 1), 28(3 0),
+            29(0 4), 30(1 3), 31(2 2), 32(3 1), 33(4 0), 34(1 4), 35(2 3), 36(3 2), 37(4 1), 38(2 4), 39(3 3),
+            40(4 2), 41(3 4), 42(4 3), 43(4 4);
+    };
 
     #[inline(always)]
     fn basis(x: f64, b: f64) -> Basis {

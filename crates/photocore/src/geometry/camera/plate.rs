@@ -1,7 +1,7 @@
 //! The camera of a star plate (NOAA TR NOS 55, equations 38 to 41), as blocks take it.
 
 use super::inverse::{RadialFactor, RadialLimit, from_radial};
-use super::model::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit, parameters};
 use crate::geometry::plate_lens::{Decentering, Form, Kind, PlateLens, Plated};
 use crate::geometry::{Displacement, Vector3};
 
@@ -49,22 +49,11 @@ impl CameraModel for Plate {
     type Parameters = [f64; COUNT];
 
     const NAME: &'static str = "plate";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("c", Unit::Image),
-        ("c_y", Unit::Image),
-        ("xp", Unit::Image),
-        ("yp", Unit::Image),
-        ("K1", Unit::PerImage(2)),
-        ("K2", Unit::PerImage(4)),
-        ("K3", Unit::PerImage(6)),
-        ("K4", Unit::PerImage(1)),
-        ("K5", Unit::PerImage(3)),
-        ("phi_T", Unit::One),
-        ("dx", Unit::Image),
-        ("dy", Unit::Image),
-        ("epsilon", Unit::One),
-        ("c0", Unit::Image),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "c" "c_y" "xp" "yp"; Unit::PerImage(2) => "K1"; Unit::PerImage(4) => "K2";
+        Unit::PerImage(6) => "K3"; Unit::PerImage(1) => "K4"; Unit::PerImage(3) => "K5"; Unit::One => "phi_T";
+        Unit::Image => "dx" "dy"; Unit::One => "epsilon"; Unit::Image => "c0";
+    };
     const CONSTANTS: usize = 1;
     const DOWN: bool = true;
     const FORMULA: &'static str = "(p, q) = (c P1, -c_y P2) / -P3, or c0 (P1, -P2) / -P3 with scales (c, c_y) / c0 behind the lens, c_y = c where it \

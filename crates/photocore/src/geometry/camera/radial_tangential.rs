@@ -1,6 +1,11 @@
 //! The terms of Brown (1966, 1971), Conrady (1919) and those who came after: radial, tangential, thin prism.
+//!
+//! A camera as a table of what its parameters are: a projection, a lens with radial, tangential and prism terms, focal lengths.
 
-use super::inverse::{ALL_POWERS, Matrix2, RadialFactor};
+use super::inverse::{ALL_POWERS, Matrix2, RadialFactor, RadialLimit, from_radial};
+use super::model::{Image, Unit};
+use super::projections::{RayProjection, Seen};
+use crate::geometry::Vector3;
 
 /// The lens
 ///
@@ -160,5 +165,254 @@ impl Bent {
     #[inline(always)]
     pub fn by_prism(&self) -> [f64; 2] {
         [self.square, self.square * self.square]
+    }
+}
+
+/// What a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    /// Both focal lengths; that of columns; that of rows.
+    F,
+    Fx,
+    Fy,
+    /// The principal point.
+    Cx,
+    Cy,
+    /// The size of the picture, from whose centre the principal point is counted.
+    W,
+    H,
+    /// Beside the focal length of columns; what rows add to columns; the same as a part of it.
+    B1,
+    B2,
+    Skew,
+    /// A parameter of the projection.
+    Own(usize),
+    /// A coefficient of N or D of the radial factor, by its power.
+    N(usize),
+    D(usize),
+    /// t1 or t2.
+    T(usize),
+    /// s1 and s2 of x, s3 and s4 of y.
+    S(usize),
+    /// p3 or p4 of the tangential profile.
+    P(usize),
+}
+
+/// What a lens does to a place: all terms at once, radial terms first and the others on what these have bent, or all at once with a
+/// profile of the tangential ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Action {
+    Whole,
+    Staged,
+    Profiled,
+}
+
+impl Role {
+    pub const fn unit(self) -> Unit {
+        match self {
+            Self::F | Self::Fx | Self::Fy | Self::Cx | Self::Cy | Self::W | Self::H | Self::B1 | Self::B2 => {
+                Unit::Image
+            }
+            Self::Skew | Self::Own(_) | Self::N(_) | Self::D(_) | Self::T(_) | Self::S(_) | Self::P(_) => {
+                Unit::One
+            }
+        }
+    }
+}
+
+/// The terms of a lens that some parameters are of.
+pub(super) const fn terms(roles: &[Role]) -> Terms {
+    let mut terms = Terms { powers: [0, 0], prism: false };
+    let mut i = 0;
+    while i < roles.len() {
+        match roles[i] {
+            Role::N(power) if power > terms.powers[0] => terms.powers[0] = power,
+            Role::D(power) if power > terms.powers[1] => terms.powers[1] = power,
+            Role::S(_) => terms.prism = true,
+            _ => {}
+        }
+        i += 1;
+    }
+    terms
+}
+
+/// What a camera is made of: image = (fx a + shear b + x0, fy b + y0) of the bent a, b.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parts {
+    pub focal: [f64; 2],
+    pub shear: f64,
+    pub skew: f64,
+    pub origin: [f64; 2],
+    pub own: [f64; 2],
+    pub lens: RadialTangential,
+    pub profile: Profile,
+}
+
+impl Parts {
+    /// Nothing but a lens that bends nothing.
+    #[inline(always)]
+    pub fn none() -> Self {
+        let lens =
+            RadialTangential { radial: RadialFactor::NONE, tangential: [0.0; 2], prism: [[0.0; 2]; 2] };
+        let (origin, own) = ([0.0; 2], [0.0; 2]);
+        Self { focal: [0.0; 2], shear: 0.0, skew: 0.0, origin, own, lens, profile: [0.0; 2] }
+    }
+
+    /// Takes the value of a parameter.
+    #[inline(always)]
+    pub fn take(&mut self, role: Role, value: f64) {
+        match role {
+            Role::F => (self.focal[0], self.focal[1]) = (self.focal[0] + value, self.focal[1] + value),
+            Role::Fx | Role::B1 => self.focal[0] += value,
+            Role::Fy => self.focal[1] += value,
+            Role::Cx => self.origin[0] += value,
+            Role::Cy => self.origin[1] += value,
+            Role::W => self.origin[0] += 0.5 * value,
+            Role::H => self.origin[1] += 0.5 * value,
+            Role::B2 => self.shear += value,
+            Role::Skew => self.skew = value,
+            Role::Own(k) => self.own[k] = value,
+            Role::N(power) => self.lens.radial.numerator[power] = value,
+            Role::D(power) => self.lens.radial.denominator[power] = value,
+            Role::T(k) => self.lens.tangential[k] = value,
+            Role::S(k) => self.lens.prism[k / 2][k % 2] = value,
+            Role::P(k) => self.profile[k] = value,
+        }
+    }
+
+    /// The place that a lens bends, and what it is then.
+    #[inline(always)]
+    fn bend(&self, ab: [f64; 2], action: Action, terms: Terms) -> Bending {
+        if action != Action::Staged {
+            let bent = match action {
+                Action::Profiled => self.lens.bend_profiled(ab, self.profile, terms),
+                _ => self.lens.bend_by(ab, terms),
+            };
+            return Bending {
+                first: bent,
+                last: bent,
+                by_first: [[1.0, 0.0], [0.0, 1.0]],
+                by_place: bent.by_place,
+            };
+        }
+        let straight = RadialFactor::NONE;
+        let first = RadialTangential { tangential: [0.0; 2], prism: [[0.0; 2]; 2], ..self.lens };
+        let first = first.bend_by(ab, Terms { prism: false, ..terms });
+        let last = RadialTangential { radial: straight, ..self.lens };
+        let last = last.bend_by(first.xy, Terms { powers: [0, 0], ..terms });
+        let (to, from) = (last.by_place, first.by_place);
+        let by_place = [0, 1].map(|i| [0, 1].map(|k| to[i][0] * from[0][k] + to[i][1] * from[1][k]));
+        Bending { first, last, by_first: to, by_place }
+    }
+
+    #[inline(always)]
+    fn image(&self, [a, b]: [f64; 2]) -> [f64; 2] {
+        [self.focal[0] * a + self.shear * b + self.origin[0], self.focal[1] * b + self.origin[1]]
+    }
+
+    /// What moves a, b moves the image so.
+    #[inline(always)]
+    fn moved(&self, [a, b]: [f64; 2]) -> [f64; 2] {
+        [self.focal[0] * a + self.shear * b, self.focal[1] * b]
+    }
+
+    /// The image's partials by a parameter.
+    #[inline(always)]
+    pub fn by(&self, role: Role, seen: &Seen, bending: &Bending) -> [f64; 2] {
+        let [a, b] = bending.last.xy;
+        let through = |m: &Matrix2, v: [f64; 2]| self.moved(super::inverse::times(m, v));
+        match role {
+            Role::F => [a, b],
+            Role::Fx => [a + self.skew * b, 0.0],
+            Role::Fy => [0.0, b],
+            Role::Cx => [1.0, 0.0],
+            Role::Cy => [0.0, 1.0],
+            Role::W => [0.5, 0.0],
+            Role::H => [0.0, 0.5],
+            Role::B1 => [a, 0.0],
+            Role::B2 => [b, 0.0],
+            Role::Skew => [self.focal[0] * b, 0.0],
+            Role::Own(k) => through(&bending.by_place, seen.by_own.map(|row| row[k])),
+            Role::N(power) => through(&bending.by_first, bending.first.by_numerator(power as i32)),
+            Role::D(power) => through(&bending.by_first, bending.first.by_denominator(power as i32)),
+            Role::T(k) => self.moved(bending.last.by_tangential()[k]),
+            Role::S(k) => {
+                let own = bending.last.by_prism()[k % 2];
+                self.moved(if k < 2 { [own, 0.0] } else { [0.0, own] })
+            }
+            Role::P(k) => self.moved(bending.last.by_profile()[k]),
+        }
+    }
+}
+
+/// What a lens does in one or two stages: radial, then the rest.
+pub(super) struct Bending {
+    first: Bent,
+    last: Bent,
+    /// What a lens gives by what its first stage gives, and by the place.
+    by_first: Matrix2,
+    by_place: Matrix2,
+}
+
+/// A model as a table: the projection, how its terms act, and the roles.
+pub(super) trait Table<const N: usize>: Copy {
+    type Projection: RayProjection;
+    const ACTION: Action;
+    const ROLES: [Role; N];
+    const TERMS: Terms = terms(&Self::ROLES);
+
+    fn parts(&self) -> Parts;
+
+    /// The partials of x and y by the parameters.
+    fn by_parameters(parts: &Parts, seen: &Seen, bending: &Bending) -> [[f64; N]; 2];
+
+    #[inline(always)]
+    fn place(&self, u: &Vector3) -> [f64; 2] {
+        let parts = self.parts();
+        let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
+        parts.image(parts.bend(seen.ab, Self::ACTION, Self::TERMS).last.xy)
+    }
+
+    #[inline(always)]
+    fn with_partials(&self, u: &Vector3) -> Image<[f64; N]> {
+        let parts = self.parts();
+        let seen = Self::Projection::project([u.x, -u.y, -u.z], parts.own);
+        let bending = parts.bend(seen.ab, Self::ACTION, Self::TERMS);
+        let [a, b] = &seen.by_ray;
+        let by_ray = |k: usize| parts.moved(super::inverse::times(&bending.by_place, [a[k], b[k]]));
+        let [x, y, z] = [by_ray(0), by_ray(1), by_ray(2)];
+        let by_u = |row: usize| Vector3::new(x[row], -y[row], -z[row]);
+        let by_parameters = Self::by_parameters(&parts, &seen, &bending);
+        Image { xy: parts.image(bending.last.xy), by_u: [by_u(0), by_u(1)], by_parameters }
+    }
+
+    fn sight(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
+        let parts = self.parts();
+        let b = (y - parts.origin[1]) / parts.focal[1];
+        let a = (x - parts.origin[0] - parts.shear * b) / parts.focal[0];
+        let ab = from_radial(&parts.lens.radial, Self::TERMS.powers, [a, b], move |place| {
+            let bending = parts.bend(place, Self::ACTION, Self::TERMS);
+            (bending.last.xy, bending.by_place)
+        })?;
+        let [x, y, z] = Self::Projection::ray(ab, parts.own)?;
+        Some(Vector3::new(x, -y, -z).normalize())
+    }
+
+    fn looks_to(&self, u: &Vector3) -> bool {
+        Self::Projection::faces([u.x, -u.y, -u.z], self.parts().own)
+    }
+
+    fn bent_at(&self, u: &Vector3) -> f64 {
+        let [a, b] = Self::Projection::project([u.x, -u.y, -u.z], self.parts().own).ab;
+        a.hypot(b)
+    }
+
+    fn bent_until(&self) -> f64 {
+        self.parts().lens.radial.fold()
+    }
+
+    fn limit(&self) -> Option<RadialLimit> {
+        let parts = self.parts();
+        parts.lens.radial.limit().or_else(|| Self::Projection::limit(parts.own))
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::inverse::{Matrix2, inverted, times};
 use super::knots::{NODES, Patch, Window};
-use super::model::{CameraModel, Image, Unit};
+use super::model::{CameraModel, Image, Unit, parameters};
 use super::projections::{RayProjection, Stereographic};
 use crate::geometry::Vector3;
 
@@ -171,16 +171,9 @@ impl CameraModel for SplinedStereographic {
     type Parameters = [f64; 8];
 
     const NAME: &'static str = "splined_stereographic";
-    const PARAMETERS: &'static [(&'static str, Unit)] = &[
-        ("fx", Unit::Image),
-        ("fy", Unit::Image),
-        ("cx", Unit::Image),
-        ("cy", Unit::Image),
-        ("order", Unit::One),
-        ("nx", Unit::One),
-        ("ny", Unit::One),
-        ("fov_x_deg", Unit::One),
-    ];
+    const PARAMETERS: &'static [(&'static str, Unit)] = parameters! {
+        Unit::Image => "fx" "fy" "cx" "cy"; Unit::One => "order" "nx" "ny" "fov_x_deg";
+    };
     const CONSTANTS: usize = 4;
     const DOWN: bool = true;
     const FORMULA: &'static str = "(a, b) = 2 (P1, -P2) / (|P| - P3), s = (nx - order) / (4 tan(fov_x_deg / 4)), (i, j) = s (a, b) + \

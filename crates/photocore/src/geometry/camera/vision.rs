@@ -9,7 +9,7 @@ use super::projections::{
     Central, DivisionByRadius, Equidistant, Equisolid as EquisolidRays, ExtendedUnified, FieldOfView, Seen,
     Stereographic as StereographicRays,
 };
-use super::table::{Action, Bending, Parts, Role, Table};
+use super::radial_tangential::{Action, Bending, Parts, Role, Table};
 use crate::geometry::Vector3;
 
 /// Declares cameras: name and number of parameters, what files call it, projection, formula of the lens, parameters with their roles. The

@@ -8,14 +8,12 @@
 //! ```
 
 mod pattern;
-mod scanner;
 
 use super::camera::Matrix2;
 use super::camera::inverse::{inverted, times, way_back};
 use super::correction::PARAMETERS;
 
-pub use pattern::{Deformation, Function, Functions, Grid, Pattern};
-pub use scanner::{Scanned, Scanner};
+pub use pattern::{Deformation, Function, Functions, Grid, Pattern, Scanned, Scanner};
 
 /// The film of a photo: where it lay, and how its size changed.
 #[derive(Debug, Clone, Copy, PartialEq)]

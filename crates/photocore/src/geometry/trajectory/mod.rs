@@ -9,7 +9,6 @@
 
 mod axes;
 mod functions;
-mod lagrange;
 mod rotations;
 mod table;
 

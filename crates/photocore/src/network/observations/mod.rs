@@ -1,7 +1,7 @@
 //! Observations of a network beside its images (lengths, differences of coordinates, positions and attitudes of photos ...).
 //!
-//! Each kind is a file with a type that implements [`ObservationModel`], and a line of `kinds!` below. It writes observed minus
-//! computed, and the partials of the computed values by positions and rotations; [`Rows`] turns these into the columns of the unknowns.
+//! Each kind is a type that implements [`ObservationModel`], in a file of its own or in one with others that are of the same things, and
+//! a line of `kinds!` below. It writes observed minus computed, and the partials of the computed values by positions and rotations; [`Rows`] turns these into the columns of the unknowns.
 
 mod adjusted;
 mod fault;
@@ -16,19 +16,22 @@ use self::model::{deviation, in_own_axes, nine, own_axes, rotates, rows_of, thre
 use super::commons::{Common, CommonKind};
 
 pub use adjusted::{AdjustedObservation, KindSums};
-pub(super) use attitude::misalignment;
 pub use fault::Fault;
 pub use model::{Named, ObservationModel, Quantity, Touches};
+pub(super) use photos::misalignment;
 pub use precision::Precision;
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
 pub use rows::{Rows, Sites};
 pub(super) use tied::{TiedModel, TiedObservation};
 
 macro_rules! kinds {
-    ($($module:ident::$name:ident;)*) => {
+    ($($module:ident::$($name:ident)? $({$($member:ident),*})?;)*) => {
         $(mod $module;
-        pub use $module::$name;)*
-
+        $(pub use $module::$name;)?
+        $(pub use $module::{$($member),*};)?)*
+        kinds! { @kinds $($($name)? $($($member)*)?)* }
+    };
+    (@kinds $($name:ident)*) => {
         /// An observation of any kind.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Observation {
@@ -121,25 +124,13 @@ macro_rules! kinds {
 }
 
 kinds! {
-    control::Control;
-    distance::Distance;
-    difference::Difference;
+    points::{Control, Distance, Difference};
     equal_height::EqualHeight;
-    on_level::OnLevel;
-    on_plane::OnPlane;
-    on_plumb_line::OnPlumbLine;
-    on_line::OnLine;
-    range::Range;
-    position::Position;
-    attitude::Attitude;
-    relative::Relative;
-    base::Base;
-    prior::Prior;
-    velocity::Velocity;
-    rate::Rate;
-    smoothness::Smoothness;
-    fiducial::Fiducial;
-    film::Film;
+    on_figure::{OnLevel, OnPlane, OnPlumbLine, OnLine};
+    photos::{Range, Position, Attitude, Relative};
+    unknowns::{Base, Prior};
+    motion::{Velocity, Rate, Smoothness};
+    film::{Fiducial, Film};
 }
 
 impl Observation {

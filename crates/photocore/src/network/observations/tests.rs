@@ -4,17 +4,22 @@
 
 use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::tied::TiedModel;
-use super::{Common, CommonKind, Fault, Observation, Precision, Quantity, TiedObservation};
+use super::{
+    Attitude, Common, CommonKind, Control, Difference, Fault, Observation, OnLevel, OnLine, OnPlane,
+    OnPlumbLine, Position, Precision, Quantity, Smoothness, TiedObservation,
+};
+use crate::geometry::film::Pattern;
 use crate::geometry::{
-    Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, PoseNumbers, RotationSense, rotation,
+    Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, Pose, PoseNumbers, RotationSense, Vector3, rotation,
 };
 use crate::network::commons::{CommonState, PlacedCommon};
+use crate::network::film::{FilmOf, Readings};
 use crate::network::in_block::InBlock;
 use crate::network::mounts::tests::mounted;
 use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
 
 /// Two points or photos in rectangular space.
-pub const PLACES: [[f64; 3]; 2] = [[10.0, 20.0, 1.5], [13.0, 18.5, 2.0]];
+const PLACES: [[f64; 3]; 2] = [[10.0, 20.0, 1.5], [13.0, 18.5, 2.0]];
 const ATTITUDES: [[f64; 3]; 2] = [[0.4, -0.3, 1.2], [1.1, 0.5, -0.7]];
 /// Unknowns of a photo, those of its camera among them.
 const PHOTO: usize = 7;
@@ -22,19 +27,19 @@ const PHOTO: usize = 7;
 const BLOCKS: usize = 4;
 
 /// Common unknowns: one of each type, and a second sensor.
-pub const LEVER_ARM: usize = 0;
-pub const SHIFT: usize = 1;
-pub const DRIFT: usize = 2;
-pub const BORESIGHT: usize = 3;
-pub const INSTRUMENT: usize = 4;
-pub const LEVEL: usize = 5;
-pub const PLUMB_LINE: usize = 6;
-pub const LINE: usize = 7;
-pub const PLANE: usize = 8;
-pub const SENSORS: [usize; 2] = [9, 11];
+const LEVER_ARM: usize = 0;
+const SHIFT: usize = 1;
+const DRIFT: usize = 2;
+const BORESIGHT: usize = 3;
+const INSTRUMENT: usize = 4;
+const LEVEL: usize = 5;
+const PLUMB_LINE: usize = 6;
+const LINE: usize = 7;
+const PLANE: usize = 8;
+const SENSORS: [usize; 2] = [9, 11];
 
 /// Where the common unknown of a type is.
-pub fn of_kind(kind: CommonKind) -> usize {
+fn of_kind(kind: CommonKind) -> usize {
     CommonKind::ALL.iter().position(|&own| own == kind).unwrap()
 }
 
@@ -202,7 +207,7 @@ pub fn agrees(observation: &Observation) {
 }
 
 /// Whether an observation stays as it is when everything is shifted and turned.
-pub fn stays(observation: &Observation) -> bool {
+fn stays(observation: &Observation) -> bool {
     let scene = &scenes()[0];
     let turn = rotation([0.2, -0.4, 0.3]);
     let numbers =
@@ -219,6 +224,108 @@ pub fn stays(observation: &Observation) -> bool {
     }
     let [before, after] = [&scene.unknowns, &moved].map(|values| scene.equations(observation, values).0);
     before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-12)
+}
+
+/// Observations of nearly each kind, of what is known and of common unknowns.
+fn of_kinds() -> Vec<Observation> {
+    let alike = |sd: f64, count: usize| Precision::Deviations(vec![sd; count]);
+    let two = Precision::Deviations(vec![0.01, 0.02]);
+    let [attitude, boresight] = [[0.3, -0.2, 0.9], [0.02, 0.5, -0.1]].map(rotation);
+    let of_attitude =
+        |boresight| Attitude { photo: 0, attitude, boresight, precision: alike(1e-4, 3) }.into();
+    let known = Position::new(1, PLACES[0], Vector3::new(0.3, -1.2, 0.8), alike(0.01, 3));
+    let (shift, drift, time) = (Some(SHIFT), Some(DRIFT), -7.5);
+    let in_common = Position { lever_arm: Quantity::Common(LEVER_ARM), shift, drift, time, ..known.clone() };
+    let coefficients = vec![LEVER_ARM, SHIFT, DRIFT];
+    let (factors, observed) = (vec![1.0, -2.0, 1.0], [0.1, 0.0, -0.2]);
+    vec![
+        Control { point: 1, coordinates: PLACES[0], precision: alike(0.01, 3) }.into(),
+        distance(None),
+        distance(Some(INSTRUMENT)),
+        Difference { points: [1, 0], components: [Some(1.0), None, Some(-2.0)], precision: two.clone() }
+            .into(),
+        OnLevel { point: 1, level: LEVEL, difference: 0.2, sd: 0.01 }.into(),
+        OnPlane { point: 1, plane: PLANE, distance: 0.1, sd: 0.01 }.into(),
+        OnPlumbLine { point: 1, line: PLUMB_LINE, precision: two.clone() }.into(),
+        OnLine { point: 1, line: LINE, precision: two }.into(),
+        range(None),
+        range(Some(INSTRUMENT)),
+        known.clone().into(),
+        Position { shift, ..known }.into(),
+        in_common.into(),
+        of_attitude(Quantity::Known(boresight)),
+        of_attitude(Quantity::Common(BORESIGHT)),
+        relative(),
+        base(None),
+        base(Some(SENSORS[0])),
+        prior(vec![SENSORS[0]], vec![6]),
+        prior(vec![PLANE], vec![3]),
+        prior(vec![PLANE, SENSORS[0]], vec![3, 6]),
+        Smoothness { coefficients, factors, observed, precision: alike(0.01, 3) }.into(),
+        fiducial(None, true),
+        fiducial(Some(Pattern::Quadratic { half: 3.0 }), false),
+        film(None, vec![3, 4, 5]),
+        film(Some(of_kind(CommonKind::Roll)), vec![0, 2, 3, 5]),
+    ]
+}
+
+fn distance(instrument: Option<usize>) -> Observation {
+    super::Distance { points: [1, 0], length: 4.0, sd: 0.01, instrument }.into()
+}
+
+fn range(instrument: Option<usize>) -> Observation {
+    let lever_arm = Vector3::new(0.3, -1.2, 0.8);
+    super::Range { photo: 1, point: 0, length: 4.0, sd: 0.01, lever_arm, instrument }.into()
+}
+
+fn relative() -> Observation {
+    let pose = Pose { position: Vector3::new(2.0, -1.0, 0.4), attitude: rotation([0.4, -0.2, 1.1]) };
+    super::Relative { photos: [1, 0], pose, precision: Precision::Deviations(vec![0.01; 6]) }.into()
+}
+
+fn base(first: Option<usize>) -> Observation {
+    super::Base { first, second: SENSORS[1], length: 0.5, sd: 0.01 }.into()
+}
+
+fn prior(commons: Vec<usize>, components: Vec<usize>) -> Observation {
+    let count = components.iter().sum();
+    let (precision, observed) = (Precision::Deviations(vec![0.01; count]), vec![0.5; count]);
+    super::Prior { commons, components, observed, precision }.into()
+}
+
+fn fiducial(pattern: Option<Pattern>, projective: bool) -> Observation {
+    let film = FilmOf {
+        placement: of_kind(CommonKind::FilmPlacement),
+        size: of_kind(CommonKind::FilmSize),
+        bend: (!projective).then(|| of_kind(CommonKind::FilmBend)),
+        projective,
+        roll: projective.then(|| of_kind(CommonKind::Roll)),
+        scanner: of_kind(CommonKind::Scanner),
+        curves: vec![],
+        readings: Readings { pitch: 0.5, origin: [3.0, 4.0], down: projective, half_range: [9.0; 2] },
+        weights: pattern.map_or(vec![], |_| vec![of_kind(CommonKind::Pattern)]),
+        pattern,
+        mirrored: projective,
+    };
+    let (mark, precision) = (of_kind(CommonKind::Fiducial), Precision::Deviations(vec![0.1; 2]));
+    super::Fiducial { mark, near: [0.4, 0.2], film, reading: [3.2, 4.1], precision }.into()
+}
+
+fn film(roll: Option<usize>, components: Vec<usize>) -> Observation {
+    let (placement, size) = (of_kind(CommonKind::FilmPlacement), of_kind(CommonKind::FilmSize));
+    let count = components.len();
+    let (observed, precision) = (vec![0.1; count], Precision::Deviations(vec![0.01; count]));
+    super::Film { placement, size, roll, components, observed, precision }.into()
+}
+
+#[test]
+fn partials_of_kinds_agree_with_differences() {
+    of_kinds().iter().for_each(agrees);
+}
+
+#[test]
+fn what_is_between_places_moves_with_the_network() {
+    assert!([distance(None), range(None), relative()].iter().all(stays));
 }
 
 #[test]

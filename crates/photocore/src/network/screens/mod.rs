@@ -1,6 +1,5 @@
 //! What leaves a network for the good of the rest: screens, each of which looks at how an adjustment has ended and names what leaves.
 
-mod at_station;
 mod leaving;
 mod near_station;
 mod not_determined;
@@ -21,7 +20,7 @@ type Screen = (fn(&Screens) -> bool, fn(&Ended<'_>) -> Leaves, Begin);
 const GONE_WRONG: [Screen; 3] = [
     (|on| on.not_determined, not_determined::look, Begin::AsBefore),
     (|on| on.ran_off, ran_off::look, Begin::FromStart),
-    (|on| on.at_station, at_station::look, Begin::FromStart),
+    (|on| on.at_station, near_station::at_station, Begin::FromStart),
 ];
 /// What an adjustment has stopped for. Points that ran off are told from those that ran into a station at the end only.
 const STOPPED: Screen = (|on| on.ran_into_station || on.ran_off, ran_into_station::look, Begin::FromHere);

@@ -1,6 +1,6 @@
-//! Points that are held near a station that sees them: a wrong image of one turns photos as no other can.
+//! Points at a station, and points that are held near one that sees them: a wrong image of one turns photos as no other can.
 
-use super::leaving::{Ended, FEW, Leaving};
+use super::leaving::{Ended, FEW, Leaves, Leaving};
 use crate::adjustment::{AdjustError, Adjustment, Method, Status};
 use crate::network::problem::Assembled;
 use crate::network::selection::{Dropped, Reason};
@@ -98,4 +98,13 @@ impl Assembled {
         let few = FEW * near.len() <= model.locals && near.len() + HELD <= held.len();
         if few { near.into_iter().map(|local| self.points[local]).collect() } else { vec![] }
     }
+}
+
+/// Points given at the place of a station that sees them: nothing can be computed of them.
+pub(super) fn at_station(ended: &Ended<'_>) -> Leaves {
+    let Err(AdjustError::NotFinite) = ended.adjusted else { return Leaves::default() };
+    let squares = ended.assembled.nearest_stations(&ended.assembled.problem.initial);
+    let at_station = ended.assembled.points.iter().zip(&squares).filter(|(_, square)| **square == 0.0);
+    let dropped = |(&point, _): (&usize, &f64)| Dropped { point, reason: Reason::AtStation };
+    Leaves { points: at_station.map(dropped).collect(), photos: vec![] }
 }

@@ -5,11 +5,11 @@ mod others;
 use std::time::Instant;
 
 use self::others::Others;
+use super::assembly::TieEquations;
 use super::equations::{Equations, Prior};
 use super::incidence::Batches;
-use super::selected::SelectedInverse;
+use super::panels::SelectedInverse;
 use super::system::System;
-use super::tie_equations::TieEquations;
 use super::vectorised::dot;
 use super::watch::Control;
 use super::workspace::zeros;

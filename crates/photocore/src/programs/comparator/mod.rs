@@ -38,7 +38,6 @@
 
 mod adjust;
 mod measure;
-mod model;
 
 use thiserror::Error;
 

@@ -3,14 +3,16 @@
 //! With F(q, x) = 1/2 sum d^2 over all deviations, q the motions of the frame: the steps are Newton's, -F_qq^-1 F_q (Gauss-Newton's where
 //! F_qq is not positive definite). At the end F_q = 0 for any points, so that dq/dx = -F_qq^-1 F_qx: exactly, also where the form
 //! deviates much.
+//!
+//! A feature in its place.
+//!
+//! First values: the main axes of the points, circles and spheres by linear equations, axes of cylinders from all directions.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 
-use super::form::{ByMotions, Curvature, MOTIONS, Partials};
-use super::placed::Placed;
-use super::start::starts;
+use super::form::{ByMotions, Curvature, MOTIONS, Partials, RADIUS};
 use super::{FeatureError, Form};
-use crate::geometry::Vector3;
+use crate::geometry::{Matrix3, Vector3, angle_axis_rotation};
 use crate::sorting::sort_by;
 
 /// Steps at the most, and the step below which the feature rests; lengths are those of points with a mean square distance of 1.
@@ -145,4 +147,160 @@ fn all_motions(form: Form, own: &DVector<f64>) -> ByMotions {
         all[motion] = value;
     }
     all
+}
+
+/// A feature in its place.
+#[derive(Debug, Clone)]
+pub struct Placed {
+    /// The origin of its frame.
+    pub centre: Vector3,
+    /// Unit vectors of the frame, in columns.
+    pub axes: Matrix3,
+    /// The radius; 0 where there is none.
+    pub radius: f64,
+}
+
+impl Placed {
+    /// The third axis.
+    pub fn axis(&self) -> Vector3 {
+        self.axes.column(2).into()
+    }
+
+    /// A point in the frame.
+    pub fn own(&self, point: &Vector3) -> Vector3 {
+        self.axes.transpose() * (point - self.centre)
+    }
+
+    /// The sum of the squares of all deviations.
+    pub fn square_sum(&self, form: Form, points: &[Vector3]) -> f64 {
+        let of = |p: &Vector3| {
+            let y = self.own(p);
+            form.deviations().iter().map(|each| each.value(&y, self.radius).powi(2)).sum::<f64>()
+        };
+        points.iter().map(of).sum()
+    }
+
+    /// The deviations of all points, point by point.
+    pub fn linearize(&self, form: Form, points: &[Vector3]) -> Vec<Partials> {
+        let of = |p: &Vector3| {
+            let y = self.own(p);
+            form.deviations().iter().map(move |each| each.linearize(&y, self.radius))
+        };
+        points.iter().flat_map(of).collect()
+    }
+
+    /// After motions of its frame.
+    pub(super) fn moved(&self, motions: &ByMotions) -> Self {
+        let turn = angle_axis_rotation(&motions.fixed_rows::<3>(3).into());
+        Self {
+            centre: self.centre + self.axes * motions.fixed_rows::<3>(0),
+            axes: self.axes * turn,
+            radius: self.radius + motions[RADIUS],
+        }
+    }
+
+    /// The same feature: the largest component of its axis is positive, and along what does not change it the origin of the frame is at
+    /// the foot of the mean of the points, which is 0.
+    pub(super) fn oriented(mut self, form: Form) -> Self {
+        let axis = self.axis();
+        if axis[axis.iamax()] < 0.0 {
+            self.axes.fixed_columns_mut::<2>(1).neg_mut();
+        }
+        let back = self.own(&Vector3::zeros());
+        let free = |k: usize| if form.motions().contains(&k) { 0.0 } else { back[k] };
+        self.centre += self.axes * Vector3::from_fn(|k, _| free(k));
+        self
+    }
+}
+
+/// Directions of the axis of a cylinder that are tried, over half a sphere: one every 8 degrees.
+const DIRECTIONS: usize = 300;
+/// Of these the best, no two nearer to each other than this cosine (15 degrees).
+const TAKEN: usize = 8;
+const APART: f64 = 0.966;
+/// Steps of a decomposition at the most.
+const DECOMPOSITION_STEPS: usize = 1000;
+
+/// Where to begin, the likeliest first; points are counted from their mean. None where there is nothing to begin with.
+pub fn starts(form: Form, points: &[Vector3]) -> Vec<Placed> {
+    let Some(axes) = main_axes(points) else { return vec![] };
+    let at = |axis: Vector3| placed(form, points, &axis);
+    match form {
+        Form::Line => at(axes.column(0).into()).into_iter().collect(),
+        Form::Cylinder => cylinders(points, &axes),
+        Form::Plane | Form::Circle | Form::Sphere => at(axes.column(2).into()).into_iter().collect(),
+    }
+}
+
+/// Unit vectors along which the points extend most, less, least.
+fn main_axes(points: &[Vector3]) -> Option<Matrix3> {
+    let scatter: Matrix3 = points.iter().map(|p| p * p.transpose()).sum();
+    let eigen = scatter.try_symmetric_eigen(f64::EPSILON, DECOMPOSITION_STEPS)?;
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    Some(Matrix3::from_columns(&order.map(|k| Vector3::from(eigen.eigenvectors.column(k)))))
+}
+
+/// A feature with a given axis through the mean of the points, its centre and radius by linear equations.
+fn placed(form: Form, points: &[Vector3], axis: &Vector3) -> Option<Placed> {
+    let axes = frame_about(axis);
+    let count = match form {
+        Form::Line | Form::Plane => {
+            return Some(Placed { centre: Vector3::zeros(), axes, radius: 0.0 });
+        }
+        Form::Circle | Form::Cylinder => 2,
+        Form::Sphere => 3,
+    };
+    let (centre, radius) = round(count, points.iter().map(|p| axes.transpose() * p))?;
+    Some(Placed { centre: axes * centre, axes, radius })
+}
+
+/// The centre and radius that fit best in |y|^2 = 2 c y + k, of the first two or three coordinates.
+fn round(count: usize, points: impl Iterator<Item = Vector3>) -> Option<(Vector3, f64)> {
+    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    for y in points {
+        let own = Vector3::from_fn(|k, _| if k < count { y[k] } else { 0.0 });
+        let row = Vector4::new(2.0 * own.x, 2.0 * own.y, 2.0 * own.z, 1.0);
+        normal += row * row.transpose();
+        right += row * own.norm_squared();
+    }
+    if count == 2 {
+        normal[(2, 2)] = 1.0;
+    }
+    let found = normal.cholesky()?.solve(&right);
+    let centre = found.xyz();
+    let square = found.w + centre.norm_squared();
+    (square > 0.0 && square.is_finite()).then(|| (centre, square.sqrt()))
+}
+
+/// Cylinders about the best of many directions, and about the main axes.
+fn cylinders(points: &[Vector3], axes: &Matrix3) -> Vec<Placed> {
+    // A spiral with the golden angle covers the half sphere evenly.
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let spiral = (0..DIRECTIONS).map(|k| {
+        let z = (k as f64 + 0.5) / DIRECTIONS as f64;
+        let (sin, cos) = (golden * k as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        Vector3::new(r * cos, r * sin, z)
+    });
+    let main = (0..3).map(|k| Vector3::from(axes.column(k)));
+    let all = main.chain(spiral).filter_map(|axis| placed(Form::Cylinder, points, &axis));
+    let mut judged: Vec<(f64, Placed)> =
+        all.map(|each| (each.square_sum(Form::Cylinder, points), each)).collect();
+    sort_by(&mut judged, &|a, b| a.0.total_cmp(&b.0));
+    let mut taken: Vec<Placed> = vec![];
+    for (_, each) in judged {
+        let apart = |other: &Placed| other.axis().dot(&each.axis()).abs() < APART;
+        if taken.len() < TAKEN && taken.iter().all(apart) {
+            taken.push(each);
+        }
+    }
+    taken
+}
+
+/// Right-handed axes of which the third is given.
+fn frame_about(axis: &Vector3) -> Matrix3 {
+    let z = axis.normalize();
+    let x = z.cross(&Vector3::ith(z.iamin(), 1.0)).normalize();
+    Matrix3::from_columns(&[x, z.cross(&x), z])
 }

@@ -2,9 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3xX, RowDVector};
 
+use super::fit::Placed;
 use super::fit::{by_points, fit};
 use super::form::{Partials, RADIUS};
-use super::placed::Placed;
 use super::{FeatureError, Form};
 use crate::geometry::{Matrix3, Vector3};
 

@@ -24,8 +24,6 @@
 pub mod fit;
 pub mod form;
 mod measured;
-pub mod placed;
-mod start;
 
 pub use measured::{FormTest, Measured, PointDeviation, Quantity, distance, measure};
 

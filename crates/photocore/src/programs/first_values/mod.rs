@@ -9,10 +9,8 @@
 //! Images come as directions in the photos' axes, so that any camera will do; the adjustments in between see them in the plane at unit
 //! distance. Object space is cartesian.
 
-mod adjusted;
 mod chained;
 mod find;
-mod joined;
 mod model;
 mod resected;
 

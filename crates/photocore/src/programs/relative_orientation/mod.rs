@@ -21,11 +21,9 @@
 
 mod five_points;
 mod oriented;
-mod planar;
 
-pub use five_points::five_points;
+pub use five_points::{five_points, over_plane};
 pub use oriented::Oriented;
-pub use planar::over_plane;
 
 use super::sampling::Samples;
 use crate::geometry::{Matrix3, Vector3};

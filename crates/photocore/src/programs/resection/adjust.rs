@@ -3,9 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::degenerate::Degeneracy;
-use super::model::SinglePhoto;
-use super::solution::Solution;
-use super::solved::Solved;
+use super::solution::{SinglePhoto, Solution, Solved};
 use super::{ControlPoint, Pose, Resection, ResectionError};
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Event, Options, Problem};

@@ -35,9 +35,7 @@
 
 mod adjust;
 mod degenerate;
-mod model;
 mod solution;
-mod solved;
 mod start;
 mod three_points;
 

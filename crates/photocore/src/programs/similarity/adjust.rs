@@ -3,11 +3,11 @@
 use std::ops::ControlFlow;
 
 use super::error::{Cause, SimilarityError};
+use super::misclosures::Weighted;
 use super::model::{AsControl, CHANGES, SCALE};
 use super::solution::Solution;
 use super::start::Chosen;
 use super::transform::Similarity;
-use super::weights::Weighted;
 use super::{Method, Options, Start, Station, determinacy, published, start};
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Event, Problem, Status, Stop};

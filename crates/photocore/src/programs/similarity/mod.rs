@@ -27,7 +27,6 @@
 //! ```
 
 mod adjust;
-mod crout;
 mod determinacy;
 mod error;
 mod misclosures;
@@ -37,14 +36,12 @@ mod published;
 mod solution;
 mod start;
 mod transform;
-mod weights;
 
 use crate::geometry::Vector3;
 
 pub use adjust::{closed_form, orient, orient_on};
-pub use crout::gauss_crout;
 pub use error::{Cause, SimilarityError};
-pub use published::Trace;
+pub use published::{Trace, gauss_crout};
 pub use solution::{AdjustedStation, Solution};
 pub use start::Started;
 pub use transform::{Matrix7, Parameters, Similarity};

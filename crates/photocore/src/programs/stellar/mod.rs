@@ -67,10 +67,9 @@ mod solution;
 
 use thiserror::Error;
 
-use crate::Stopped;
-use crate::adjustment;
 use crate::geometry::Station;
 use crate::normals::LayoutError;
+use crate::{Stopped, adjustment};
 
 pub use camera::{Attitude, Camera, Decentering, Form, INTERIOR, Kind, PlateImage};
 pub use hypotheses::{Agreement, Similarity, best_voted, hypotheses};

@@ -1,0 +1,197 @@
+//! How a photo on a trajectory moves: velocities from GNSS, rates of rotation from gyroscopes, smooth curves.
+
+use nalgebra::DMatrix;
+
+use super::{
+    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, nine, rotates,
+    three,
+};
+use crate::geometry::{Matrix3, Vector3};
+
+/// The velocity of the antenna of a photo or record on a trajectory, in the cartesian axes of the object space.
+///
+/// `C' + A [w]x l`, with the partials `I` by C', `-A [l]x` by w, `-A [w x l]x` by rho and `A [w]x` by l.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Velocity {
+    /// The photo, which is on a trajectory.
+    pub photo: usize,
+    /// Units of the object space in a second.
+    pub velocity: [f64; 3],
+    /// l, from the projection centre to the antenna in the photo's axes.
+    pub lever_arm: Quantity<Vector3>,
+    /// Of X, Y, Z.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Velocity {
+    const NAME: &'static str = "velocity";
+
+    /// The velocity, l where it is known; the lever arm.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[photo], &[lever_arm]) = (of.photos, of.commons) else { return None };
+        let lever_arm = Quantity::new(lever_arm, three(values, 3)?.into());
+        let precision = Precision::Covariance(covariance);
+        Some(Self { photo, velocity: three(values, 0)?, lever_arm, precision })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::photos(&[self.photo]).and(self.lever_arm.common(), CommonKind::LeverArm)
+    }
+
+    fn moves(&self) -> bool {
+        true
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let Some(moving) = sites.moving(0) else { return };
+        let attitude = sites.pose(0).attitude;
+        let lever_arm = match self.lever_arm {
+            Quantity::Known(lever_arm) => lever_arm,
+            Quantity::Common(_) => sites.common(0).vector(),
+        };
+        let around = moving.rate.cross(&lever_arm);
+        let computed = moving.velocity + attitude * around;
+        rows.residual(0, (Vector3::from(self.velocity) - computed).as_slice());
+        rows.by_velocity(0, 0, &Matrix3::identity());
+        rows.by_rate(0, 0, &(-attitude * lever_arm.cross_matrix()));
+        rows.by_rotation(0, 0, &(-attitude * around.cross_matrix()));
+        if self.lever_arm.common().is_some() {
+            rows.by_offset(0, 0, &(attitude * moving.rate.cross_matrix()));
+        }
+    }
+}
+
+/// The rate of the body that carries a camera, about its own axes, at a photo or record on a trajectory.
+///
+/// `B^T w + b`, with the partials `B^T` by w, `[B^T w]x` by a turn of B about the axes of the body, and `I` by the bias b.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rate {
+    /// The photo, which is on a trajectory.
+    pub photo: usize,
+    /// Radians in a second.
+    pub rate: [f64; 3],
+    /// B, body to photo.
+    pub boresight: Quantity<Matrix3>,
+    /// b, where there is one.
+    pub bias: Option<usize>,
+    /// Of the three axes of the body.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Rate {
+    const NAME: &'static str = "rate";
+
+    /// The rate, then B where it is known, row by row; the boresight, the bias.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[photo], &[boresight, bias]) = (of.photos, of.commons) else { return None };
+        let boresight = Quantity::new(boresight, nine(values, 3)?);
+        let precision = Precision::Covariance(covariance);
+        Some(Self { photo, rate: three(values, 0)?, boresight, bias, precision })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::photos(&[self.photo])
+            .and(self.boresight.common(), CommonKind::Boresight)
+            .and(self.bias, CommonKind::GyroBias)
+    }
+
+    fn moves(&self) -> bool {
+        true
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let Some(moving) = sites.moving(0) else { return };
+        let (boresight, bias) = match self.boresight {
+            Quantity::Known(boresight) => (boresight, 0),
+            Quantity::Common(_) => (*sites.common(0).attitude(), 1),
+        };
+        let mut computed = boresight.tr_mul(&moving.rate);
+        rows.by_rate(0, 0, &boresight.transpose());
+        if self.boresight.common().is_some() {
+            rows.by_turn(0, 0, &computed.cross_matrix());
+        }
+        if self.bias.is_some() {
+            computed += sites.common(bias).vector();
+            rows.by_offset(0, bias, &Matrix3::identity());
+        }
+        rows.residual(0, (Vector3::from(self.rate) - computed).as_slice());
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        match &self.boresight {
+            Quantity::Known(boresight) => rotates(boresight),
+            Quantity::Common(_) => Ok(()),
+        }
+    }
+}
+
+/// A sum of coefficients of a trajectory, each with its factor: differences of neighbours (Eilers and Marx 1996), or one that follows from
+/// the one before as in a process of Gauss and Markov.
+///
+/// `sum f_k c_k`, with the partials `f_k I`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Smoothness {
+    /// The coefficients: common unknowns of three components.
+    pub coefficients: Vec<usize>,
+    /// As many factors.
+    pub factors: Vec<f64>,
+    /// What was observed, most often zero.
+    pub observed: [f64; 3],
+    /// Of x, y, z.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Smoothness {
+    const NAME: &'static str = "smoothness";
+
+    /// What was observed, then the factors.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let coefficients: Vec<usize> = of.commons.iter().copied().collect::<Option<_>>()?;
+        let factors = values.get(3..)?.to_vec();
+        let precision = Precision::Covariance(covariance);
+        let sound = factors.len() == coefficients.len();
+        sound.then_some(Self { coefficients, factors, observed: three(values, 0)?, precision })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches { commons: self.coefficients.iter().map(|&own| (own, None)).collect(), ..Touches::default() }
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let mut missing = Vector3::from(self.observed);
+        for (k, &factor) in self.factors.iter().enumerate() {
+            missing -= factor * sites.common(k).vector();
+            rows.by_offset(0, k, &Matrix3::from_diagonal_element(factor));
+        }
+        rows.residual(0, missing.as_slice());
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        let numbers = self.factors.iter().chain(&self.observed);
+        if numbers.into_iter().all(|value| value.is_finite()) { Ok(()) } else { Err(Fault::NotFinite) }
+    }
+}

@@ -1,0 +1,156 @@
+//! Points on unknown levels, planes, verticals and straight lines.
+
+use nalgebra::{DMatrix, Matrix2x3, RowVector3};
+
+use super::{
+    CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, in_own_axes, own_axes,
+};
+
+/// A point on a plane, or at a distance from it: the standard deviation is how flat that is.
+///
+/// n.(P - p_0) - d, n being the third of the axes of the plane and p_0 the place that is given; with the partials n by P, -1 by d, and by a
+/// turn of the plane about its own axes those of R^T (P - p_0).
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnPlane {
+    /// The point.
+    pub point: usize,
+    /// The plane.
+    pub plane: usize,
+    /// The observed distance from it along its normal.
+    pub distance: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
+
+impl ObservationModel for OnPlane {
+    const NAME: &'static str = "on plane";
+
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[point], &[Some(plane)], &[distance]) = (of.points, of.commons, values) else { return None };
+        Some(Self { point, plane, distance, sd: deviation(&covariance) })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::points(&[self.point]).and(Some(self.plane), CommonKind::Plane)
+    }
+
+    fn rows(&self) -> usize {
+        1
+    }
+
+    fn precision(&self) -> Precision {
+        Precision::Deviations(vec![self.sd])
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        in_own_axes(sites, rows, &RowVector3::new(0.0, 0.0, 1.0), &[self.distance]);
+    }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        own_axes(sites, &RowVector3::new(0.0, 0.0, 1.0))
+    }
+}
+
+/// A point at the height of a level, or so much above it: a water line, the horizon of a levelling instrument.
+///
+/// Z - h, with the partials 1 by Z and -1 by h; heights above the ellipsoid in geographic space. As many points as there are give one check
+/// fewer, as their differences with the full covariance of these would.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnLevel {
+    /// The point.
+    pub point: usize,
+    /// The level.
+    pub level: usize,
+    /// The observed height above it: zero, or what was levelled.
+    pub difference: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
+
+impl ObservationModel for OnLevel {
+    const NAME: &'static str = "on level";
+
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[point], &[Some(level)], &[difference]) = (of.points, of.commons, values) else { return None };
+        Some(Self { point, level, difference, sd: deviation(&covariance) })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::points(&[self.point]).and(Some(self.level), CommonKind::Level)
+    }
+
+    fn rows(&self) -> usize {
+        1
+    }
+
+    fn precision(&self) -> Precision {
+        Precision::Deviations(vec![self.sd])
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        rows.residual(0, &[self.difference - (sites.height(0) - sites.common(0).height())]);
+        rows.by_height(0, 0, 1.0);
+        rows.by_offset(0, 0, &RowVector3::new(0.0, 0.0, -1.0));
+    }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        sites.up()
+    }
+}
+
+/// Points on a line, told by two offsets that are zero.
+macro_rules! on_lines {
+    ($($(#[$doc:meta])* $name:ident = $said:literal, $kind:ident, $axes:literal;)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct $name {
+            /// The point.
+            pub point: usize,
+            /// The line.
+            pub line: usize,
+            #[doc = $axes]
+            pub precision: Precision,
+        }
+
+        impl ObservationModel for $name {
+            const NAME: &'static str = $said;
+
+            fn from_numbers(of: &Named<'_>, _: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+                let (&[point], &[Some(line)]) = (of.points, of.commons) else { return None };
+                Some(Self { point, line, precision: Precision::Covariance(covariance) })
+            }
+
+            fn touches(&self) -> Touches {
+                Touches::points(&[self.point]).and(Some(self.line), CommonKind::$kind)
+            }
+
+            fn rows(&self) -> usize {
+                2
+            }
+
+            fn precision(&self) -> Precision {
+                self.precision.clone()
+            }
+
+            fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+                in_own_axes(sites, rows, &Matrix2x3::identity(), &[0.0; 2]);
+            }
+
+            fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+                own_axes(sites, &Matrix2x3::identity())
+            }
+        }
+    )*};
+}
+
+on_lines! {
+    /// A point on a plumb line.
+    ///
+    /// (X - X0, Y - Y0), with the partials 1 by X, Y and -1 by X0, Y0; in geographic space along east and north of the given place.
+    OnPlumbLine = "on plumb line", PlumbLine, "Of the offsets along X and Y or, in geographic space, east and north.";
+    /// A point on a straight line.
+    ///
+    /// T^T (P - p_0) - q, T being the first two of the axes of the line and p_0 the place that is given; with the partials T^T by P, -I by
+    /// q, and by a turn of the line about its own axes those of R^T (P - p_0).
+    OnLine = "on line", Line, "Of the offsets along the first two axes of the line.";
+}

@@ -1,0 +1,302 @@
+//! Photos: positions from GNSS, attitudes from inertial units, relative poses, ranges from a photo to a point.
+
+use nalgebra::{DMatrix, Matrix1x3, SMatrix};
+
+use super::{
+    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, deviation, nine,
+    rotates, rows_of, three,
+};
+use crate::geometry::angle_axis::{right_jacobian_inverse, rotation_angle_axis};
+use crate::geometry::{Matrix3, Pose, Vector3};
+
+/// The position of the antenna of a photo.
+///
+/// `C + A l + s + d dt`, with the partials `I` by C, `-A [l]x` by rho, `A` by l, `I` by s and `dt I` by d (Ackermann and Schade 1993); in
+/// geographic space positions and their errors are told in the axes east, north and up of the observed place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Position {
+    /// The photo.
+    pub photo: usize,
+    /// The observed coordinates of the antenna in the object space.
+    pub coordinates: [f64; 3],
+    /// l, from the projection centre to the antenna in the photo's axes (x right, y up, z back), in the unit of the object space.
+    pub lever_arm: Quantity<Vector3>,
+    /// s, where there is one.
+    pub shift: Option<usize>,
+    /// d, where there is one.
+    pub drift: Option<usize>,
+    /// dt in seconds: from the time that the drift counts from.
+    pub time: f64,
+    /// Of X, Y, Z or, in geographic space, of east, north and up, in units of length.
+    pub precision: Precision,
+}
+
+impl Position {
+    /// With a lever arm that is known, and nothing else.
+    pub fn new(photo: usize, coordinates: [f64; 3], lever_arm: Vector3, precision: Precision) -> Self {
+        let lever_arm = Quantity::Known(lever_arm);
+        Self { photo, coordinates, lever_arm, shift: None, drift: None, time: 0.0, precision }
+    }
+}
+
+impl Position {
+    /// l; zero where it is unknown.
+    pub(in crate::network) fn known_lever_arm(&self) -> Vector3 {
+        match self.lever_arm {
+            Quantity::Known(lever_arm) => lever_arm,
+            Quantity::Common(_) => Vector3::zeros(),
+        }
+    }
+}
+
+impl ObservationModel for Position {
+    const NAME: &'static str = "position";
+
+    /// The coordinates, l where it is known, dt; lever arm, shift and drift.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[photo], &[lever_arm, shift, drift]) = (of.photos, of.commons) else { return None };
+        Some(Self {
+            photo,
+            coordinates: three(values, 0)?,
+            lever_arm: Quantity::new(lever_arm, three(values, 3)?.into()),
+            shift,
+            drift,
+            time: *values.get(6)?,
+            precision: Precision::Covariance(covariance),
+        })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::photos(&[self.photo])
+            .and(self.lever_arm.common(), CommonKind::LeverArm)
+            .and(self.shift, CommonKind::Shift)
+            .and(self.drift, CommonKind::Drift)
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let pose = sites.pose(0);
+        let (observed, axes) = sites.observed(self.coordinates);
+        let lever_arm =
+            self.lever_arm.common().map_or_else(|| self.known_lever_arm(), |_| sites.common(0).vector());
+        let mut computed = pose.position + pose.attitude * lever_arm;
+        rows.by_centre(0, 0, &axes);
+        rows.by_rotation(0, 0, &(-axes * pose.attitude * lever_arm.cross_matrix()));
+        let mut place = 0;
+        if self.lever_arm.common().is_some() {
+            rows.by_offset(0, 0, &(axes * pose.attitude));
+            place = 1;
+        }
+        for factor in [self.shift.map(|_| 1.0), self.drift.map(|_| self.time)].into_iter().flatten() {
+            let own = sites.common(place);
+            computed += factor * own.attitude() * own.vector();
+            rows.by_offset(0, place, &(factor * axes * own.attitude()));
+            place += 1;
+        }
+        rows.residual(0, (axes * (observed - computed)).as_slice());
+    }
+
+    /// What a drift takes up depends on where all antennas are.
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        self.drift.is_none().then(|| sites.observed(self.coordinates).1).and_then(|axes| rows_of(&axes))
+    }
+}
+
+/// The attitude of the body that carries a camera.
+///
+/// Computed is A B, body to object; the residual is v = Log((A B)^T A_obs), a rotation about the axes of the body, and with
+/// Jl = Jr^-1(-v) its partials are -Jl B^T by rho and -Jl by a turn of B about the axes of the body (Sola, Deray and Atchuthan 2018).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attitude {
+    /// The photo.
+    pub photo: usize,
+    /// A_obs, body to object: its columns are the axes of the body in those of the space or, where it is geographic, in east, north
+    /// and up at the photo.
+    pub attitude: Matrix3,
+    /// B, body to photo: the identity where what is observed is the attitude of the photo itself.
+    pub boresight: Quantity<Matrix3>,
+    /// Of rotations about the axes of the body, in radians.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Attitude {
+    const NAME: &'static str = "attitude";
+
+    /// A_obs, then B where it is known, row by row; the boresight.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[photo], &[boresight]) = (of.photos, of.commons) else { return None };
+        let boresight = Quantity::new(boresight, nine(values, 9)?);
+        Some(Self {
+            photo,
+            attitude: nine(values, 0)?,
+            boresight,
+            precision: Precision::Covariance(covariance),
+        })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::photos(&[self.photo]).and(self.boresight.common(), CommonKind::Boresight)
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let boresight = match self.boresight {
+            Quantity::Known(boresight) => boresight,
+            Quantity::Common(_) => *sites.common(0).attitude(),
+        };
+        let computed = sites.local_attitude(0) * boresight;
+        let (residual, jacobian) = misalignment(&computed, &self.attitude);
+        rows.residual(0, residual.as_slice());
+        rows.by_local_rotation(0, 0, &(jacobian * boresight.transpose()));
+        if self.boresight.common().is_some() {
+            rows.by_turn(0, 0, &jacobian);
+        }
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        rotates(&self.attitude)?;
+        match &self.boresight {
+            Quantity::Known(boresight) => rotates(boresight),
+            Quantity::Common(_) => Ok(()),
+        }
+    }
+}
+
+/// v = Log(computed^T observed), and Jl = Jr^-1(-v): a turn of the computed by a small vector about its own axes takes Jl times it away.
+pub(in super::super) fn misalignment(computed: &Matrix3, observed: &Matrix3) -> (Vector3, Matrix3) {
+    let residual = rotation_angle_axis(&computed.tr_mul(observed));
+    (residual, right_jacobian_inverse(&-residual))
+}
+
+/// The pose of one photo in the axes of another: odometry, a stereo rig that was calibrated.
+///
+/// t = Ai^T (Cj - Ci) and R = Ai^T Aj; the residuals are t_obs - t in the axes of photo i and v = Log(R^T R_obs) about those of
+/// photo j. With Jl = Jr^-1(-v), the partials of t are -Ai^T, `[t]x`, Ai^T, 0 by Ci, rho_i, Cj, rho_j; those of the residual v are
+/// 0, Jl R^T, 0, -Jl.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Relative {
+    /// i and j.
+    pub photos: [usize; 2],
+    /// Photo j in the axes of photo i: t_obs in the unit of the object space, and R_obs.
+    pub pose: Pose,
+    /// Of the three components of t, in units of length, and the three rotations, in radians.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Relative {
+    const NAME: &'static str = "relative";
+
+    /// t_obs, then R_obs row by row.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let &[i, j] = of.photos else { return None };
+        let pose = Pose { position: three(values, 0)?.into(), attitude: nine(values, 3)? };
+        Some(Self { photos: [i, j], pose, precision: Precision::Covariance(covariance) })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::photos(&self.photos)
+    }
+
+    fn rows(&self) -> usize {
+        6
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let (first, second) = (sites.pose(0), sites.pose(1));
+        let to_first: Matrix3 = first.attitude.transpose();
+        let translation = first.sight(&second.position);
+        rows.residual(0, (self.pose.position - translation).as_slice());
+        rows.by_centre(0, 0, &-to_first);
+        rows.by_rotation(0, 0, &translation.cross_matrix());
+        rows.by_centre(0, 1, &to_first);
+        let rotation = to_first * second.attitude;
+        let (residual, jacobian): (_, SMatrix<f64, 3, 3>) = misalignment(&rotation, &self.pose.attitude);
+        rows.residual(3, residual.as_slice());
+        rows.by_rotation(3, 0, &(-jacobian * rotation.transpose()));
+        rows.by_rotation(3, 1, &jacobian);
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        rotates(&self.pose.attitude)
+    }
+}
+
+/// The distance of a point from a rangefinder that moves with a photo.
+///
+/// s = |P - C - A l|, with the partials e by P, -e by C and e A \[l\]x by rho, e = (P - C - A l)^T/s; of an instrument with the scale m and
+/// the constant k, m s + k, with the partials m e, -m e, m e A \[l\]x, and s and 1 by m and k.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Range {
+    /// The photo.
+    pub photo: usize,
+    /// P.
+    pub point: usize,
+    /// The observed length in the unit of the object space.
+    pub length: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// l, from the projection centre to the rangefinder in the photo's axes (x right, y up, z back), in the unit of the object space.
+    pub lever_arm: Vector3,
+    /// The instrument, where its scale and constant count.
+    pub instrument: Option<usize>,
+}
+
+impl ObservationModel for Range {
+    const NAME: &'static str = "range";
+
+    /// The length, l.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[photo], &[point], &[instrument]) = (of.photos, of.points, of.commons) else { return None };
+        let (length, lever_arm) = (*values.first()?, three(values, 1)?.into());
+        Some(Self { photo, point, length, sd: deviation(&covariance), lever_arm, instrument })
+    }
+
+    fn touches(&self) -> Touches {
+        let photos = vec![self.photo];
+        Touches { photos, ..Touches::points(&[self.point]) }.and(self.instrument, CommonKind::Instrument)
+    }
+
+    fn rows(&self) -> usize {
+        1
+    }
+
+    fn precision(&self) -> Precision {
+        Precision::Deviations(vec![self.sd])
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let pose = sites.pose(0);
+        let ray = sites.position(0) - pose.position - pose.attitude * self.lever_arm;
+        let distance = ray.norm();
+        let (scale, constant) = match self.instrument {
+            None => (1.0, 0.0),
+            Some(_) => (sites.common(0).vector().x, sites.common(0).vector().y),
+        };
+        let direction = scale * (ray / distance).transpose();
+        rows.residual(0, &[self.length - scale * distance - constant]);
+        rows.by_position(0, 0, &direction);
+        rows.by_centre(0, 0, &-direction);
+        rows.by_rotation(0, 0, &(direction * pose.attitude * self.lever_arm.cross_matrix()));
+        if self.instrument.is_some() {
+            rows.by_offset(0, 0, &Matrix1x3::new(distance, 1.0, 0.0));
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Points by themselves and two by two: control points whose coordinates are correlated, distances, differences of coordinates.
+
+use nalgebra::{DMatrix, Matrix1x3, SMatrix};
+
+use super::{
+    CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, rows_of, three,
+};
+use crate::geometry::Matrix3;
+
+/// The position of a point with its full covariance, from an adjustment of its own.
+///
+/// P, with the partials I; in geographic space P and its errors are told in the axes east, north and up of the observed place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Control {
+    /// The point.
+    pub point: usize,
+    /// Its observed coordinates in the object space.
+    pub coordinates: [f64; 3],
+    /// Of X, Y, Z or, in geographic space, of east, north and up, in units of length.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Control {
+    const NAME: &'static str = "control";
+
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let &[point] = of.points else { return None };
+        Some(Self { point, coordinates: three(values, 0)?, precision: Precision::Covariance(covariance) })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::points(&[self.point])
+    }
+
+    fn rows(&self) -> usize {
+        3
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let (observed, axes) = sites.observed(self.coordinates);
+        rows.residual(0, (axes * (observed - sites.position(0))).as_slice());
+        rows.by_position(0, 0, &axes);
+    }
+
+    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+        rows_of(&sites.observed(self.coordinates).1)
+    }
+}
+
+/// The distance between two points: a tape, a rangefinder, the ends of a scale bar.
+///
+/// s = |Q - P|, with the partials e = (Q - P)/s by Q and -e by P (Mikhail and Ackermann 1976, "Observations and Least Squares"); of an
+/// instrument with the scale m and the constant k, m s + k, with the partials m e, -m e, and s and 1 by m and k.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Distance {
+    /// Its ends P and Q.
+    pub points: [usize; 2],
+    /// The observed length in the unit of the object space.
+    pub length: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+    /// The instrument, where its scale and constant count.
+    pub instrument: Option<usize>,
+}
+
+impl ObservationModel for Distance {
+    const NAME: &'static str = "distance";
+
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let (&[p, q], &[instrument], &[length]) = (of.points, of.commons, values) else { return None };
+        Some(Self { points: [p, q], length, sd: deviation(&covariance), instrument })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::points(&self.points).and(self.instrument, CommonKind::Instrument)
+    }
+
+    fn rows(&self) -> usize {
+        1
+    }
+
+    fn precision(&self) -> Precision {
+        Precision::Deviations(vec![self.sd])
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let difference = sites.position(1) - sites.position(0);
+        let distance = difference.norm();
+        let (scale, constant) = match self.instrument {
+            None => (1.0, 0.0),
+            Some(_) => (sites.common(0).vector().x, sites.common(0).vector().y),
+        };
+        let direction = scale * (difference / distance).transpose();
+        rows.residual(0, &[self.length - scale * distance - constant]);
+        rows.by_position(0, 0, &-direction);
+        rows.by_position(0, 1, &direction);
+        if self.instrument.is_some() {
+            rows.by_offset(0, 0, &Matrix1x3::new(distance, 1.0, 0.0));
+        }
+    }
+}
+
+/// The components of the vector from one point to another: a GNSS baseline, a levelled height, offsets that were taped.
+///
+/// Q - P in cartesian axes (geocentric ones in geographic space), with the partials I by Q and -I by P.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// P and Q.
+    pub points: [usize; 2],
+    /// The observed components along X, Y, Z in the unit of the object space; None for those that were not observed.
+    pub components: [Option<f64>; 3],
+    /// Of those that were observed, in their order.
+    pub precision: Precision,
+}
+
+impl ObservationModel for Difference {
+    const NAME: &'static str = "difference";
+
+    /// The vector, NaN for components that were not observed.
+    fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        let &[p, q] = of.points else { return None };
+        let components = three(values, 0)?.map(|value| (!value.is_nan()).then_some(value));
+        if covariance.shape() != (3, 3) {
+            return None;
+        }
+        let seen: Vec<usize> = (0..3).filter(|&k| components[k].is_some()).collect();
+        let precision = Precision::Covariance(covariance.select_rows(&seen).select_columns(&seen));
+        Some(Self { points: [p, q], components, precision })
+    }
+
+    fn touches(&self) -> Touches {
+        Touches::points(&self.points)
+    }
+
+    fn rows(&self) -> usize {
+        self.components.iter().flatten().count()
+    }
+
+    fn precision(&self) -> Precision {
+        self.precision.clone()
+    }
+
+    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+        let difference = sites.position(1) - sites.position(0);
+        let observed = (0..3).filter_map(|k| self.components[k].map(|value| (k, value)));
+        for (row, (k, value)) in observed.enumerate() {
+            let axis: SMatrix<f64, 1, 3> = Matrix3::identity().row(k).into();
+            rows.residual(row, &[value - difference[k]]);
+            rows.by_position(row, 0, &-axis);
+            rows.by_position(row, 1, &axis);
+        }
+    }
+
+    fn axes(&self, _: &Sites<'_>) -> Option<DMatrix<f64>> {
+        let observed: Vec<usize> = (0..3).filter(|&k| self.components[k].is_some()).collect();
+        Some(DMatrix::from_fn(observed.len(), 3, |row, k| f64::from(u8::from(observed[row] == k))))
+    }
+}

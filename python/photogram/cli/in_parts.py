@@ -1,0 +1,121 @@
+"""`photogram adjust` in parts: the options, and projects that are read batch by batch, never whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from photogram.cli.console import NOT_CONVERGED, output, print_sections
+from photogram.cli.job import Job, OutputFolder
+from photogram.cli.progress import adjustment_status
+from photogram.lazy_dataclasses import dataclass, replace
+
+if TYPE_CHECKING:
+    from photogram.cli.choices import Choices
+    from photogram.distributed import Division
+    from photogram.distributed.plan import PartsPlan
+
+__all__ = ["Parts", "adjusted_on_disk", "print_plan"]
+
+TAKEN = frozenset(
+    (
+        *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--loss", "--keep-all"),
+        *("--cluster", "--workers", "--parts", "--memory", "--run", "--plan"),
+    )
+)
+"""Options that a project on disk takes. Any other is refused: nothing is left out without a word."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """How a user divides an adjustment, with the options that say it."""
+
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS|local",
+            help="Adjust in parts on a Dask cluster: its scheduler, or `local` for workers on this machine.",
+        ),
+    ] = None
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", help="Workers of a local cluster; one for each processor.")
+    ] = None
+    parts: Annotated[
+        int | None, typer.Option(metavar="P", help="Parts. Default: some for each worker, that fit.")
+    ] = None
+    memory: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SIZE",
+            help="Memory of a worker, or of this process (4GB, 1.5GiB): what takes more goes in parts.",
+        ),
+    ] = None
+    run: Annotated[
+        OutputFolder,
+        typer.Option(
+            metavar="DIR",
+            help="Keep parts and states there, for all workers: the same command takes up a run that died.",
+        ),
+    ] = None
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Print parts, work, memory, traffic and time, and adjust nothing.")
+    ] = False
+
+    @property
+    def division(self) -> Division | None:
+        """As :func:`photogram.adjust_in_parts` takes it; None where nothing is asked for."""
+        if replace(self, plan=False) == Parts():
+            return None
+        from photogram.distributed import Division
+
+        return Division(
+            parts=self.parts, cluster=self.cluster, workers=self.workers, memory=self.memory, folder=self.run
+        )
+
+
+def print_plan(plan: PartsPlan) -> None:
+    """Print how a block would be adjusted in parts."""
+    output.print("\n".join(plan.lines()))
+    plan.check()
+
+
+def adjusted_on_disk(
+    job: Job, path: Path, target: Path, divided: Parts, choices: Choices, threads: int | None
+) -> bool:
+    """Plan or adjust a project that is read batch by batch; False where it has to be read whole."""
+    division = divided.division
+    if division is None:
+        return False
+    from photogram.formats import Wishes
+    from photogram.formats.plain.batches import streamable
+
+    if not streamable(path):
+        return False
+    for name in job.given:
+        if name not in TAKEN:
+            raise typer.BadParameter(
+                "is not done of a project whose images are read batch by batch from Parquet, in parts: it"
+                " goes without --cluster, --parts, --memory and --run, or with images in CSV, which are read"
+                " whole",
+                param_hint=name,
+            )
+    from photogram.formats import in_parts
+
+    wishes, folder = Wishes(), divided.run or target / "run"
+    chosen: Any = {"unit_variance": choices.unit_variance, "loss": choices.loss_of}
+    if divided.plan:
+        print_plan(in_parts.planned_on_disk(path, wishes, folder, division, **chosen))
+        return True
+    with adjustment_status(job) as progress:
+        found = in_parts.adjusted_on_disk(
+            path, wishes, folder, division, **chosen, threads=threads, progress=progress
+        )
+    lines = [*found.lines(), f"what was found of each node: {folder / 'results'}"]
+    job.finish(
+        {target / "report.txt": ("\n".join(lines) + "\n").encode()},
+        summary=lambda: print_sections([("adjusted in parts", lines)], "report.txt"),
+        code=0 if found.outcome.status == "converged" else NOT_CONVERGED,
+    )
+    return True

@@ -1,0 +1,261 @@
+"""Fits of one case: rigid (FIDFIT2) and linear, with their residuals.
+
+A general linear transformation is taken apart into two scales, lack of orthogonality and rotation exactly,
+not to first order (NOAA TR NOS 57, equations 33 to 38, 46, 47 and 54).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from photogram.arguments.types import Floats, Indices
+from photogram.errors import AdjustmentError
+from photogram.lazy_dataclasses import dataclass
+
+__all__ = [
+    "AffineFit",
+    "Decomposition",
+    "Residuals",
+    "RigidFit",
+    "fit_affine",
+    "fit_rigid",
+    "rotation_matrix",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Residuals of the points of one case, in the handedness of the comparator.
+
+    Attributes
+    ----------
+    points
+        (n,) numbers of the points.
+    xy_um
+        (n, 2) comparator coordinates that the residuals belong to (X ADJ, Y ADJ), micrometres.
+    comparator_um
+        (n, 2) grid transformed into the comparator system less measured: what to add to the measurement.
+    grid_um
+        (n, 2) measurement transformed into the grid system less given grid: what to add to the given grid.
+    lost
+        Unknowns that a coordinate axis has lost to the adjustment: SIGMA divides by points less this.
+    """
+
+    points: Indices
+    xy_um: Floats
+    comparator_um: Floats
+    grid_um: Floats
+    lost: float
+
+    @property
+    def squares_um2(self) -> tuple[float, float, float, float]:
+        """Sums of squares: comparator x, y, grid X, Y (SUM VV)."""
+        x, y = (self.comparator_um**2).sum(axis=0)
+        grid_x, grid_y = (self.grid_um**2).sum(axis=0)
+        return float(x), float(y), float(grid_x), float(grid_y)
+
+    @property
+    def sigma_um(self) -> tuple[float, ...]:
+        """Root of each sum of squares over points less `lost` (SIGMA); NaN without redundancy."""
+        return tuple(self._sigma(square, 1) for square in self.squares_um2)
+
+    @property
+    def sigma0_um(self) -> float:
+        """Standard error of unit weight, comparator x and y (equations 52, 60); NaN without redundancy."""
+        return self._sigma(sum(self.squares_um2[:2]), 2)
+
+    def _sigma(self, square: float, axes: int) -> float:
+        dof = axes * (len(self.points) - self.lost)
+        return math.sqrt(square / dof) if dof > 1e-9 else math.nan
+
+
+def rotation_matrix(rotation_rad: float) -> Floats:
+    """Return M = [[cos, sin], [-sin, cos]]: grid = M (corrected comparator coordinates) + translation."""
+    c, s = math.cos(rotation_rad), math.sin(rotation_rad)
+    return np.array([[c, s], [-s, c]])
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """Two scales, lack of orthogonality, rotation.
+
+    Attributes
+    ----------
+    scale_x, scale_y
+        Multiply the readings.
+    nonorthogonality_rad
+        Angle between the y axis and the normal to the x axis; positive when the y axis leans toward +x.
+    rotation_rad
+        Of the plate against the comparator.
+    """
+
+    scale_x: float
+    scale_y: float
+    nonorthogonality_rad: float
+    rotation_rad: float
+
+    @classmethod
+    def of_inverse(cls, matrix: Floats) -> Decomposition:
+        """Take apart the matrix A = [[a, b], [c, d]] of comparator = A grid + shift (equation 47)."""
+        (a, b), (c, d) = matrix.tolist()
+        determinant = a * d - b * c
+        return cls(
+            math.hypot(c, d) / determinant,
+            math.hypot(a, b) / determinant,
+            math.atan2(-(a * c + b * d), determinant),
+            math.atan2(c, d),
+        )
+
+    @property
+    def linear_matrix(self) -> Floats:
+        """N S, the correction of readings for scales and lack of orthogonality (equation 34), 2 x 2."""
+        lean = self.nonorthogonality_rad
+        return np.array([[self.scale_x, self.scale_y * math.sin(lean)], [0.0, self.scale_y * math.cos(lean)]])
+
+    @property
+    def matrix(self) -> Floats:
+        """R = M N S of grid = R comparator + shift (equation 36), 2 x 2."""
+        product: Floats = rotation_matrix(self.rotation_rad) @ self.linear_matrix
+        return product
+
+
+def decomposition_jacobian(matrix: Floats) -> Floats:
+    """Return the partials of scales, lack of orthogonality and rotation by a, b, c, d (equation 54), 4 x 4.
+
+    In closed form: the listing divides by b and d, which vanish when the plate lies exactly along the axes.
+    """
+    (a, b), (c, d) = matrix.tolist()
+    determinant = a * d - b * c
+    w = a * c + b * d
+    cd, ab = math.hypot(c, d), math.hypot(a, b)
+    squared = determinant**2
+    return np.array(
+        [
+            [-d * cd / squared, c * cd / squared, d * w / (squared * cd), -c * w / (squared * cd)],
+            [-b * w / (squared * ab), a * w / (squared * ab), b * ab / squared, -a * ab / squared],
+            [b / ab**2, -a / ab**2, -d / cd**2, c / cd**2],
+            [0.0, 0.0, d / cd**2, -c / cd**2],
+        ]
+    )
+
+
+RIGID_LOST = 1.5
+"""Half of rotation and two translations: what each axis loses."""
+
+
+@dataclass(frozen=True, eq=False)
+class RigidFit:
+    """A rigid fit: grid = M(rotation) comparator + translation, in the handedness of the comparator."""
+
+    rotation_rad: float
+    translation_um: Floats
+    residuals: Residuals
+
+
+def fit_rigid(
+    points: Indices, xy_um: Floats, grid_um: Floats, *, lost: float = RIGID_LOST, as_listed: bool = False
+) -> RigidFit:
+    """Fit measured coordinates onto grid coordinates of the same handedness by rotation and translation.
+
+    The rotation is that of the least-squares similarity transformation, which is that of the rigid one as
+    well. `lost` are the unknowns of each axis, for the standard errors. `as_listed` turns residuals back with
+    the cosine and sine of the similarity transformation, without taking its scale out (1e-5 of them or so).
+    """
+    middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
+    d, g = xy_um - middle, grid_um - grid_middle
+    along = float((d * g).sum())
+    across = float((d[:, 1] * g[:, 0] - d[:, 0] * g[:, 1]).sum())
+    rotation = math.atan2(across, along)
+    matrix = rotation_matrix(rotation)
+    grid_residuals = d @ matrix.T - g
+    size = math.hypot(along, across) / float((d * d).sum()) if as_listed else 1.0
+    comparator = -size * grid_residuals @ matrix
+    return RigidFit(
+        rotation,
+        np.asarray(grid_middle - matrix @ middle),
+        Residuals(points, xy_um, comparator, grid_residuals, lost),
+    )
+
+
+LEAST_POINTS = 4
+"""Three points determine the transformation; the fourth says how good it is."""
+AFFINE_LOST = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class AffineFit:
+    """A linear fit of one case.
+
+    Attributes
+    ----------
+    coefficients, shift_um
+        (2, 2) and (2,): comparator = coefficients grid + shift (equation 40).
+    parameters
+        Scales, lack of orthogonality, rotation.
+    cofactors
+        (4, 4) of the parameters in that order, per um^2 of the variance of unit weight.
+    residuals
+        In both systems.
+    """
+
+    coefficients: Floats
+    shift_um: Floats
+    parameters: Decomposition
+    cofactors: Floats
+    residuals: Residuals
+
+    @property
+    def covariance(self) -> Floats:
+        """(4, 4) of scale x, scale y, lack of orthogonality (rad), rotation (rad) (equation 53)."""
+        return self.residuals.sigma0_um**2 * self.cofactors
+
+    @property
+    def translation_um(self) -> Floats:
+        """(2,) of grid = M N S comparator + translation: grid coordinates of the comparator's zero."""
+        return np.asarray(-np.linalg.solve(self.coefficients, self.shift_um))
+
+
+def fit_affine(points: Indices, xy_um: Floats, grid_um: Floats) -> AffineFit:
+    """Fit two scales, lack of orthogonality, rotation and translation; the grid is without error.
+
+    The form x + v = A X + T is linear; QR on centred coordinates takes the place of the listing's adjugate of
+    the normal equations.
+
+    Raises AdjustmentError: fewer than four points, or points in one line.
+
+    Parameters
+    ----------
+    points
+        (n,) numbers, four at least.
+    xy_um, grid_um
+        (n, 2) measured and grid coordinates in micrometres, of the same handedness.
+    """
+    if len(points) < LEAST_POINTS:
+        raise AdjustmentError(
+            f"{len(points)} points were measured; the linear adjustment needs {LEAST_POINTS} at least"
+        )
+    middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
+    centred = grid_um - grid_middle
+    q, r = np.linalg.qr(centred)
+    if np.abs(np.diag(r)).min() <= 1e-6 * np.abs(r).max():
+        raise AdjustmentError("the points measured lie in one line")
+    inverse = np.linalg.inv(r)
+    coefficients = (inverse @ (q.T @ (xy_um - middle))).T
+    if np.linalg.det(coefficients) <= 0:
+        raise AdjustmentError("the comparator is of the other handedness than the grid")
+    computed = centred @ coefficients.T + middle
+    comparator = computed - xy_um
+    # Grid residuals V = -A^-1 v.
+    grid_residuals = -np.linalg.solve(coefficients, comparator.T).T
+    block = inverse @ inverse.T
+    jacobian = decomposition_jacobian(coefficients)
+    cofactors = jacobian @ np.kron(np.eye(2), block) @ jacobian.T
+    return AffineFit(
+        coefficients,
+        np.asarray(middle - coefficients @ grid_middle),
+        Decomposition.of_inverse(coefficients),
+        cofactors,
+        Residuals(points, xy_um, comparator, grid_residuals, AFFINE_LOST),
+    )

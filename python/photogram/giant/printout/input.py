@@ -1,0 +1,197 @@
+"""The job as it was given: options (sample, page 0), frames (page 1), control (page 21), warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from photogram.giant.common import Common
+from photogram.giant.diagnostics import ErrorWarning
+from photogram.giant.ground import GroundPoint
+from photogram.giant.images import IMAGE_SD, ImageFrame
+from photogram.giant.printout.forms import (
+    Page,
+    Space,
+    Values,
+    attitude,
+    attitude_name,
+    dms,
+    fixed,
+    headed,
+    paginate,
+)
+from photogram.lazy_dataclasses import dataclass
+from photogram.network.refraction import Refraction
+
+__all__ = ["Station", "control_pages", "frame_pages", "options_page", "warning_pages"]
+
+
+UNIT_VARIANCE: dict[str, str] = {
+    "free": "UNIT VARIANCE WILL BE BASED ON COMPLETELY FREE CAMERA PARAMETERS",
+    "constrained": "UNIT VARIANCE WILL BE BASED ON CONSTRAINED CAMERA PARAMETERS",
+    "unity": "UNIT VARIANCE WILL BE SET TO UNITY",
+    "redundancy": "UNIT VARIANCE WILL BE BASED ON REDUNDANCY NUMBERS",
+}
+
+
+def options_page(
+    common: Common,
+    space: Space,
+    refraction: Refraction | None,
+    unit_variance: str | None = None,
+    *,
+    as_published: bool = False,
+) -> Page:
+    """Return the page of the options; the unit variance as COMMON says where none is given.
+
+    The sample shows one choice of most options only; `docs/giant-listing.md` says which lines are ours. As
+    published there is no linear unit of a rectangular job. `refraction` may be more than COMMON asks for.
+    """
+    air = refraction is not None and refraction.air is not None
+    water = refraction is not None and refraction.water is not None
+    lines = [
+        f"OBJECT SPACE REFERENCE SYSTEM IS {'GEOGRAPHIC' if space.geographic else 'RECTANGULAR'}",
+        f"ROTATION ANGLES ARE {'PHOTO-TO-GROUND' if common.photo_to_ground else 'GROUND-TO-PHOTO'}",
+        f"{'INTERSECTION ONLY' if common.intersection_only else 'COMPLETE TRIANGULATION'}"
+        " PROCESS IS REQUESTED",
+        f"ERROR PROPAGATION IS {'' if common.error_propagation else 'NOT '}REQUESTED",
+    ]
+    if common.error_propagation:
+        lines.append(UNIT_VARIANCE[unit_variance or common.unit_variance])
+    for medium, applied in (("ATMOSPHERIC", air), ("WATER", water)):
+        lines.append(f"{medium} REFRACTION WILL {'' if applied else 'NOT '}BE INCLUDED IN THE ADJUSTMENT")
+    lines.append(_residuals(common.residual_limit))
+    if common.strip:
+        lines.append(f"LEADING '{common.strip}' WILL BE ELIMINATED FROM ALL IDENTIFICATIONS")
+    if space.geographic or not as_published:
+        lines += _lengths(common, space)
+    if common.save_points:
+        lines.append("TRIANGULATED GROUND COORDINATES WILL BE SAVED")
+    if common.save_stations:
+        lines.append("ADJUSTED CAMERA STATION PARAMETERS WILL BE SAVED")
+    return ["", *(line for option in lines for line in (option, ""))]
+
+
+def _lengths(common: Common, space: Space) -> list[str]:
+    if not space.geographic:
+        return [f"LINEAR UNIT OF OBJECT SPACE = {space.linear_unit}"]
+    return [
+        f"SEMI-{axis} AXIS OF SPHEROID = {length:.3f} {space.linear_unit}"
+        for axis, length in (("MAJOR", common.semi_major), ("MINOR", common.semi_minor))
+    ]
+
+
+def _residuals(limit: float) -> str:
+    if limit == 0:
+        return "ALL IMAGE RESIDUALS WILL BE LISTED"
+    if limit < 0:
+        return "NO IMAGE RESIDUALS WILL BE LISTED"
+    return f"IMAGE RESIDUALS GREATER THAN {limit:.3f} (MM) WILL BE LISTED"
+
+
+def control_pages(
+    space: Space, ground: Iterable[GroundPoint], default_sd: tuple[float, float, float]
+) -> list[Page]:
+    """Return the pages of the control: ten points each, whether they are photographed or not.
+
+    Components that are not held are listed as they stand; `default_sd` stands for deviations of zero.
+    """
+    return paginate(headed("GROUND CONTROL DATA"), (_entry(space, point, default_sd) for point in ground))
+
+
+def _entry(space: Space, point: GroundPoint, default_sd: tuple[float, float, float]) -> list[str]:
+    sd = [given or default for given, default in zip(point.sd, default_sd, strict=True)]
+    first, second, third = (
+        f"{name} = {value}     ST. D. = {deviation}"
+        for name, value, deviation in zip(
+            space.names, space.values(point.position, 4), space.values(sd, 4), strict=True
+        )
+    )
+    return [
+        f"{'':10}{first}",
+        f"{point.name:<10}{second}     TYPE = {point.type_code}",
+        f"{'':10}{third}",
+        "",
+        "",
+    ]
+
+
+ACROSS = 4
+"""Plate coordinates, or names of points, on a line."""
+
+
+@dataclass(frozen=True)
+class Station:
+    """A camera station as it was given, in the units of the block, with the standard deviations in force."""
+
+    position: Values
+    attitude: Values
+    position_sd: Values
+    attitude_sd: Values
+    principal_distance: float
+
+
+def frame_pages(
+    space: Space,
+    photo_to_ground: bool,
+    station: Station,
+    images: ImageFrame,
+    *,
+    parameters: bool = True,
+    plates: bool = True,
+) -> list[Page]:
+    """Return the pages of a frame: station (COMMON column 3), plate coordinates (column 4), if asked for."""
+    x_sd, y_sd = (sd or IMAGE_SD for sd in images.sd)
+    frame = ["", f"FRAME  {images.name}", ""]
+    heading = [
+        *frame,
+        f"PRINCIPAL DISTANCE ={fixed(station.principal_distance, 12, 4)}"
+        f"     ST. D. OF X ={fixed(x_sd, 10, 4)}     ST. D. OF Y ={fixed(y_sd, 10, 4)}",
+        "",
+    ]
+    if parameters:
+        heading += _parameters(space, photo_to_ground, station)
+    columns = headed("PLATE COORDINATES", f"{'ID':<8}{'X':>10}{'Y':>11}    " * ACROSS)[1:] if plates else []
+    return paginate([*heading, *columns], _plates(images) if plates else [], again=[*frame, *columns])
+
+
+def _parameters(space: Space, photo_to_ground: bool, station: Station) -> Page:
+    sense = attitude_name(photo_to_ground)
+    lines = headed(
+        "CAMERA STATION PARAMETERS", f"{'P O S I T I O N':^49}{f'A T T I T U D E  ({sense})':^49}".rstrip()
+    )[1:]
+    rows = zip(
+        space.names,
+        space.values(station.position, 4),
+        space.values(station.position_sd, 4),
+        ("OMEGA", "PHI", "KAPPA"),
+        attitude(station.attitude),
+        (dms(each) for each in station.attitude_sd),
+        strict=True,
+    )
+    for name, value, sd, angle, turn, turn_sd in rows:
+        lines.append(f"{name} = {value}   ST. D. = {sd}     {angle:<5} = {turn}   ST. D. = {turn_sd}")
+    return [*lines, ""]
+
+
+def _plates(images: ImageFrame) -> list[Sequence[str]]:
+    cells = [
+        f"{name:<8}{fixed(x, 10, 4)}{fixed(y, 11, 4)}    "
+        for name, (x, y) in zip(images.points, images.xy.tolist(), strict=True)
+    ]
+    return [["".join(cells[row : row + ACROSS])] for row in range(0, len(cells), ACROSS)]
+
+
+def warning_pages(warnings: Iterable[ErrorWarning]) -> list[Page]:
+    """Return the pages of the warnings; none where there is nothing to warn of."""
+    entries = [entry for warning in warnings for entry in _entries(warning)]
+    return paginate([""], entries) if entries else []
+
+
+def _entries(warning: ErrorWarning) -> list[list[str]]:
+    """Keep the heading with the first names."""
+    heading = ["ERROR WARNINGS", ""] if warning.general else []
+    names = [
+        ["".join(f"{name:<20}" for name in warning.names[row : row + ACROSS])]
+        for row in range(0, len(warning.names), ACROSS)
+    ]
+    return [[*heading, warning.heading, "", *names[0]], *names[1:], ["", ""]]

@@ -1,0 +1,193 @@
+"""What was adjusted: stations, ground points (sample, pages 30 to 34, 41 to 54), corrections (page 35)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats
+from photogram.giant.printout.forms import (
+    MATRIX,
+    VALUE,
+    Page,
+    Space,
+    attitude,
+    attitude_name,
+    counts_and_rms,
+    headed,
+    matrix_rows,
+    paginate,
+)
+
+__all__ = ["correction_pages", "point_pages", "propagated_point_pages", "station_pages"]
+
+
+POSITION, ATTITUDE = VALUE + 5, VALUE + 7
+"""Columns of `LNG =` and `OMEGA =` with their values."""
+
+
+def station_pages(
+    space: Space,
+    photo_to_ground: bool,
+    names: Sequence[str],
+    positions: Floats,
+    attitudes: Floats,
+    covariances: Floats | None,
+) -> list[Page]:
+    """Return the pages of P stations, thirteen each; with their (P, 6, 6) covariances if there are any."""
+    matrix = "" if covariances is None else f"{'COVARIANCE MATRIX':^{MATRIX}}"
+    heading = headed(
+        "TRIANGULATED CAMERA STATIONS",
+        f"{'IDENT':<10}{'POSITION':^{POSITION}}{matrix}"
+        f"   {f'ATT({attitude_name(photo_to_ground)})':^{ATTITUDE}}{matrix}".rstrip(),
+    )
+    entries = (
+        _station(
+            space, name, positions[row], attitudes[row], None if covariances is None else covariances[row]
+        )
+        for row, name in enumerate(names)
+    )
+    return paginate(heading, entries)
+
+
+def _station(
+    space: Space, name: str, position: Floats, angles: Floats, covariance: Floats | None
+) -> list[str]:
+    rows = zip(
+        ("", name, ""),
+        space.names,
+        space.values(position, 4),
+        matrix_rows(None if covariance is None else covariance[:3, :3]),
+        ("OMEGA", "PHI", "KAPPA"),
+        attitude(angles),
+        matrix_rows(None if covariance is None else covariance[3:, 3:]),
+        strict=True,
+    )
+    lines = [
+        f"{ident:<10}{axis} ={value}{matrix}   {angle:<5} ={turn}{turn_matrix}"
+        for ident, axis, value, matrix, angle, turn, turn_matrix in rows
+    ]
+    return [*lines, ""]
+
+
+TITLE = "TRIANGULATED GROUND POINTS"
+IDENT = 18
+"""Columns of the name and the mark of control."""
+
+
+def point_pages(space: Space, names: Sequence[str], marks: Sequence[str], positions: Floats) -> list[Page]:
+    """Return the pages of n points without error propagation: a line for each, 52 on a page.
+
+    Marks are `*code*` for control, else nothing.
+    """
+    heading = headed(TITLE, f"{'IDENT':<{IDENT}}{'POSITION':^72}".rstrip())
+    return paginate(
+        heading,
+        (
+            [_ident(name, mark) + "   ".join(_labelled(space, space.values(position, 3)))]
+            for name, mark, position in zip(names, marks, positions.tolist(), strict=True)
+        ),
+    )
+
+
+def propagated_point_pages(
+    space: Space,
+    names: Sequence[str],
+    marks: Sequence[str],
+    positions: Floats,
+    covariances: Floats,
+    held: Bools,
+) -> list[Page]:
+    """Return the pages with covariances (n, 3, 3): three lines for each point, 13 on a page, and a summary.
+
+    Components that are held (n, 3) do not count in the summary.
+    """
+    heading = headed(
+        TITLE,
+        f"{'IDENT':<{IDENT}}{'POSITION':^{POSITION}}{'COVARIANCE MATRIX':^{MATRIX}}"
+        f"   {'STANDARD DEV':^{VALUE}}".rstrip(),
+    )
+    deviations = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    rows = zip(names, marks, positions.tolist(), covariances, deviations.tolist(), strict=True)
+    entries = (_entry(space, *row) for row in rows)
+    return paginate(heading, entries, closing=_summary(space, deviations, ~held))
+
+
+def _entry(
+    space: Space,
+    name: str,
+    mark: str,
+    position: Iterable[float],
+    covariance: Floats,
+    deviations: Iterable[float],
+) -> list[str]:
+    rows = zip(
+        ("", _ident(name, mark), ""),
+        _labelled(space, space.values(position, 4)),
+        matrix_rows(covariance),
+        space.values(deviations, 4),
+        strict=True,
+    )
+    lines = [f"{ident:<{IDENT}}{value}{matrix}   {sd}" for ident, value, matrix, sd in rows]
+    return [*lines, ""]
+
+
+def _ident(name: str, mark: str) -> str:
+    return f"{f'{name:<10}{mark}':<{IDENT}}"
+
+
+def _labelled(space: Space, values: Iterable[str]) -> list[str]:
+    return [f"{name} ={value}" for name, value in zip(space.names, values, strict=True)]
+
+
+def _summary(space: Space, deviations: Floats, counted: Bools) -> list[str]:
+    counts, rms = counts_and_rms(deviations, counted)
+    rows = zip(counts, _labelled(space, space.values(rms, 4)), strict=True)
+    return [
+        "SUMMARY STATISTICS FOR GROUND POINTS",
+        "RMS FOR STANDARD DEVIATIONS",
+        "",
+        *(f"COUNT ={count:>7d}     {value}" for count, value in rows),
+    ]
+
+
+ACROSS = 4
+"""Points on a line."""
+
+
+def correction_pages(
+    space: Space, names: Sequence[str], corrections: Floats, held: Bools, *, as_published: bool
+) -> list[Page]:
+    """Return the pages of the corrections (n, 3), NaN where there is none, with which components are held.
+
+    As published there is neither a line that says what is listed, nor number and rms of the components that
+    are not held.
+    """
+    meaning = "ADJUSTED MINUS INPUT; IN PARENTHESES: COMPONENT NOT HELD, ADJUSTED MINUS SUPPLIED VALUE"
+    heading = headed("CORRECTIONS APPLIED TO GROUND CONTROL", *([] if as_published else [meaning]))
+    cells = [_cells(space, *row) for row in zip(names, corrections.tolist(), held.tolist(), strict=True)]
+    entries = [
+        [*("".join(cell[line] for cell in cells[row : row + ACROSS]) for line in range(3)), ""]
+        for row in range(0, len(cells), ACROSS)
+    ]
+    known = np.isfinite(corrections)
+    closing = _of_components(space, corrections, known & held)
+    if not as_published:
+        closing += ["", "COMPONENTS NOT HELD", *_of_components(space, corrections, known & ~held)]
+    return paginate(heading, entries, closing=closing)
+
+
+def _cells(space: Space, name: str, values: Sequence[float], held: Sequence[bool]) -> list[str]:
+    """Three lines of 33 columns: the name, the label, and 17 for the value with its parentheses."""
+    rows = zip(("", name, ""), space.names, space.values(values, 3), held, strict=True)
+    return [
+        f"{ident:<9}{axis}={f' {value} ' if is_held else f'({value})'}   "
+        for ident, axis, value, is_held in rows
+    ]
+
+
+def _of_components(space: Space, corrections: Floats, counted: Bools) -> list[str]:
+    counts, rms = counts_and_rms(corrections, counted)
+    rows = zip(space.names, counts, space.values(rms, 3), strict=True)
+    return [f"{axis}     NUMBER OF COMPONENTS ={count:>6d}     RMS ={value}" for axis, count, value in rows]
