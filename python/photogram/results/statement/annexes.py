@@ -222,7 +222,7 @@ def _camera(found: Statement, camera: AdjustedCamera) -> list[Table]:
     if len(names) < 2:
         return [table, *_distortion(found, camera)]
     matrix = camera.correlations[np.ix_(estimated, estimated)].tolist()
-    rows = [
+    rows: list[Row] = [
         [name, *(cells.number(value, 2) for value in row)] for name, row in zip(names, matrix, strict=True)
     ]
     heads = [cells.column("parameter", text=True), *map(Column, names)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -216,7 +217,7 @@ def _metrology(found: Statement) -> list[Section]:
     if lengths is not None:
         test, decimals = lengths.test, decimals_for(lengths.test.sd)
         limits = np.full(len(lengths.lines), math.nan) if test.limits is None else test.limits
-        columns = [
+        columns: list[tuple[Column, Callable[[int], Cell | str | float | None]]] = [
             (cells.column("line", text=True), lambda k: f"{lengths.lines[k]}: {' – '.join(lengths.ends[k])}"),
             cells.numbers("length", lengths.calibrated, decimals, unit),
             cells.numbers("error", test.errors, decimals, unit),
