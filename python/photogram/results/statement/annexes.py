@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -222,7 +223,7 @@ def _camera(found: Statement, camera: AdjustedCamera) -> list[Table]:
     if len(names) < 2:
         return [table, *_distortion(found, camera)]
     matrix = camera.correlations[np.ix_(estimated, estimated)].tolist()
-    rows: list[Row] = [
+    rows: list[list[Any]] = [
         [name, *(cells.number(value, 2) for value in row)] for name, row in zip(names, matrix, strict=True)
     ]
     heads = [cells.column("parameter", text=True), *map(Column, names)]

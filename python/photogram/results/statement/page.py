@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -217,7 +216,7 @@ def _metrology(found: Statement) -> list[Section]:
     if lengths is not None:
         test, decimals = lengths.test, decimals_for(lengths.test.sd)
         limits = np.full(len(lengths.lines), math.nan) if test.limits is None else test.limits
-        columns: list[tuple[Column, Callable[[int], Cell | str | float | None]]] = [
+        columns: list[tuple[Column, Any]] = [
             (cells.column("line", text=True), lambda k: f"{lengths.lines[k]}: {' – '.join(lengths.ends[k])}"),
             cells.numbers("length", lengths.calibrated, decimals, unit),
             cells.numbers("error", test.errors, decimals, unit),
