@@ -12,8 +12,14 @@ type Term = (usize, usize, f64, usize, usize);
 
 /// The terms of each component: the parameter, i and j, and the number where it is not one.
 macro_rules! terms {
+    (@) => {
+        1.0
+    };
+    (@$number:expr) => {
+        $number
+    };
     ($($component:literal: $($parameter:literal($i:literal $j:literal) $(* $number:expr)?),+;)+) => {
-        &[$($(($parameter, $component, 1.0 $(* $number)?, $i, $j),)+)+]
+        &[$($(($parameter, $component, terms!(@$($number)?), $i, $j),)+)+]
     };
 }
 
