@@ -23,6 +23,7 @@ __all__ = [
     "NOTABLE",
     "control_lines",
     "image_lines",
+    "largest",
     "is_held",
     "observed_lines",
     "suspect_lines",
@@ -35,7 +36,7 @@ NOTABLE = 3.0
 SUSPECTS = 20
 """Image coordinates with large test values that are listed at most."""
 LISTED = 10_000
-"""Image points that a report lists at most; tables and documents have every one."""
+"""Photos, points, observations of a kind that a report lists at most; tables and documents have every one."""
 
 
 def tested_observations(result: AdjustedNetwork) -> list[Observations]:
@@ -92,10 +93,22 @@ def image_lines(result: AdjustedNetwork) -> list[str]:
     return found
 
 
+def largest(table: Sequence[Quantity], sizes: Floats, of: str) -> tuple[list[Quantity], list[str]]:
+    """Return what a report lists of a table, those with the largest sizes (r,), and a line on all others."""
+    if len(sizes) <= LISTED:
+        return [*table], []
+    rows = np.sort(np.argsort(-np.nan_to_num(sizes), kind="stable")[:LISTED])
+    more = f"and {len(sizes) - LISTED} more, of smaller {of}; the JSON document and the tables have all"
+    return chosen(table, rows), [more]
+
+
 def observed_lines(table: Sequence[Quantity], kind: str) -> list[str]:
     """List observed photos or points, four lines for each: what was observed, and how it fits."""
     forms = {"sd": ".5f", "difference": ".5f", "redundancy": ".3f", "standardized": ".2f"}
-    return stacked(table[0], kind, [(labelled(table, label), form) for label, form in forms.items()])
+    tests = np.nan_to_num(np.abs(labelled(table, "standardized").values))
+    table, more = largest(table, tests.max(axis=1, initial=0.0), "test values")
+    lines = stacked(table[0], kind, [(labelled(table, label), form) for label, form in forms.items()])
+    return [*lines, *more]
 
 
 def is_held(control: Observed) -> Bools:

@@ -28,6 +28,7 @@ from photogram.results.observation_rows import (
     NOTABLE,
     control_lines,
     image_lines,
+    largest,
     observed_lines,
     suspect_lines,
     tested_observations,
@@ -288,6 +289,9 @@ def _kind(result: Result, kind: ObservedKind) -> list[str]:
         worst = np.sort(np.argsort(-tests, kind="stable")[:WORST])
         note = [f"{len(worst)} of {len(tests)} components, with the largest test values; the table has all"]
         table = chosen(table, worst)
+    else:
+        tests = np.nan_to_num(np.abs(labelled(table, "standardized").values))
+        table, note = largest(table, tests, "test values")
     _, of, names, _, *numbers = table
     forms = [_decimals_of(labelled(numbers, "sd"), 5)] * 2 + [".3f", ".2f"]
     fields = [field(each, 14, form, str(each.label)) for each, form in zip(numbers, forms, strict=True)]
@@ -356,13 +360,14 @@ def _datum(result: Result) -> list[str]:
 
 
 def _photos(result: Result) -> list[str]:
-    names, values, sd = photos(result)
+    sizes = np.linalg.norm(result.photo_sd[:, :3] * _lengths(result), axis=1)
+    (names, values, sd), more = largest(photos(result), sizes, "standard deviations")
     place, turn, unit = slice(0, 3), slice(3, 6), "sd {unit}"
     blank = Field(f"{'':<10}", [f"{'':<10}"] * len(names.values))
     first = [*field(part(values, place), 20, ".4f"), *field(part(values, turn), 15, ".7f")]
     second = [*field(part(sd, place), 20, ".5f", unit), *field(part(sd, turn), 15, ".3f", unit)]
-    table = table_lines([*field(names, 10, head="photo"), *first], [blank, *second, *_long(result, sd)])
-    return [*_datum(result), *([POSES] if result.block.timed else []), *table]
+    lines = table_lines([*field(names, 10, head="photo"), *first], [blank, *second, *_long(result, sd)])
+    return [*_datum(result), *([POSES] if result.block.timed else []), *lines, *more]
 
 
 def _held_cameras(result: Result) -> list[str]:
@@ -374,12 +379,14 @@ def _held_cameras(result: Result) -> list[str]:
 
 
 def _points(result: Result) -> list[str]:
-    names, kinds, rays, values, sd = points(result)
+    table = points(result)
+    sizes = np.linalg.norm(np.asarray(table[-1].values) * _lengths(result), axis=1)
+    (names, kinds, rays, values, sd), more = largest(table, sizes, "standard deviations")
     blank = Field(f"{'':<10}", [f"{'':<10}"] * len(names.values))
     rest = [*field(rays, 4, ".0f", "rays", "  "), *field(kinds, 0, head="kind", gap="  ")]
     first = [*field(names, 10, head="point"), *field(values, 20, ".4f"), *rest]
-    table = table_lines(first, [blank, *field(sd, 20, ".5f", "sd {unit}"), *_long(result, sd)])
-    return [*_datum(result), *table]
+    lines = table_lines(first, [blank, *field(sd, 20, ".5f", "sd {unit}"), *_long(result, sd)])
+    return [*_datum(result), *lines, *more]
 
 
 def _work(result: Result) -> list[str]:
