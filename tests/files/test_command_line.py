@@ -221,7 +221,7 @@ def writes(tree):
             yield name, node.lineno
 
 
-IN_RUNS = {f"distributed/{name}.py" for name in ("core", "executors", "files", "run", "running", "tasks")} | {
+IN_RUNS = {f"distributed/{name}.py" for name in ("executors", "files", "nodes", "run", "tasks")} | {
     "formats/in_parts.py",
     "formats/plain/batches.py",
 }

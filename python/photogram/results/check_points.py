@@ -116,7 +116,7 @@ def _agreement(
         found.differences,
         network.point_cofactors[found.rows],
         survey,
-        name=lambda place: found.names[place[0]],
+        name=partial(_named, found.names),
         apart=partial(_apart, found.differences, point_axes(block)),
     )
     if not whole:
@@ -129,6 +129,11 @@ def _agreement(
         except AdjustmentError:  # not enough memory, or singular by rounding: the single tests stand
             return alone
     return replace(alone, together=asked(found.differences[some], joint, survey[some]).together)
+
+
+def _named(names: tuple[str, ...], place: tuple[int, ...]) -> str:
+    """Return the name of a point; results are pickled with what names their tests."""
+    return names[place[0]]
 
 
 def together(count: int) -> slice:

@@ -152,6 +152,17 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// The covariance matrix of a point's coordinates: its cofactors times the variance of unit weight. None where it was left out, or where
+    /// there are no degrees of freedom.
+    pub fn covariance_of_point(&self, point: usize) -> Option<Matrix3> {
+        Some(self.points.get(point)?.as_ref()?.cofactors * self.variance_of_unit_weight?)
+    }
+
+    /// The same of the unknowns of a photo: its pose and, unless it is held or shared, its camera.
+    pub fn covariance_of_photo(&self, photo: usize) -> Option<DMatrix<f64>> {
+        Some(&self.photos.get(photo)?.cofactors * self.variance_of_unit_weight?)
+    }
+
     /// The observations beside images by kind; `network` is the one that was adjusted.
     pub fn kinds(&self, network: &Network) -> Vec<KindSums> {
         KindSums::all(&network.observations, &self.observations)

@@ -514,9 +514,9 @@ TABLES: Mapping[str, Schema] = {
         ("covariance",),
         "`kind`, `name`, `first`, `second`, `covariance`: what was determined together of a `camera`"
         " (parameters), or of a `lever arm`, `shift`, `drift`, `boresight`, `instrument`, `level`, `plane`,"
-        " `line`, `plumb line`, `sensor`, `gyro bias`, `position coefficient`, `rotation coefficient`"
-        " (components as [observations](observations.md) call them); one triangle with its diagonal, what is"
-        " missing is 0",
+        " `line`, `plumb line`, `sensor`, `bend` (of a board: x, y), `gyro bias`, `position coefficient`,"
+        " `rotation coefficient` (components as [observations](observations.md) call them); one triangle with"
+        " its diagonal, what is missing is 0",
     ),
 }
 """In the order in which they are read and written."""
