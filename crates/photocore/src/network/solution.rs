@@ -13,6 +13,7 @@ use super::{
     KindSums, Network, NetworkError, Options, State, UnitVariance, WeakPoint,
 };
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
+use crate::geometry::Matrix3;
 
 /// A redundancy of less is rounding.
 pub const LEAST_REDUNDANCY: f64 = 1e-9;
