@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
@@ -15,7 +16,7 @@ except SystemExit as end:
     assert not end.code, end.code
 """
 HEAVY = ("matplotlib", "jinja2", "pandas", "pyarrow", "pyproj", "geopandas", "scipy", "erfa", "tetra3rs")
-SHOWING = ("rich", "typer", "photogram.results.report", "photogram.results.html", "photogram.show.page")
+SHOWING = ("rich", "typer", "photogram.results.report", "photogram.show.html", "photogram.show.page")
 NUMERICAL = ("numpy", "orjson", "photogram._photocore")
 SELDOM = (
     "difflib",
@@ -48,6 +49,11 @@ def loaded(program, among, folder):
         [sys.executable, "-c", program + said], check=True, capture_output=True, text=True, cwd=folder
     )
     return done.stderr.split()
+
+
+def test_what_must_not_be_loaded_is_there():
+    listed = (*SHOWING, *NUMERICAL, *SELDOM, *OF_OTHERS)
+    assert [name for name in listed if name.startswith("photogram.") and find_spec(name) is None] == []
 
 
 @pytest.mark.parametrize(

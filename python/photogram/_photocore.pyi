@@ -966,7 +966,7 @@ def judge_full_step(
     unknowns: int,
     tolerance: float,
 ) -> str:
-    """Return what a full step is, by the rules of one process; see `adjustment/history.rs`.
+    """Return what a full step is, by the rules of one process; see `adjustment/options.rs`.
 
     Parameters
     ----------

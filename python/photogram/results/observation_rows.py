@@ -8,7 +8,7 @@ from itertools import chain
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.messages import counted, listed
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.network_tables import control, images, part, terms_of
@@ -25,6 +25,7 @@ __all__ = [
     "image_lines",
     "is_held",
     "largest",
+    "largest_of",
     "observed_lines",
     "suspect_lines",
     "tested_observations",
@@ -97,9 +98,13 @@ def largest(table: Sequence[Quantity], sizes: Floats, of: str) -> tuple[list[Qua
     """Return what a report lists of a table, those with the largest sizes (r,), and a line on all others."""
     if len(sizes) <= LISTED:
         return [*table], []
-    rows = np.sort(np.argsort(-np.nan_to_num(sizes), kind="stable")[:LISTED])
     more = f"and {len(sizes) - LISTED} more, of smaller {of}; the JSON document and the tables have all"
-    return chosen(table, rows), [more]
+    return chosen(table, largest_of(sizes, LISTED)), [more]
+
+
+def largest_of(sizes: Floats, most: int) -> Indices:
+    """Return the rows of the `most` largest sizes, in their order; those that are not known are the smallest."""
+    return np.sort(np.argsort(-np.nan_to_num(sizes), kind="stable")[:most])
 
 
 def observed_lines(table: Sequence[Quantity], kind: str) -> list[str]:

@@ -29,6 +29,7 @@ from photogram.results.observation_rows import (
     control_lines,
     image_lines,
     largest,
+    largest_of,
     observed_lines,
     suspect_lines,
     tested_observations,
@@ -281,16 +282,15 @@ def _check_points(result: Result) -> list[str]:
 
 def _kind(result: Result, kind: ObservedKind) -> list[str]:
     """Write a line for each component of every observation; of many of trajectories, of the worst."""
-    table, note = observed_components([kind]), list[str]()
+    table = observed_components([kind])
+    tests = np.abs(labelled(table, "standardized").values)
     if len(kind.rows) > FLOWN and any(
         _is_flown(result.block.observations[row]) for row in kind.rows.tolist()
     ):
-        tests = np.nan_to_num(np.abs(labelled(table, "standardized").values))
-        worst = np.sort(np.argsort(-tests, kind="stable")[:WORST])
+        worst = largest_of(tests, WORST)
         note = [f"{len(worst)} of {len(tests)} components, with the largest test values; the table has all"]
         table = chosen(table, worst)
     else:
-        tests = np.nan_to_num(np.abs(labelled(table, "standardized").values))
         table, note = largest(table, tests, "test values")
     _, of, names, _, *numbers = table
     forms = [_decimals_of(labelled(numbers, "sd"), 5)] * 2 + [".3f", ".2f"]
