@@ -103,7 +103,7 @@ def largest(table: Sequence[Quantity], sizes: Floats, of: str) -> tuple[list[Qua
 
 
 def largest_of(sizes: Floats, most: int) -> Indices:
-    """Return the rows of the `most` largest sizes, in their order; those that are not known are the smallest."""
+    """Return the rows of the `most` largest sizes, in their order; unknown ones are the smallest."""
     return np.sort(np.argsort(-np.nan_to_num(sizes), kind="stable")[:most])
 
 
