@@ -11,8 +11,6 @@ from pathlib import Path
 
 from photogram.errors import OutOfMemoryError
 
-__all__ = ["available_memory", "gibibytes", "give_back", "require", "resident_memory", "turned"]
-
 GROUPS = (
     # Version 2, alone and beside version 1; then version 1.
     ("", "sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),

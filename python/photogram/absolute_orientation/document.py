@@ -21,8 +21,6 @@ from photogram.show.methods import document_of
 from photogram.show.quantity import records
 from photogram.statistics.limits import GlobalTest
 
-__all__ = ["point_rows", "read_similarity", "to_json", "without_points"]
-
 
 @document_of.register(Orientation)
 def to_json(result: Orientation) -> bytes:

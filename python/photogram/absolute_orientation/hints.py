@@ -17,9 +17,6 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.likelihood import judged
 
-__all__ = ["Fit", "Hint", "Trial", "find", "trials", "undecided", "unit_of"]
-
-
 FOOT = 0.3048
 STATIONS = 60
 """Stations that are tried one by one, at the most."""

@@ -23,8 +23,6 @@ from photogram.network.datum import MinimumConstraints
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 
-__all__ = ["Model", "Strip", "relative_model", "strip_of"]
-
 LEAST = 5
 """Points that determine the relative orientation of two photos."""
 

@@ -23,8 +23,6 @@ from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Facts, Page, Part, Section, significant
 from photogram.show.quantity import chosen, long
 
-__all__ = ["orientation_page"]
-
 LISTED = 300
 """Transformed points that are listed at most."""
 

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["figure", "residuals"]
-
-
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
 WIDE = 4.0

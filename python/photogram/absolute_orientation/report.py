@@ -24,8 +24,6 @@ from photogram.show.lines import Field, fact_lines, field, marks, table_lines
 from photogram.show.methods import report_of
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 
-__all__ = ["summary", "trace_text"]
-
 
 @report_of.register(Orientation)
 def report(result: Orientation) -> str:

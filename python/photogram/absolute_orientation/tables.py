@@ -15,9 +15,6 @@ from photogram.show.quantity import Axis, Quantity, chosen, frame, long
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["cycles", "facts", "left_out", "parameters", "points", "rotation", "stations", "tested_control"]
-
-
 _STARTS = {
     "restart": "a former result",
     "report": "the first two stations",

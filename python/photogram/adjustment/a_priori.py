@@ -12,8 +12,6 @@ from photogram.network.motion import on_shared, scanners
 from photogram.network.observations import Attitude, Control, Position
 from photogram.network.unknowns import Boresight, LeverArm
 
-__all__ = ["Known"]
-
 
 @dataclass(frozen=True, eq=False)
 class Known:

@@ -12,8 +12,6 @@ from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["resection_findings"]
-
 UNKNOWNS = ("X", "Y", "Z", "omega", "phi", "kappa")
 
 

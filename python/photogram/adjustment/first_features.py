@@ -20,8 +20,6 @@ from photogram.network.rays import meet
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
 
-__all__ = ["started"]
-
 FLAT = 1e-3
 """Points of a plane whose spread across their longest extent is less, in parts of this, lie on a line."""
 

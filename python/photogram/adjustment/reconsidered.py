@@ -28,8 +28,6 @@ from photogram.network.motion import timed_photos
 from photogram.network.subset import kept_images
 from photogram.results.result import Result
 
-__all__ = ["adjust_started"]
-
 FITS = 10.0
 """Standard deviations, by the median of the images that take part, within which an image returns: the tests
 name what is wrong by so much, and the adjustment bears it; what is beyond would bend it."""

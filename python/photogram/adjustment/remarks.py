@@ -11,25 +11,11 @@ from photogram import _photocore
 from photogram.adjustment.undetermined import named_unknowns, weak_in_words
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, Undetermined, listed
-from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
+from photogram.network.block import Block, position_columns
 from photogram.network.motion import on_shared
 from photogram.network.refraction import metres_per_unit
+from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import Coefficient
-
-__all__ = [
-    "behind",
-    "check_cameras",
-    "folded",
-    "hardly_determined",
-    "harmful",
-    "harmful_points",
-    "hidden",
-    "refraction_remarks",
-    "rounded",
-    "too_coarse",
-    "undetermined",
-]
-
 
 NEAR = 1e-3
 """A point nearer to a station than this part of the median of such distances is at its place."""

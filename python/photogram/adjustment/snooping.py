@@ -46,8 +46,9 @@ from photogram.results.suspects import network_trial
 from photogram.show.methods import Way
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
-from photogram.statistics.snooping.snooping import Outcome, Settings, snooped
+from photogram.statistics.snooping.snooping import Outcome, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
+from photogram.statistics.snooping.taking_out import Settings
 
 __all__ = [
     "block_trial",

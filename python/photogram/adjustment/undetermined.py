@@ -20,17 +20,6 @@ from photogram.network.unknowns import Unknown
 if TYPE_CHECKING:
     from photogram import _photocore
 
-__all__ = [
-    "Setting",
-    "in_words",
-    "named_unknowns",
-    "of_motion",
-    "outside",
-    "undetermined_combinations",
-    "weak_in_words",
-]
-
-
 _Combination = tuple[
     tuple[int, ...], tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...], tuple[str, ...]
 ]

@@ -27,8 +27,6 @@ from photogram.arguments.arrays import is_masked, number, one_of, shown, truth_v
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 
-__all__ = ["check_arguments", "check_members", "path"]
-
 Check = Callable[[str, Any], Any]
 """Takes the name of an argument and its value; returns the value, converted where it must be, or raises."""
 _MARK = "_checks_arguments"

@@ -21,28 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
 
-__all__ = [
-    "chosen",
-    "finite_rows",
-    "freeze_fields",
-    "frozen",
-    "indices",
-    "is_covariance",
-    "is_masked",
-    "length",
-    "names",
-    "natural_order",
-    "number",
-    "numbers",
-    "one_of",
-    "shaped",
-    "shown",
-    "standard_deviations",
-    "text",
-    "truth_value",
-    "whole_number",
-]
-
 _SYMMETRIC = 1e-9
 """What a covariance matrix may be unsymmetric by, relative to its diagonal."""
 _ROUNDING = 1e-6

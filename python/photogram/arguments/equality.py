@@ -8,8 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-__all__ = ["Valued", "alike"]
-
 
 class Valued:
     """A data class whose instances are equal where all their fields are; NaN counts as equal to NaN.

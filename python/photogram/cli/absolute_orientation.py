@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation.cards import Deck
     from photogram.io.writing import OutputSet
 
-__all__ = ["absolute_orientation", "relative", "transform"]
-
 SHOWN = 40
 """Lines of a section that the summary shows at most."""
 TRANSFORMED = "points-transformed.csv"

@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     from photogram.show.page import Section as Chapter
     from photogram.show.sections import Section
 
-__all__ = ["adjust", "adjusted_block", "result_at", "started_block"]
-
 
 @with_job
 def adjust(

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from photogram.show.page import Page
     from photogram.targets import Board, Calibrated, Calibration, ViewPlan
 
-__all__ = ["calibrate"]
-
-
 EXAMPLE = ("board",)
 """The packaged example, a directory of photogram.examples."""
 

@@ -16,9 +16,6 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from photogram.targets import Board, Calibration
 
-__all__ = ["PriorName", "Seen"]
-
-
 ShapeName = Literal["held", "bend", "points"]
 """What of a board is unknown."""
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from photogram.film import Certificate
     from photogram.film.years import DatedCamera
 
-__all__ = ["certificate", "compare"]
-
 EXAMPLE = ("certificate", "rc10.toml")
 """The packaged example, in photogram.examples."""
 

@@ -18,8 +18,6 @@ from photogram.cli.projects import Additions, Example, ProjectPath, described, p
 if TYPE_CHECKING:
     from photogram.diagnosis.findings import Diagnosis
 
-__all__ = ["EXAMPLE", "check", "check_project"]
-
 EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""
 

@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.formats import Project
 
-__all__ = ["Choices", "LossName"]
-
-
 LossName = Literal["none", "huber", "cauchy"]
 """What is minimised."""
 

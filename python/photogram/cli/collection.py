@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from photogram.adjustment import robust
     from photogram.collection import AdjustedCollection, Collection
 
-__all__ = ["collection"]
-
 EXAMPLE = ("collection", "ring.txt")
 """The packaged example, in photogram.examples."""
 PACKED = (".bz2", ".gz")

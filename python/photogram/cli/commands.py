@@ -18,8 +18,6 @@ from photogram.cli.panels import Command
 if TYPE_CHECKING:
     app: typer.Typer
 
-__all__ = ["COMMANDS", "app", "application"]
-
 ADJUST = (
     "Examples: `photogram adjust --example`,"
     " `photogram adjust sparse/0 --control control.csv --control-crs EPSG:25832`,"

@@ -22,8 +22,6 @@ from photogram.cli.options import Quiet, default_out, out_option
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
-__all__ = ["comparator", "compare", "correct"]
-
 EXAMPLE = ("comparator", "comparator-3.txt")
 """The packaged example, a deck in photogram.examples."""
 

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from photogram.show.sections import Section
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["COMPONENTS", "Components", "Found", "UnitVarianceName", "snooped"]
-
 Network = TypeVar("Network", bound="AdjustedNetwork")
 COMPONENTS = "components.txt"
 """What goes to the output directory where variance components are asked for."""

@@ -17,19 +17,6 @@ from photogram.messages import printable
 if TYPE_CHECKING:
     from photogram.show.sections import Section
 
-__all__ = [
-    "NOT_CONVERGED",
-    "SHOWN",
-    "errors",
-    "failures",
-    "output",
-    "print_remark",
-    "print_report",
-    "print_sections",
-    "print_withheld",
-    "print_written",
-]
-
 INPUT_ERROR = 1
 NOT_CONVERGED = 3
 NOT_USABLE = 4

@@ -12,8 +12,6 @@ from photogram.cli.job import InputFile, Job, Writes, with_job
 from photogram.cli.options import Quiet
 from photogram.cli.projects import Additions, Example, described, project_path, read_project
 
-__all__ = ["convert"]
-
 
 @with_job
 def convert(

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from photogram.network.cameras import Camera
     from photogram.targets import Conversion
 
-__all__ = ["convert_lens"]
-
 BEYOND_TOLERANCE = 4
 """The exit code of a difference that is larger than asked."""
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from photogram.show.page import Drawing, Page
     from photogram.show.sections import Section
 
-__all__ = ["TEXT", "Crs", "Documents", "OfPrograms", "PageAndJson", "Pictures", "check_maps"]
-
 TEXT, HTML = "report.txt", "report.html"
 """The reports, in a directory of results."""
 NEEDED = ("jinja2", "matplotlib")

@@ -16,8 +16,6 @@ from photogram.lazy_dataclasses import dataclass, fields
 if TYPE_CHECKING:
     from photogram.results.features import Definition
 
-__all__ = ["features"]
-
 Given = list[str] | None
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from photogram import Result
     from photogram.show.sections import Section
 
-__all__ = ["film", "marks"]
-
 EXAMPLE = ("archive",)
 """The packaged example, in photogram.examples."""
 

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from photogram.giant import Limits, Project
     from photogram.giant.common import Common
 
-__all__ = ["giant"]
-
 RESULTS = ("FRAMES", "GROUND", "RESTART", "report.txt")
 """What goes to the output directory."""
 

@@ -6,8 +6,6 @@ from typing import Any
 
 from typer.core import TyperGroup
 
-__all__ = ["GroupWithMain"]
-
 
 class GroupWithMain(TyperGroup):
     """A group whose first command is run when the first word names none.

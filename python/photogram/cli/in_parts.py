@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from photogram.distributed import Division
     from photogram.distributed.plan import PartsPlan
 
-__all__ = ["Parts", "adjusted_on_disk", "print_plan"]
-
 TAKEN = frozenset(
     (
         *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--loss", "--keep-all"),

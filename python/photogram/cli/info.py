@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.show.sections import Section
 
-__all__ = ["info"]
-
 CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 """What accuracy classes are of."""
 

@@ -31,18 +31,6 @@ if TYPE_CHECKING:
     from photogram.io.writing import Content, OutputSet
     from photogram.show.run import Run
 
-__all__ = [
-    "InputFile",
-    "Job",
-    "OutputFile",
-    "OutputFolder",
-    "Reads",
-    "Without",
-    "Writes",
-    "roles",
-    "with_job",
-]
-
 STANDS = {"example": "--example", "plan_views": "--plan"}
 """Options that stand for the first argument of a command, by their parameters."""
 LARGEST = 2**53

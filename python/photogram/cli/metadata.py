@@ -12,8 +12,6 @@ from photogram.cli.job import Job, OutputFile, Reads, with_job
 from photogram.cli.options import Quiet
 from photogram.cli.projects import Deviations, MrkAntenna, PhotosCrs
 
-__all__ = ["metadata"]
-
 
 @with_job
 def metadata(

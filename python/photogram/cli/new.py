@@ -11,9 +11,6 @@ from photogram.cli.job import Job, Writes, with_job
 from photogram.cli.options import Quiet
 from photogram.cli.projects import EXAMPLE
 
-__all__ = ["new"]
-
-
 Kind = Literal["block", "metrology", "survey", "rolling", "archive", "night", "board"]
 """What a project begins with."""
 

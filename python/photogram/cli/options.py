@@ -11,25 +11,6 @@ import typer
 from photogram.cli.job import OutputFile
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = [
-    "AirModel",
-    "JsonFile",
-    "Ordering",
-    "OrderingName",
-    "PictureFormat",
-    "Plots",
-    "Quiet",
-    "Snooping",
-    "Strict",
-    "Threads",
-    "UnitWeight",
-    "WaterModel",
-    "default_out",
-    "example_out",
-    "out_option",
-    "pair",
-]
-
 PictureFormat = Literal["png", "pdf", "svg"]
 UnitWeight = Literal["known", "unknown"]
 OrderingName = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissection"]

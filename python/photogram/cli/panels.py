@@ -6,8 +6,6 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-__all__ = ["Command"]
-
 PANELS = {
     "Input": "example day name packaged file_format control control_crs columns roles images names camera sd"
     " settings cubes jigsaw photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"

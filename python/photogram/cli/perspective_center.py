@@ -16,8 +16,6 @@ from photogram.cli.options import Quiet, Strict, example_out, out_option
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
 
-__all__ = ["perspective_center"]
-
 EXAMPLE = ("perspective_center", "grid.deck")
 """The packaged example, in photogram.examples."""
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from photogram import Block
     from photogram.planning import Plan
 
-__all__ = ["plan"]
-
 
 @with_job
 def plan(

@@ -13,9 +13,6 @@ if TYPE_CHECKING:
 
     from photogram import Progress
 
-__all__ = ["adjustment_status", "estimation_status", "shown"]
-
-
 _PHASES = {"form": "normal equations", "solve": "solution", "invert": "standard deviations"}
 """What the phases of the core are for."""
 

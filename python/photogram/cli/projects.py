@@ -16,21 +16,6 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.show.sections import Section
 
-__all__ = [
-    "EXAMPLE",
-    "NOTHING",
-    "Additions",
-    "Deviations",
-    "Example",
-    "MrkAntenna",
-    "OriginName",
-    "PhotosCrs",
-    "ProjectPath",
-    "described",
-    "project_path",
-    "read_project",
-]
-
 EXAMPLE = ("project",)
 """The packaged example, a directory of photogram.examples."""
 

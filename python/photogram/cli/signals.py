@@ -7,8 +7,6 @@ import signal
 import sys
 from types import FrameType
 
-__all__ = ["end_by_signals", "ignore_signals"]
-
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 SHOW_CURSOR = b"\x1b[?25h\r\x1b[K"
 """Ends a status line: rich hides the cursor meanwhile."""

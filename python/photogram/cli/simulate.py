@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from photogram.network.block import Block
     from photogram.network.simulation import Simulation
 
-__all__ = ["simulate"]
-
 
 @with_job
 def simulate(

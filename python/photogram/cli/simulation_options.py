@@ -13,8 +13,6 @@ from photogram.lazy_dataclasses import dataclass, fields
 if TYPE_CHECKING:
     from photogram.network.simulated_motion import LineScanner, RollingShutter
 
-__all__ = ["Control", "MotionOptions", "NetworkOptions"]
-
 Control = Literal["perimeter", "corners", "none"]
 """Where the control of a simulated block is."""
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from photogram.results.statement.statement import Statement
     from photogram.show.sections import Section
 
-__all__ = ["statement"]
-
 
 def _text(name: str, what: str, metavar: str = "TEXT") -> Any:
     return typer.Option(f"--{name}", metavar=metavar, help=what)

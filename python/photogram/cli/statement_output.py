@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from photogram import Result
     from photogram.results.statement.statement import Statement
 
-__all__ = ["stated", "statement_files"]
-
 
 def stated(
     job: Job,

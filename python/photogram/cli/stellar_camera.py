@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
 
-__all__ = ["exposures", "places", "stellar_camera"]
-
 Out = Annotated[
     OutputFolder,
     out_option("Directory for report.html, listing, camera and pictures. Default: INPUT-calibrated, here."),

@@ -8,8 +8,6 @@ import sys
 from contextlib import suppress
 from io import TextIOWrapper
 
-__all__ = ["finish", "open_streams", "stream_fault"]
-
 OUTPUT_FAULT = 1
 STREAM_FAULTS = (errno.ENOSPC, errno.EIO, errno.EFBIG, errno.EBADF)
 """What writing to a standard stream ends in."""

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from photogram.targets.calibration_result import WorthOptions
     from photogram.targets.cross_validation import Into
 
-__all__ = ["NOT_GOOD_ENOUGH", "Uncertainty", "distances_of"]
-
 NOT_GOOD_ENOUGH = 4
 """Exit code, as of results that should not be used."""
 

@@ -11,8 +11,6 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 
-__all__ = ["as_block"]
-
 
 def as_block(collection: Collection) -> Block:
     """Return the block of a collection: the same photos with a camera each, and points where rays meet.

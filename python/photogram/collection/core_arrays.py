@@ -16,7 +16,6 @@ from photogram.messages import listed
 from photogram.network.core_arrays import CoreOptions, core_network
 from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
 
-__all__ = ["collection_network", "collection_trial", "named"]
 ROUGH, EXACT = 1e-7, 1e-12
 """A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
 

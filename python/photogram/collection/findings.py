@@ -16,9 +16,6 @@ from photogram.results.patterns import CameraImages, patterns
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 
-__all__ = ["collection_findings", "collection_held"]
-
-
 NO_DATUM = (
     "Nothing gives the network a datum: shapes and relative precision can be used, absolute positions and the"
     " scale mean nothing."

@@ -11,8 +11,6 @@ from photogram.results.page.tables import control_section, stations_section
 from photogram.show.methods import page_of
 from photogram.show.page import Fact, Page, Section, significant
 
-__all__ = ["collection_page"]
-
 
 @page_of.register(AdjustedCollection)
 @np.errstate(over="ignore", invalid="ignore")

@@ -15,8 +15,6 @@ from photogram.plots.picture_data import Correlated, Curve, Curves, Pictured, Pl
 from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part
 from photogram.results.picture_data import PicturedNetwork
 
-__all__ = ["PicturedCollection"]
-
 BEYOND = 1.1
 """How far curves of distortion go on, of the largest observed radius."""
 ROWS = 51

@@ -16,8 +16,6 @@ from photogram.show.lines import Field, field, table_lines
 from photogram.show.methods import report_of
 from photogram.show.sections import Section, composed, headline
 
-__all__ = ["report", "size_of", "summary"]
-
 
 @report_of.register(AdjustedCollection)
 def report(result: AdjustedCollection) -> str:

@@ -30,8 +30,6 @@ from photogram.results.result_files import (
 )
 from photogram.show.methods import files_of
 
-__all__ = ["KIND", "collection_files", "read_collection_result"]
-
 KIND = "collection"
 _AXES = ("x", "y", "z")
 _TABLES = {"control": "control", "stations": "station"}

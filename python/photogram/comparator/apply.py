@@ -15,8 +15,6 @@ from photogram.errors import InputError
 from photogram.io.rows import cells
 from photogram.messages import Message, counted
 
-__all__ = ["correct_table"]
-
 CORRECTED = ("corrected_x_um", "corrected_y_um", "sd_x_um", "sd_y_um", "in_range")
 READINGS = ("reading_x_um", "reading_y_um", "in_range")
 EDGE = 1.25

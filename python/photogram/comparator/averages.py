@@ -15,18 +15,6 @@ from photogram.comparator.grid import Grid
 from photogram.comparator.reduction import GridErrors, Reduction
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = [
-    "ListedGridSigma",
-    "LocationAverages",
-    "PlateAverages",
-    "average_residuals",
-    "corrected_grid_sigma",
-    "listed_grid_sigma",
-    "text_grid_sigma",
-    "unbiased_grid_sigma",
-]
-
-
 SAME_PLACE = 0.25
 """Locations nearer to each other than this part of the spacing of the plate are one."""
 

@@ -54,8 +54,6 @@ from photogram.messages import Message
 from photogram.show.methods import Judged, Paged
 from photogram.show.summary import Brief
 
-__all__ = ["Calibration", "CaseResult", "PlateResult", "Pointing", "calibrate", "needed_memory"]
-
 BASE, PER_POINTING = 64 << 20, 3500
 """Bytes that any calibration takes, and what each pointing adds, with listing and document."""
 

@@ -18,8 +18,6 @@ from photogram.io.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 
-__all__ = ["Header", "join_least_count", "read_cards", "to_cards"]
-
 SPECIAL_GRID = 3
 CASES = 20
 """Cases that a header names operators for."""

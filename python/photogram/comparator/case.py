@@ -23,17 +23,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.neighbours import mutually_nearest
 
-__all__ = [
-    "PlacedCase",
-    "detect_orientation",
-    "exchanged",
-    "intersect_legs",
-    "locations",
-    "place_case",
-    "reduce_legs",
-]
-
-
 # Quarter turns that bring a corner of the plate to the place of its first corner (least X and Y), with the
 # listing's KROTC.
 CORNERS = {1: (-1, -1), 4: (1, -1), 3: (1, 1), 2: (-1, 1)}

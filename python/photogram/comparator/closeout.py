@@ -9,8 +9,6 @@ from photogram.comparator.readings import Case
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
-__all__ = ["Closeout", "close_out"]
-
 SUSPECT_UM = 2.0
 """A mean shift beyond this: a shift of the plate is suspected; close on the second point too."""
 REMEASURE_UM = 4.0

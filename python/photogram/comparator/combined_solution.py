@@ -14,8 +14,6 @@ from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_rigid,
 from photogram.comparator.polynomial import COUNT, Polynomial, fit_polynomial
 from photogram.lazy_dataclasses import dataclass, replace
 
-__all__ = ["CombinedLinear", "CombinedPolynomial", "SinglePolynomial", "combine_linear", "combine_polynomial"]
-
 
 @dataclass(frozen=True, eq=False)
 class CombinedLinear:

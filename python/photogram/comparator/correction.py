@@ -21,8 +21,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
 from photogram.network.cameras import Camera
 
-__all__ = ["Correction", "Identity"]
-
 
 @dataclass(frozen=True)
 class Identity:

@@ -12,8 +12,6 @@ from photogram.io.places import Place
 from photogram.io.rows import Row
 from photogram.messages import nearest, quoted
 
-__all__ = ["Setting", "Table", "read_table"]
-
 MICROMETRES = {"um": 1.0, "mm": 1000.0}
 """Units of coordinates, as the names of columns end."""
 NOTE = "note"

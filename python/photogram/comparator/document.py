@@ -15,8 +15,6 @@ from photogram.comparator.tables import precisions, terms
 from photogram.io import json
 from photogram.show.quantity import Quantity, of_each, records
 
-__all__ = ["to_json"]
-
 CONVENTIONS = {
     "residuals_comparator_um": "grid transformed into the comparator system less measured: to be added to"
     " the measurement",

@@ -14,16 +14,6 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = [
-    "AffineFit",
-    "Decomposition",
-    "Residuals",
-    "RigidFit",
-    "fit_affine",
-    "fit_rigid",
-    "rotation_matrix",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class Residuals:

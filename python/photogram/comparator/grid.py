@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     pass
 
 
-__all__ = ["BUILT_IN", "Grid", "built_in_grid", "find_grid", "read_grid"]
-
 BUILT_IN = (773, 1320, 778)
 """The master grids of the program, in the order of its option MASTER (0, 1, 2)."""
 KEYS = ("grid", "owner", "adopted", "sigma_um", "temperature_c", "expansion_per_k")

@@ -12,8 +12,6 @@ from photogram.comparator.averages import corrected_grid_sigma
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.grid import Grid
 
-__all__ = ["adjusted_grid", "corrected", "corrected_grid"]
-
 
 def corrected_grid(calibration: Calibration, plate: int) -> Grid:
     """Return a plate with its final average residuals added, and what that leaves as its uncertainty.

@@ -25,8 +25,6 @@ from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["JointCase", "JointFit", "JointPlate", "Weights", "adjust_jointly"]
-
 DEGREE = 4
 OWN_TERMS = 6
 """Terms of the polynomials that the linear parameters do not repeat: the first six."""

@@ -18,8 +18,6 @@ from photogram.io.numbers import is_whole_number
 from photogram.io.rows import Row
 from photogram.messages import quoted
 
-__all__ = ["read", "read_csv", "to_csv"]
-
 T = TypeVar("T")
 
 KEYS = ("grid", "comparator", "date", "left_handed", "range_centre_um", "temperature_c")

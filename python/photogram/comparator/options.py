@@ -6,8 +6,6 @@ from typing import Literal
 
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Options"]
-
 
 @dataclass(frozen=True)
 class Options:

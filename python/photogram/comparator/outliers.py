@@ -33,9 +33,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.statistics.limits import externally_studentized, studentized_limit
 
-__all__ = ["FarPointing", "Outlier", "Screening", "far_pointings", "plate_remarks", "problems", "screen"]
-
-
 ROUNDS = 30
 """Adjustments at most; each takes out what is at least half as far off as the farthest."""
 LEAST_POINTS = 6

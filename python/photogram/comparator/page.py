@@ -21,8 +21,6 @@ from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Section, Table, significant
 
-__all__ = ["calibration_page"]
-
 UM = "µm"
 
 

@@ -11,19 +11,6 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 
-__all__ = [
-    "CONFIDENCE_FACTORS",
-    "Ellipse",
-    "PointReadings",
-    "Precision",
-    "group",
-    "group_as_listed",
-    "pool",
-    "pool_points",
-    "read_points",
-    "rows_by_point",
-]
-
 
 def group(points: Indices) -> Indices:
     """Return the order of readings in which equal points stand together, points and readings as measured."""

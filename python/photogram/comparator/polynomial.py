@@ -15,8 +15,6 @@ from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["TERMS", "Frame", "Polynomial", "fit_polynomial"]
-
 TERMS = ("x^4", "y^4", "x^3", "y^3", "x^2", "y^2", "x", "y", "1")
 """The terms in the order of the report."""
 EXPONENTS = np.array([[4, 0], [0, 4], [3, 0], [0, 3], [2, 0], [0, 2], [1, 0], [0, 1], [0, 0]])

@@ -15,8 +15,6 @@ from photogram.io.places import Place
 from photogram.messages import Message
 from photogram.show.summary import Brief
 
-__all__ = ["LARGEST_UM", "Case", "Reading", "Session", "collect_cases"]
-
 FURTHEST_UM = 1000.0
 """A reading this far from the others on its point was taken on another point, or is in another unit."""
 

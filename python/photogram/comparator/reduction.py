@@ -24,8 +24,6 @@ from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.polynomial import Frame, design
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["GridErrors", "Reduction"]
-
 
 @dataclass(frozen=True, eq=False)
 class GridErrors:

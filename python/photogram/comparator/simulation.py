@@ -20,9 +20,6 @@ from photogram.errors import InputError
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
 
-__all__ = ["Simulation", "simulate_calibration", "simulated_years"]
-
-
 IDEAL = Correction(1.0, 1.0, 0.0)
 
 

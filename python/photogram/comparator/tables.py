@@ -20,20 +20,6 @@ from photogram.show.methods import findings_of
 from photogram.show.quantity import Axis, Quantity, component, of_each
 from photogram.statistics.findings import Findings, Systematic, Tested
 
-__all__ = [
-    "UM",
-    "XY",
-    "cases",
-    "coefficients",
-    "far_pointings",
-    "linear",
-    "outliers",
-    "precisions",
-    "terms",
-    "variance",
-]
-
-
 UM = (Axis.of("", "um"),)
 XY = (Axis.of("x", "um"), Axis.of("y", "um"))
 _LINEAR = (

@@ -19,19 +19,6 @@ from photogram.comparator.pointing import Precision
 from photogram.comparator.polynomial import TERMS
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = [
-    "AxisSigma",
-    "CaseVarianceTest",
-    "PolynomialTest",
-    "TermTest",
-    "VarianceAnalysis",
-    "analyse_variance",
-    "compare_case_variances",
-    "difference",
-    "polynomial_tests",
-]
-
-
 NM = 1000.0
 
 

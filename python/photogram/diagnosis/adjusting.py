@@ -15,8 +15,6 @@ from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
 
-__all__ = ["Adjuster", "put_right"]
-
 KEPT = 2
 """Adjustments that are remembered."""
 

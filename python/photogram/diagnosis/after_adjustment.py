@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from photogram.adjustment.first_values import FirstValues
     from photogram.diagnosis.findings import Diagnosis
 
-__all__ = ["diagnosed", "diagnosis_of", "errors_explained", "explained", "remarks"]
-
 BAD = 5.0
 """Sigma0 above which an adjustment that has converged is doubted."""
 

@@ -15,8 +15,6 @@ from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Clock
 from photogram.results.result import Result
 
-__all__ = ["counted_lines", "differences", "known_offsets", "named"]
-
 LEAPS = range(13, 19)
 """GPS - UTC in seconds from 1999 on; 18 since 2017."""
 TAI_GPS, ET_TAI = 19.0, 32.184

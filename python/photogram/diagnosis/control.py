@@ -8,8 +8,6 @@ from photogram.diagnosis.editing import Edited
 from photogram.diagnosis.findings import Finding, Level, Section, Words, note
 from photogram.results.result import Result
 
-__all__ = ["control"]
-
 MANY = 0.2
 """Of the control: when more does not fit, it is hardly the points."""
 

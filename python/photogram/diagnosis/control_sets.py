@@ -35,8 +35,6 @@ from photogram.network.similarity import turn_and_scale
 from photogram.results.result import Result
 from photogram.statistics.likelihood import judged
 
-__all__ = ["FreeModel", "doubtful", "explain", "free_model"]
-
 MOST = 60
 """Control points that are compared."""
 FEWEST = 3

@@ -41,8 +41,6 @@ from photogram.network.motion import at_rest
 from photogram.network.observations import Distance
 from photogram.network.rays import Rays
 
-__all__ = ["Verdict", "conventions", "further", "hints", "passing", "verdicts"]
-
 SUSPICION = 0.35
 """Misfit m above which photos are looked at more closely."""
 PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1

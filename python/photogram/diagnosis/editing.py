@@ -33,8 +33,6 @@ from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.show.angles import ARCSEC
 
-__all__ = ["_BESIDE", "Edited", "edit"]
-
 ROUNDS = 20
 """Adjustments at the most."""
 TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5

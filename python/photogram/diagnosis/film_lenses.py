@@ -23,8 +23,6 @@ from photogram.messages import Message
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 
-__all__ = ["lens_hints"]
-
 RADIAL = re.compile(r"[AK]\d")
 POINT = ("xp", "yp")
 CHANCE = 1e-4

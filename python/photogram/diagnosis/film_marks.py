@@ -29,8 +29,6 @@ from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.statistics.distributions import critical_chi_square
 
-__all__ = ["axis_hints", "mark_hints"]
-
 CERTIFICATE = "certificate"
 ALIKE = 0.7
 """What has at least this part of the largest test value is named beside it: less may be its consequence."""

@@ -25,8 +25,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
 
-__all__ = ["line_hints", "seam_hints"]
-
 FEWEST_OF_HALVES = 12
 """Images of a photo."""
 EXPLAINED = 0.4

@@ -17,9 +17,6 @@ from photogram.network.block import Block
 from photogram.network.rays import Rays, meet
 from photogram.results.result import Result
 
-__all__ = ["Suspects", "disproved", "gross", "without"]
-
-
 BAD_PHOTO = 4.0
 """A photo is bad when its median residual is so many times that of the median photo, ..."""
 BAD_PHOTO_SD = 4.3

@@ -13,18 +13,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 
-__all__ = [
-    "FOOT",
-    "TURNS",
-    "Change",
-    "Hypothesis",
-    "attitude_readings",
-    "hypotheses",
-    "image_hypothesis",
-    "quaternion_readings",
-    "read_as",
-]
-
 FOOT = 0.3048
 """Metres; the survey foot differs by two millionths."""
 _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])

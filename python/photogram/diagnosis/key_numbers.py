@@ -14,8 +14,6 @@ from photogram.results.result import Result
 from photogram.show.methods import findings_of
 from photogram.statistics.evidence import WITHHELD, Evidence
 
-__all__ = ["disagreeing", "held_values", "key_numbers", "points_left_out"]
-
 VARIANCE = (0.5, 2.0)
 """Variance of unit weight between which the weights count as realistic."""
 

@@ -18,8 +18,6 @@ from photogram.results.result import Result
 from photogram.show.methods import findings_of
 from photogram.statistics.evidence import Evidence
 
-__all__ = ["half_pixel", "lenses_estimated", "lenses_put_right"]
-
 RADIAL = re.compile(r"[Kk]([1-6])")
 SIGNIFICANT = 5.0
 PITCH = (1e-3, 3e-2)

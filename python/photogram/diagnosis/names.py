@@ -22,8 +22,6 @@ from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
 from photogram.statistics.limits import normal_limit
 
-__all__ = ["with_exchanges"]
-
 CENTRES = 3
 """Photos around which names are looked at."""
 AROUND, SHARED = 24, 3

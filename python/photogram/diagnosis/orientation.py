@@ -14,9 +14,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
 
-__all__ = ["orientation", "spare_explained"]
-
-
 SUSPICIOUS = 0.25
 """Cost above which an orientation is doubted: 0 for rays that meet in front, 1 for rays that miss."""
 BETTER = 0.5

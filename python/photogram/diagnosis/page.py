@@ -14,8 +14,6 @@ from photogram.show.methods import page_of
 from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
 from photogram.show.page import Section as Chapter
 
-__all__ = ["check_page"]
-
 _TESTS = (
     "Those of the adjustment, without what was found wrong: what the verdict rests on beside the findings."
 )

@@ -31,8 +31,6 @@ from photogram.network.unknowns import LeverArm, Shift, Unknown
 from photogram.results.result import Result
 from photogram.statistics.likelihood import RIVAL, TESTED, judged, likelihood
 
-__all__ = ["wrong_positions"]
-
 FEWEST = 5
 """Observed positions that can be judged as a whole."""
 EQUAL = 0.15

@@ -18,9 +18,6 @@ from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 
-__all__ = ["exchange", "exchanged_pair", "exchanged_where_rays_meet", "freed", "tests_of_predictions"]
-
-
 FEWEST = 3
 """Control points that tell which two of them are exchanged."""
 BETTER, RUNNER_UP = 25.0, 10.0

@@ -13,22 +13,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 
-__all__ = [
-    "LEAST",
-    "MOST",
-    "UNKNOWN",
-    "Regression",
-    "control_misfit",
-    "control_residuals",
-    "eligible",
-    "given_points",
-    "misfits",
-    "regressions",
-    "relative",
-    "spread",
-    "view",
-]
-
 LEAST = 6
 """Known or intersected points of a photo that is looked at."""
 MOST = 12

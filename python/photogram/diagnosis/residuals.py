@@ -15,9 +15,6 @@ from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
 
-__all__ = ["residuals"]
-
-
 FEWEST = 20
 """Images of a photo that a test of its pattern needs."""
 WORTH = 0.3

@@ -18,8 +18,6 @@ from photogram.network.directions import without_lenses
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 
-__all__ = ["ODDS", "rival_images"]
-
 ODDS = 20.0
 """An image that is less likely by this factor is no rival."""
 ALIKE = 0.98

@@ -9,9 +9,6 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-__all__ = ["critical", "fit", "mad_sd", "normal_of_chi_square"]
-
-
 MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
 ROUNDING = 1e-9
 """Of the largest residual: a median below it is rounding."""

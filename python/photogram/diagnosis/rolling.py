@@ -28,8 +28,6 @@ from photogram.results.result import Result
 from photogram.results.scores import Scores
 from photogram.statistics.limits import externally_studentized
 
-__all__ = ["rolling_hints"]
-
 SIGNIFICANT = 5.0
 """Standard deviations."""
 EXPLAINED = 0.8

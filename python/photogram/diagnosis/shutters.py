@@ -15,8 +15,6 @@ from photogram.network.trajectories import Readout
 from photogram.results.fixed_tests import is_suspected
 from photogram.results.result import Result
 
-__all__ = ["backward_readouts", "shutter_hints"]
-
 SIGNIFICANT = 5.0
 """Standard deviations of a readout time below zero."""
 LONGEST = 1.0

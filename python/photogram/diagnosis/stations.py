@@ -16,8 +16,6 @@ from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.results.result import Result
 
-__all__ = ["flown", "neighbours", "stations", "two_ray_heights"]
-
 LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their kind."""
 FEW = 4

@@ -13,8 +13,6 @@ from photogram.network.ties import FEWEST_TIES, ties
 from photogram.results.report import bandwidths
 from photogram.results.result import Result
 
-__all__ = ["parts_of", "structure_section"]
-
 
 def structure_section(block: Block, result: Result | None, words: Words) -> Section:
     """Describe rays, ties and bandwidth; name photos with few ties, and parts that share no point.

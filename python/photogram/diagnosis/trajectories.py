@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from photogram.diagnosis.findings import Words
     from photogram.statistics.snooping.log import Removal
 
-__all__ = ["flown_checked"]
-
 
 def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[Section], Result | None]:
     """Check a block with photos or records on trajectories.

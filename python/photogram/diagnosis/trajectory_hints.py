@@ -37,16 +37,6 @@ from photogram.network.subset import kept_images
 from photogram.network.trajectories import Table, Trajectory
 from photogram.network.unknowns import LeverArm
 
-__all__ = [
-    "flown_hints",
-    "flown_hypotheses",
-    "flown_misfits",
-    "flown_predictions",
-    "flown_view",
-    "shifted_records",
-    "shifts",
-]
-
 
 def flown_hints(block: Block) -> list[Message]:
     """Look for mistakes in tables and times of trajectories, and in how the lines of scanners are counted.

@@ -13,8 +13,6 @@ from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.subset import kept_images
 
-__all__ = ["View"]
-
 _SHARED = (
     "photo_positions",
     "photo_attitudes",

@@ -14,8 +14,6 @@ from photogram.messages import Message
 from photogram.results.result import Result
 from photogram.statistics import global_test
 
-__all__ = ["weight_hints"]
-
 LEAST_REDUNDANCY = 10.0
 """Of a kind whose standard deviations are judged."""
 NOTABLE = 1.5

@@ -21,19 +21,6 @@ from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = [
-    "UNKNOWNS",
-    "Counts",
-    "Cut",
-    "Incidence",
-    "Tree",
-    "counted_work",
-    "cut",
-    "homes",
-    "joined",
-    "outer_vertices",
-    "tree_of",
-]
 UNKNOWNS = 6
 """Of the pose of a photo."""
 SMALLEST = 8

@@ -14,8 +14,6 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow
 from photogram.results.datum import refused
 
-__all__ = ["InDatum", "Mover", "local_row", "rights_of", "with_columns"]
-
 LANES = 8
 """Right-hand sides that the core reduces at a time, of points."""
 

@@ -40,8 +40,6 @@ from photogram.errors import AdjustmentError, RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 
-__all__ = ["Driver", "Outcome", "Stop"]
-
 RULES = _photocore.step_rules()
 """The constants of the rules of steps, which are those of one process."""
 

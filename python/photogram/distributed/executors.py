@@ -21,9 +21,6 @@ from photogram.distributed.shelf import shelf
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import resident_memory
 
-__all__ = ["Executor", "Handle", "Serial", "Workers", "check_workers", "connected"]
-
-
 Handle = Any
 """Stands for what a task will give."""
 Client = Any

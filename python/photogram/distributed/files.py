@@ -19,9 +19,6 @@ from photogram.io.files import reading
 from photogram.io.seals import SEAL, check_sealed, seal
 from photogram.io.writing.staging import try_lock
 
-__all__ = ["alone", "read_arrays", "read_json", "write_arrays", "write_file", "write_json"]
-
-
 LOCK = "lock"
 
 

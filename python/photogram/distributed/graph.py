@@ -13,17 +13,6 @@ from photogram.network.block import Block, flown_by
 from photogram.network.films import Scan
 from photogram.network.observations import Observation
 
-__all__ = [
-    "Homes",
-    "alone_of",
-    "homes_of",
-    "incidence_of",
-    "photos_of",
-    "photos_of_unknowns",
-    "shared_cameras",
-    "vertices_of",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class Homes:

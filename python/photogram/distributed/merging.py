@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from photogram.results.covariance import Covariances
     from photogram.results.network_trial import NetworkTrial
 
-__all__ = ["InParts", "merged"]
-
 _OF_PHOTOS = ("photo_positions", "photo_attitudes", "photo_cofactors", "photo_redundancy")
 _OF_POINTS = (
     "point_positions",

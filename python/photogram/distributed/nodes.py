@@ -25,8 +25,6 @@ from photogram.results.result_files import read_summary
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution
 
-__all__ = ["CoreEngine", "read_outcome"]
-
 OUTCOME = "outcome.json"
 
 

@@ -29,18 +29,6 @@ from photogram.network.subset import IMAGES, PHOTOS
 from photogram.network.unknowns import Unknown
 from photogram.results.block_files import CLASSES, STANDS
 
-__all__ = [
-    "IN_TABLES",
-    "AtHome",
-    "Names",
-    "Part",
-    "assembled_part",
-    "names_above",
-    "part_of",
-    "read_part",
-    "write_part",
-]
-
 TABLES: dict[str, tuple[str, ...]] = {
     "photos": PHOTOS,
     "points": ("point_positions", "point_sd"),

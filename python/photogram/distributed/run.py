@@ -36,20 +36,6 @@ from photogram.network.unknowns import Unknown
 from photogram.results.block_files import KeptTrajectory
 from photogram.results.iteration import Iteration
 
-__all__ = [
-    "Course",
-    "Manifest",
-    "divided",
-    "part_folder",
-    "partition",
-    "places_of",
-    "read_manifest",
-    "read_node",
-    "result_folder",
-    "with_flights",
-]
-
-
 MANIFEST = "run.json"
 _PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held", "datum")
 PROGRESS = "progress.json"

@@ -9,8 +9,6 @@ from typing import Any
 
 from photogram.memory import give_back, resident_memory
 
-__all__ = ["shelf"]
-
 
 class Shelf:
     """The nodes and factors that a process keeps."""

@@ -28,33 +28,6 @@ if TYPE_CHECKING:
     from photogram._photocore import ContributionRow, FormedNode, Node
     from photogram.distributed.nodes import CoreEngine
 
-__all__ = [
-    "Chord",
-    "Contribution",
-    "Formed",
-    "Inverted",
-    "Job",
-    "Lost",
-    "Point",
-    "about",
-    "counted",
-    "evaluated",
-    "finished",
-    "formed",
-    "inverted",
-    "located",
-    "lost",
-    "predicted",
-    "reduced_chord",
-    "redundancies",
-    "relocated",
-    "settled",
-    "solved",
-    "solved_chord",
-    "state_path",
-    "write_state",
-]
-
 GIVEN = "0"
 """The state that the nodes themselves give."""
 

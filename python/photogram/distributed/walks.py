@@ -21,9 +21,6 @@ from photogram.errors import AdjustmentError, PhotogramError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 
-__all__ = ["LostFactorError", "Reforming", "Up", "Walks"]
-
-
 ATTEMPTS = 20
 """So often is a node formed again that a worker has taken with it."""
 

@@ -11,11 +11,12 @@ if TYPE_CHECKING:
     from photogram.film.certificate import CalibratedMarks, Certificate
     from photogram.film.certificate_check import DistanceDifference, Explanation
     from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
-    from photogram.film.interior import Affine, Interior, interior_orientation
+    from photogram.film.interior import Interior, interior_orientation
     from photogram.film.lens_table import Curve, LensParameters, RadialTable, Tangential
     from photogram.film.marks import FilmWay, WhichMark, which_mark
     from photogram.film.steps import StepsCompared, compare_steps
     from photogram.film.years import CameraComparison, DatedCamera, compare_cameras
+    from photogram.network.film_reduction import Affine
 
 __all__ = [
     "AdjustedMarks",

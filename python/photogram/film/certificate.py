@@ -35,8 +35,6 @@ from photogram.network.cameras import Camera
 from photogram.show.methods import Shown
 from photogram.show.summary import Brief, Rows
 
-__all__ = ["CalibratedMarks", "Certificate"]
-
 SD_PLACE = 0.002
 """Of a coordinate that is printed to 0.001 mm."""
 SD_DESIGN = 0.02

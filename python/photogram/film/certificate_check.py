@@ -14,8 +14,6 @@ from typing import Literal, get_args
 
 from photogram.lazy_dataclasses import dataclass, replace
 
-__all__ = ["DistanceDifference", "Explanation", "difference_of"]
-
 How = Literal["exchange", "sign", "digit", "lost or extra"]
 
 LIMIT = 0.010

@@ -33,8 +33,6 @@ from photogram.io.toml_tables import Table, read_document
 from photogram.messages import listed, quoted
 from photogram.show.page import significant
 
-__all__ = ["read_table", "read_toml"]
-
 UM = 1e-3
 """In millimetres."""
 SD_DISTANCE = 0.002

@@ -12,8 +12,6 @@ from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["certificate_findings"]
-
 
 @findings_of.register(Certificate)
 def certificate_findings(certificate: Certificate) -> Findings:

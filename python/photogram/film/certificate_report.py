@@ -37,8 +37,6 @@ from photogram.statistics.distributions import LEVEL, bonferroni, critical_norma
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["certificate_document", "certificate_page", "certificate_report"]
-
 
 @report_of.register(Certificate)
 def certificate_report(certificate: Certificate) -> str:

@@ -14,8 +14,6 @@ from photogram.network.cameras import Camera
 from photogram.show.page import Fact, significant
 from photogram.show.quantity import Axis, Kind, Quantity, of_each
 
-__all__ = ["cameras", "compared", "curve", "distortion", "facts", "marks", "observed", "parameters", "terms"]
-
 MM = (Axis("", "mm", small="um", factor=1e3),)
 XY = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
 OBSERVED = (Axis("length", "mm", small="um", factor=1e3), Axis.turned("angle", "deg"))

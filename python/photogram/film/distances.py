@@ -22,8 +22,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["AdjustedMarks", "Crossing", "MarkDistance", "RightAngle", "adjust_distances", "with_datum"]
-
 STEPS = 50
 CLOSE = 1e-13
 """Millimetres: where steps end."""

@@ -25,8 +25,6 @@ from photogram.network.films import (
     ScannerCurve,
 )
 
-__all__ = ["Affine", "FilmModel", "Interior", "conformal", "interior_orientation", "is_mirrored"]
-
 FilmModel = Literal["conformal", "affine", "bilinear", "projective"]
 
 UNKNOWNS: dict[str, tuple[str, ...]] = {

@@ -24,22 +24,6 @@ from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = [
-    "SEMI_DIAGONALS",
-    "Curve",
-    "LensParameters",
-    "RadialTable",
-    "SemiDiagonals",
-    "Tangential",
-    "backward",
-    "chosen",
-    "curves_of",
-    "fit_curve",
-    "forward",
-    "of_profile",
-    "of_semi_diagonals",
-]
-
 MOST_TERMS = 3
 """Odd terms that cameras have."""
 LEVEL = 0.01

@@ -19,18 +19,6 @@ from photogram.errors import InputError
 from photogram.film.interior import pairs
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = [
-    "DECIDED",
-    "DataStrip",
-    "FilmWay",
-    "WhichMark",
-    "by_side",
-    "turned",
-    "turned_name",
-    "usual_places",
-    "which_mark",
-]
-
 DataStrip = Literal["left", "top"]
 
 SIDES = ("ll", "ur", "ul", "lr", "ml", "mr", "mt", "mb")

@@ -24,8 +24,6 @@ from photogram.show.summary import Brief, Rows
 if TYPE_CHECKING:
     from photogram.results.result import Result
 
-__all__ = ["StepsCompared", "compare_steps", "steps_document", "steps_page", "steps_text"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StepsCompared(Paged, Brief):

@@ -11,8 +11,6 @@ from photogram.errors import ContradictionError, InputError
 if TYPE_CHECKING:
     from photogram.film.certificate import Certificate
 
-__all__ = ["age_remark", "changed_remark", "valid_certificate"]
-
 YEARS = 3.0
 """A camera is calibrated anew after as many at the latest: what is farther from a flight is told."""
 _YEAR = 365.25

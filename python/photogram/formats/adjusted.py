@@ -15,8 +15,6 @@ from photogram.results.features import Features
 from photogram.results.result import Result
 from photogram.show.methods import columns_of
 
-__all__ = ["adjusted", "excel_file", "feature_files", "table_files"]
-
 _TABLES = {
     "photos": "photo",
     "points": "point",

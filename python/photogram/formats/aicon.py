@@ -29,8 +29,6 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.network.observations import Distance
 
-__all__ = ["FORMAT", "TITLE"]
-
 TITLE = "AICON block"
 IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
 _NOT_ORIENTED = 1

@@ -12,8 +12,6 @@ from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Project
 from photogram.io.packed_numbers import pieces
 
-__all__ = ["FORMAT", "TITLE"]
-
 TITLE = 'problem of "Bundle Adjustment in the Large"'
 FILE = "problem.txt"
 _FIRST = re.compile(

@@ -29,8 +29,6 @@ from photogram.io.csv_text import csv_text
 from photogram.messages import Message, quoted
 from photogram.network.attitudes import Attitudes
 
-__all__ = ["FORMAT", "TITLE"]
-
 TITLE = "BINGO block"
 IMAGES, ORIENTATION, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
 

@@ -17,15 +17,6 @@ from photogram.network.films import Scan
 from photogram.network.observations import Control, Position
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 
-__all__ = [
-    "check_images",
-    "correlated_control",
-    "lost_motions",
-    "lost_observations",
-    "motions",
-    "posed",
-]
-
 MOST_TOLD = 12
 """Trajectories that are told one by one."""
 

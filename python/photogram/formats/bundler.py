@@ -12,8 +12,6 @@ from photogram.formats.project import Project
 from photogram.io.files import read_lines
 from photogram.io.packed_numbers import pieces
 
-__all__ = ["FORMAT", "TITLE"]
-
 TITLE = "Bundle file"
 FILE, LIST = "bundle.out", "list.txt"
 

@@ -14,8 +14,6 @@ from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import quoted
 
-__all__ = ["END", "Card", "angle_unit", "cards", "has_suffix", "names_beside", "one_file", "to_radians"]
-
 END = "-99"
 """What ends a photo, or a file."""
 _UNITS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}

@@ -10,8 +10,6 @@ from photogram.formats.project import Frame, Project
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 
-__all__ = ["carried", "is_free"]
-
 
 def is_free(project: Project) -> bool:
     """Whether nothing but its first values says where the model of a project is.

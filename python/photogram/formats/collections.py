@@ -22,8 +22,6 @@ from photogram.network.directions import image_directions
 if TYPE_CHECKING:
     from photogram.collection.collection import Collection
 
-__all__ = ["cannot_hold", "collection_of", "project_of"]
-
 
 def project_of(
     found: Collection, path: Path, title: str, names: Sequence[str], messages: Sequence[Message] = ()

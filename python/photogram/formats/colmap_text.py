@@ -6,8 +6,6 @@ from photogram.formats.colmap.reading import TITLE, read
 from photogram.formats.colmap.writing import cannot_hold, write_as_text
 from photogram.formats.format import Format
 
-__all__ = ["FORMAT"]
-
 FORMAT = Format(
     name="colmap_text",
     title=f"{TITLE} as text",

@@ -10,8 +10,6 @@ import re
 import unicodedata
 from collections.abc import Mapping
 
-__all__ = ["ANGULAR", "ROLE", "UNITS", "column_of", "is_angular", "role_of", "unit_of", "words_of"]
-
 ROLE = "use"
 """The column that says who is check and who is control."""
 _COLUMNS: Mapping[str, Mapping[str, str]] = {

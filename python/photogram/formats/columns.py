@@ -24,19 +24,6 @@ from photogram.io.numbers import finite_number
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed, quoted
 
-__all__ = [
-    "PLAIN",
-    "Columns",
-    "check_unread",
-    "columns_given",
-    "degrees",
-    "guess",
-    "heading_of",
-    "is_geographic",
-    "nameless",
-    "settled",
-]
-
 ROLES = ("control", "check", "off")
 OURS = (
     *("point", "photo", "x", "y", "z", "sd", "sd_x", "sd_y", "sd_z"),

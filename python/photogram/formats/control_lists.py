@@ -15,8 +15,6 @@ from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
-__all__ = ["ControlList", "read_control_list", "system_of"]
-
 WGS84 = "EPSG:4979"
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 DIFFER = 1e-6

@@ -24,8 +24,6 @@ from photogram.messages import Message, quoted
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 
-__all__ = ["check_systems"]
-
 BETTER = 10.0
 """How much better control must fit after an exchange for it to be named."""
 FITS = 0.2

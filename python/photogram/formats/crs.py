@@ -21,23 +21,6 @@ from photogram.network.geometry import local_frames
 if TYPE_CHECKING:
     import pyproj
 
-__all__ = [
-    "amid",
-    "axes_of",
-    "east_north_up",
-    "enu_origin",
-    "from_frame",
-    "geocentric",
-    "has_geoid_heights",
-    "has_place",
-    "is_on",
-    "is_projected",
-    "to_frame",
-    "to_system",
-    "turn_to_frame",
-    "without_geoid",
-]
-
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
 ROUND = 1e-4
 """Degrees to which a chosen origin is rounded; its height to a metre."""

@@ -23,8 +23,6 @@ from photogram.network.geometry import (
 )
 from photogram.network.motion import scanners
 
-__all__ = ["in_pixels", "in_topocentric", "nominal_pixels", "topocentric_remarks"]
-
 NOMINAL_MM = 0.01
 """Side of a pixel where nothing says how large they are: rays are the same."""
 ROUND = 100

@@ -16,8 +16,6 @@ from photogram.giant.files import present_files, to_bytes
 from photogram.giant.project import Project as GiantProject
 from photogram.messages import Message
 
-__all__ = ["FORMAT", "TITLE"]
-
 TITLE = "GIANT project"
 
 

@@ -15,17 +15,6 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
 
-__all__ = [
-    "from_corner",
-    "from_tables",
-    "in_corner",
-    "in_unit",
-    "known_size",
-    "sizes_of",
-    "to_corner",
-    "to_tables",
-]
-
 
 def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
     """Return (m, 2) image coordinates of a camera in pixels from columns and rows from the upper-left corner.

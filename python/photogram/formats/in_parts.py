@@ -19,8 +19,6 @@ from photogram.formats.plain.batches import Streamed
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["OnDisk", "adjusted_on_disk", "planned_on_disk"]
-
 
 @dataclass(frozen=True)
 class OnDisk:

@@ -10,8 +10,6 @@ from photogram.formats.project import Project
 from photogram.network.directions import image_directions
 from photogram.network.motion import on_shared
 
-__all__ = ["complete_positions", "intersected"]
-
 STEEPEST = 1e12
 """Condition of the normal equations of a point beyond which its rays are parallel."""
 

@@ -8,8 +8,6 @@ from photogram.formats.project import Size
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 
-__all__ = ["Lens", "lens_of"]
-
 _TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
 """Models that count from the middle of the picture, y up."""

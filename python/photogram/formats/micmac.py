@@ -20,8 +20,6 @@ from photogram.io.files import read_lines
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 
-__all__ = ["MicmacMarks", "has_marks", "read_marks", "write_marks"]
-
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
 SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
 AMID = 0.1

@@ -14,8 +14,6 @@ from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.messages import Message
 
-__all__ = ["NAMES", "Colours", "names_file", "numbered", "renamed", "with_names"]
-
 NAMES = "names.csv"
 LARGEST = 2**53
 

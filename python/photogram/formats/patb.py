@@ -37,8 +37,6 @@ from photogram.io.csv_text import csv_text
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 
-__all__ = ["FORMAT", "TITLE"]
-
 TITLE = "PATB block"
 IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
 MICROMETRES = 1e-3

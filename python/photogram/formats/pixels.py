@@ -21,8 +21,6 @@ from photogram.io.delimited import ColumnTable, read_columns
 from photogram.io.files import read_beginning
 from photogram.messages import Message, quoted
 
-__all__ = ["FORMAT", "TITLE", "corner_of", "pixel_table"]
-
 TITLE = "table of pixels"
 FILE = "images.csv"
 CAMERAS = "cameras.csv"

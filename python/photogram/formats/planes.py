@@ -12,8 +12,6 @@ from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.refraction import METRES_PER_UNIT
 
-__all__ = ["Bend", "bend", "plane_remarks"]
-
 RADIUS = 6_371_000.0
 """Of the earth, metres."""
 LIKE_A_PLANE = 1e5

@@ -22,17 +22,6 @@ from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.network.observations import Control
 
-__all__ = [
-    "Reduced",
-    "ReducedImages",
-    "by_photo",
-    "given_control",
-    "lost_of_reduced",
-    "project_of",
-    "reduced_images",
-    "with_fitting_rotations",
-]
-
 BETTER = 3.0
 """How much better rotations must fit transposed to be taken so."""
 LEAST, MOST = 2.0, 3000.0

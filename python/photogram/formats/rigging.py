@@ -12,8 +12,6 @@ from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
-__all__ = ["FrameOf", "Rig", "Stand", "mounted"]
-
 
 @dataclass(frozen=True)
 class Rig:

@@ -7,8 +7,6 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.io.places import Failing
 
-__all__ = ["Y_DOWN", "checked_rotation", "is_rotation"]
-
 Y_DOWN: Floats = np.diag([1.0, -1.0, -1.0])
 """Carries vectors between axes x right, y up, z back and axes x right, y down, z forward."""
 

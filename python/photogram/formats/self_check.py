@@ -19,8 +19,6 @@ from photogram.network.motion import given_poses, on_shared
 from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
 
-__all__ = ["Agreement", "agreement", "doubts"]
-
 MOST = 20_000
 """Images that are looked at."""
 GROSS, PART = 50.0, 0.1

@@ -32,17 +32,6 @@ from photogram.results.result import Result
 if TYPE_CHECKING:
     from photogram.formats.control_lists import ControlList
 
-__all__ = [
-    "deviations",
-    "held_points",
-    "repeated_remarks",
-    "self_calibrated",
-    "with_control",
-    "with_images",
-    "with_repeated",
-    "with_sd",
-]
-
 SAME = 1e-3
 """Pixels that two measurements of a point on a photo may be apart to be one."""
 SIMILAR = 10.0

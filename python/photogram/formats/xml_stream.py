@@ -20,8 +20,6 @@ from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 
-__all__ = ["Element", "read_stream", "root_of"]
-
 PIECE = 1 << 16
 DEEPEST = 200
 LONGEST = 1 << 20

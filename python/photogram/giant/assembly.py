@@ -25,9 +25,6 @@ from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
 from photogram.network.structuring import structure
 from photogram.network.ties import FEWEST_TIES, ties
 
-__all__ = ["assemble", "job_refraction"]
-
-
 EARTH_RADIUS = 6.371e6
 """Metres."""
 FALSE_ORIGIN = 1e5

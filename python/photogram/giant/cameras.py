@@ -8,8 +8,6 @@ from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 
-__all__ = ["Camera", "camera_records", "parse_cameras"]
-
 
 @dataclass
 class Camera:

@@ -12,8 +12,6 @@ from photogram.giant.limits import Limits
 from photogram.giant.project import Project
 from photogram.network.block import Block
 
-__all__ = ["check"]
-
 """As the 1987 program printed them."""
 CODES = np.array([1, 2, 4])
 

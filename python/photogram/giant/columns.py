@@ -19,8 +19,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.giant.fields import MOST_ANGLE, format_angle, format_deviations, format_real
 from photogram.show.angles import ARCSEC
 
-__all__ = ["Columns", "angle_fields", "deviation_fields", "position_fields", "real_fields", "texts"]
-
 Table = NDArray[np.uint8]
 
 POWERS = 10 ** np.arange(19, dtype=np.int64)

@@ -9,8 +9,6 @@ from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import ARCSEC
 
-__all__ = ["Common", "common_records", "parse_common"]
-
 UnitVariance = Literal["free", "constrained", "unity"]
 UNIT_VARIANCE: tuple[UnitVariance, ...] = ("free", "constrained", "unity")
 

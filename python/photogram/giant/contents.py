@@ -17,8 +17,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.show.summary import Brief, Rows, few
 
-__all__ = ["Contents"]
-
 
 @dataclass(repr=False)
 class Contents(Brief):

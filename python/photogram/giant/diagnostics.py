@@ -11,8 +11,6 @@ from photogram.giant.limits import Limits
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 
-__all__ = ["ErrorWarning", "error_warnings"]
-
 
 @dataclass(frozen=True)
 class ErrorWarning:

@@ -23,8 +23,6 @@ from photogram.messages import Message
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
 
-__all__ = ["adjusted_frames", "adjusted_ground", "adjusted_records", "block_files"]
-
 Triple = tuple[float, float, float]
 
 

@@ -13,20 +13,6 @@ from decimal import Decimal
 from photogram.io.records import parse_real
 from photogram.show.angles import ARCSEC
 
-__all__ = [
-    "MOST_ANGLE",
-    "format_angle",
-    "format_deviations",
-    "format_name",
-    "format_principal_distance",
-    "format_real",
-    "pack_dms",
-    "parse_angle",
-    "parse_name",
-    "printed_order",
-    "unpack_dms",
-]
-
 MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
 """The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""
 

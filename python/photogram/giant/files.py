@@ -7,8 +7,6 @@ from pathlib import Path
 
 from photogram.errors import InputError
 
-__all__ = ["NAMES", "find_files", "present_files", "project_name", "to_bytes", "written"]
-
 NAMES = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
 """The input files; they are found in any letter case and with any one extension."""
 

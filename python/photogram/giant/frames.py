@@ -12,8 +12,6 @@ from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
 
-__all__ = ["ATTITUDE_SD", "Frame", "frame_records", "parse_frames"]
-
 ATTITUDE_SD = 90 * 3600 * ARCSEC
 """Default standard deviation of omega, phi and kappa: 90 degrees, in radians."""
 

@@ -11,8 +11,6 @@ from photogram.giant.columns import Columns, deviation_fields, position_fields, 
 from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 
-__all__ = ["CHECK_POINT", "GroundPoint", "ground_records", "parse_ground"]
-
 CHECK_POINT = 7
 """The type code of a point of which nothing is held."""
 

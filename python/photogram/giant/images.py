@@ -12,8 +12,6 @@ from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 
-__all__ = ["IMAGE_SD", "ImageFrame", "image_records", "parse_images"]
-
 IMAGE_SD = 0.010
 """Default standard deviation of an image coordinate in millimetres."""
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from photogram.giant.ground import GroundPoint
     from photogram.network.structuring import Structure
 
-__all__ = ["Limits", "allowed_images", "check_bandwidth", "check_files", "check_points"]
-
 NAMES = {
     "N1": "stations",
     "N2": "points",

@@ -20,8 +20,6 @@ from photogram.giant.records import Source
 from photogram.io.writing import write_whole
 from photogram.network.block import Block
 
-__all__ = ["Project", "project_files", "read_project", "write_project"]
-
 
 class Project(Contents):
     """A project: the content of the five files, and the way to a block and back."""

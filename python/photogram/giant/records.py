@@ -14,8 +14,6 @@ from photogram.io import records
 from photogram.io.records import parse_integer, parse_real
 from photogram.messages import Message
 
-__all__ = ["Record", "Source", "error_at", "message_at"]
-
 T = TypeVar("T")
 QUARTER_CIRCLE = math.pi / 2 + 1e-12
 """The largest latitude, rounding allowed for."""

@@ -10,8 +10,6 @@ import numpy as np
 
 from photogram import _photocore
 
-__all__ = ["csv_text"]
-
 _ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
 """What arrays of numbers and truth values are written from, by their kinds."""
 

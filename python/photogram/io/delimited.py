@@ -28,8 +28,6 @@ from photogram.io.rows import DELIMITERS, LONGEST_RECORD
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import listed, quoted
 
-__all__ = ["FALSE", "NAMELESS", "TRUE", "ColumnTable", "Names", "Spelling", "read_columns", "read_rows"]
-
 LARGE = 1 << 20
 """Bytes from which a table is worth the parser of pandas."""
 COMMENT = "#"

@@ -10,8 +10,6 @@ from pathlib import Path
 from photogram.errors import InputError
 from photogram.io.sheets import sheet_text
 
-__all__ = ["read_beginning", "read_bytes", "read_lines", "read_text", "reading"]
-
 HEAD = 4096
 """Bytes in which text of two bytes a character is told, where it has no mark."""
 

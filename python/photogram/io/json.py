@@ -17,8 +17,6 @@ from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
-__all__ = ["Tree", "holding", "read_json", "to_json", "unknown"]
-
 _FORM = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
 LARGEST = 1e300
 

@@ -9,8 +9,6 @@ from collections.abc import Iterable
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
-__all__ = ["LARGEST_INTEGER", "Marks", "finite_number", "is_whole_number", "marks_of", "whole_number"]
-
 LARGEST_INTEGER = 2**63 - 1
 """The largest that an array of 64-bit integers holds."""
 

@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 
-__all__ = ["PIECE", "at", "packed", "pieces", "whole"]
-
-
 COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
     b"BZh": lambda file: cast("BinaryIO", bz2.BZ2File(file)),
     b"\x1f\x8b": lambda file: cast("BinaryIO", gzip.GzipFile(fileobj=file)),

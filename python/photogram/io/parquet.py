@@ -18,8 +18,6 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     import pyarrow
 
-__all__ = ["Column", "Repeated", "Sheet", "packed", "parquet_content", "read_sheet", "unpacked"]
-
 ROWS = 2**17
 """Of a row group."""
 LEVEL = 1

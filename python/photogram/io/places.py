@@ -12,8 +12,6 @@ from photogram.errors import InputError
 from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
 from photogram.messages import Message
 
-__all__ = ["Failing", "Place", "at_place"]
-
 
 class Failing(Protocol):
     """What can tell where it stands in a file: a place, an element of XML, a member of JSON."""

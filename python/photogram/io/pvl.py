@@ -14,8 +14,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
 
-__all__ = ["Group", "Quantity", "Value", "label_text", "parsed"]
-
 
 class Quantity(NamedTuple):
     """A value with the unit that stands behind it, between angle brackets."""

@@ -14,8 +14,6 @@ from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import Message
 
-__all__ = ["Record", "Source", "parse_integer", "parse_real"]
-
 WIDTH = 80
 WIDE = 0.25
 """Zero bytes that no text of one byte a character has, as a part of all."""

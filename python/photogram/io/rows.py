@@ -18,8 +18,6 @@ from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.messages import listed, quoted
 
-__all__ = ["DELIMITERS", "LONGEST_RECORD", "Row", "Table", "cells", "read_rows"]
-
 DELIMITERS = ("\t", ";", ",", "|")
 """What a header shows to stand between cells, in this order."""
 LONGEST_RECORD = 100_000

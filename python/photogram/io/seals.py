@@ -12,8 +12,6 @@ import orjson
 from photogram.errors import InputError
 from photogram.io.files import reading
 
-__all__ = ["SEAL", "Seals", "check_seal", "check_sealed", "seal"]
-
 SEAL = "sha256"
 """The member of a document that holds its own checksum."""
 

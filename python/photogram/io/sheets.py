@@ -11,8 +11,6 @@ from typing import Any
 
 from photogram.errors import InputError
 
-__all__ = ["sheet_text", "workbook"]
-
 LARGEST = 1 << 29
 """Bytes that a workbook may unpack to: beyond, it is no table of a person but an attack."""
 

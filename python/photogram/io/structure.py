@@ -21,8 +21,6 @@ from photogram.arguments.annotations import check_members
 from photogram.errors import InputError
 from photogram.messages import quoted
 
-__all__ = ["Decoder", "Encoder", "Stand"]
-
 SMALL = 36
 """Numbers up to which an array is written as numbers that people can read."""
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}

@@ -17,8 +17,6 @@ from photogram.io.files import read_bytes
 from photogram.io.places import Place
 from photogram.messages import nearest
 
-__all__ = ["Sections", "TomlFile", "day_of", "quoted_text"]
-
 MOST_DIGITS = 1000
 _ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")
 """Python refuses whole numbers of thousands of digits, and does not say where they stand."""

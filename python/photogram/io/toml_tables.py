@@ -11,8 +11,6 @@ from photogram.errors import InputError
 from photogram.io.toml import TomlFile
 from photogram.messages import listed
 
-__all__ = ["Document", "Table", "read_document"]
-
 _LONGEST = 60
 """Characters of a value that an error shows."""
 

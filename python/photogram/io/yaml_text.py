@@ -15,8 +15,6 @@ from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 
-__all__ = ["read_yaml_text"]
-
 DEEPEST = 50
 """Brackets and indents within each other."""
 _KEY = re.compile(

@@ -23,8 +23,6 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Attitudes", "Mounting", "Representation"]
-
 Representation = Literal[
     "omega_phi_kappa",
     "omega_phi_kappa_photo_to_ground",

@@ -39,7 +39,6 @@ from photogram.network.passages import Figure, Passage, checked_passages
 from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.network.rigs import Mount, checked_mounts
 from photogram.network.tables import (
-    ATTITUDE_COLUMNS,
     GEOGRAPHIC_COLUMNS,
     RECTANGULAR_COLUMNS,
     Table,
@@ -52,9 +51,6 @@ from photogram.network.tables import (
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.summary import Brief, Rows, few
-
-__all__ = ["ATTITUDE_COLUMNS", "Block"]
-
 
 _NUMBERS: Any = None
 """Names that are not given."""

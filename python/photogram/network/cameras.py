@@ -20,8 +20,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
 from photogram.show.summary import Brief, Rows
 
-__all__ = ["Camera", "CameraRow", "ImageUnit", "camera_rows", "images_of", "rays_of_row"]
-
 Weights = Literal["corrected", "measured"]
 """Of a backward camera: what the standard deviations of images are those of."""
 

@@ -20,8 +20,6 @@ from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
 from photogram.show.methods import Way
 
-__all__ = ["CoreNetwork", "CoreOptions", "block_network", "core_network"]
-
 CoreNetwork = _photocore.BlockNetwork | _photocore.CollectionNetwork
 
 TimedRow = tuple[int, int, float, int | None, int | None]

@@ -11,8 +11,6 @@ from photogram.network.cameras import rays_of_row
 from photogram.network.motion import focal_images, scanners
 from photogram.network.subset import image_rows, kept_images
 
-__all__ = ["direction_deviations", "image_directions", "seen_without_lenses", "without_lenses"]
-
 _SIDE = -0.02
 """u3 of unit directions that are seen well in front of the camera."""
 _SMALL = 1e-6

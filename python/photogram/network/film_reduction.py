@@ -14,9 +14,6 @@ from photogram.network.block import Block
 from photogram.network.films import Film, FilmNumbers, Scan
 from photogram.network.observations import Fiducial
 
-__all__ = ["Affine", "affine_form", "as_seen", "camera_images", "camera_unit", "is_scanned"]
-
-
 FEWEST = 4
 """Marks of an affine fit that has something to be judged by."""
 FIT = 5e-4

@@ -21,25 +21,6 @@ from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
 
-__all__ = [
-    "Film",
-    "FilmBend",
-    "FilmNumbers",
-    "FilmPlacement",
-    "FilmSize",
-    "Mark",
-    "Pattern",
-    "Readings",
-    "Reseau",
-    "Roll",
-    "Scan",
-    "Scanner",
-    "ScannerCurve",
-    "Weights",
-    "check_scans",
-    "reads_pixels",
-]
-
 PATTERNS = ("none", "w1 w2", "ebner", "grid")
 """By the number under which the core knows each."""
 MOST_SHIFTS = 200

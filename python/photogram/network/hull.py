@@ -6,8 +6,6 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 
-__all__ = ["area", "hull", "outside"]
-
 MANY, DIRECTIONS = 1000, 16
 ROUNDING = 1e-9
 """Of the extent of a hull: a point that is no farther outside lies on it."""

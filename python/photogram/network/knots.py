@@ -15,17 +15,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
 
-__all__ = [
-    "KNOTTED",
-    "Knot",
-    "Knots",
-    "beyond_knots",
-    "checked_knot_sd",
-    "checked_knots",
-    "knot_names",
-    "knot_unknowns",
-]
-
 KNOTTED = "splined_stereographic"
 """The model that has knots."""
 MOST = 10_000

@@ -12,8 +12,6 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Lens", "LensModel"]
-
 LensModel = Literal["radial", "transverse", "lrolrocnac", "kaguyalism", "cahvor", "radtan"]
 
 STEPS = 50

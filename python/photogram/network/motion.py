@@ -24,19 +24,6 @@ from photogram.network.unadjusted import Given
 if TYPE_CHECKING:
     pass
 
-__all__ = [
-    "about",
-    "at_rest",
-    "focal_images",
-    "given_poses",
-    "of_pictures",
-    "on_shared",
-    "refuse_datum",
-    "scanners",
-    "timed_images",
-    "timed_photos",
-]
-
 
 def refuse_datum(block: Block, what: str) -> None:
     """Refuse to choose a datum for trajectories: what moves one as a whole is not worked out."""

@@ -7,8 +7,6 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 
-__all__ = ["mutually_nearest", "nearest"]
-
 
 def mutually_nearest(points: Floats, predicted: Floats, limit: float) -> Indices:
     """Return for each point its mutually nearest predicted one within a limit; else -1."""

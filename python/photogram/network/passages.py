@@ -14,8 +14,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.unknowns import Numbers, Unknown
 
-__all__ = ["Bend", "Figure", "Passage", "PassageRow", "checked_passages", "passage_rows"]
-
 PassageRow = tuple[str, list[int], list[int], Floats]
 """Kind; indices of unknowns; of points, photos or cameras; numbers, as the core takes a passage."""
 

@@ -10,9 +10,6 @@ from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, local_frames, photo_axes
 from photogram.network.motion import on_shared
 
-__all__ = ["Intersection", "LocalAxes", "Rays", "frame_radius", "local_axes", "meet"]
-
-
 PARALLEL = 1e-8
 """Determinant of the normal matrix of a mean ray below which the rays of a point count as parallel."""
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-__all__ = ["similarity", "turn_and_scale"]
-
 LINE = 1e-9
 """Points spread less across a line than this, as a part of along it, lie on the line."""
 

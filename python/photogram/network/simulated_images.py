@@ -19,8 +19,6 @@ from photogram.network.simulated_layout import Layout, candidates, photo_ids
 from photogram.network.simulated_motion import RollingShutter
 from photogram.network.tables import checked_cameras
 
-__all__ = ["Taken", "photograph", "photographed", "seen_side"]
-
 
 @dataclass(frozen=True)
 class Taken:

@@ -21,21 +21,6 @@ from photogram.memory import available_memory
 from photogram.network import geometry
 from photogram.network.geometry import Spheroid
 
-__all__ = [
-    "Layout",
-    "candidates",
-    "control_pattern",
-    "flight",
-    "grid",
-    "ground_points",
-    "into_object_space",
-    "laid_out",
-    "photo_ids",
-    "point_ids",
-    "strip_ids",
-    "window",
-]
-
 _FAR_MORE = 10.0
 """Times as many points as were asked for are too many."""
 _AT_ONCE = 2**22

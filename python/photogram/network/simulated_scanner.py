@@ -19,8 +19,6 @@ from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_id
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
-__all__ = ["Flown", "scanned"]
-
 _BETWEEN = 60.0
 """Seconds between two passes, at least."""
 _PERIODS = 8.0, 30.0

@@ -6,8 +6,6 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 
-__all__ = ["strips_of"]
-
 
 def strips_of(positions: Floats) -> list[Indices]:
     """Cut photos at (P, 3) in metric axes, in their order, into strips: where the flight turns or jumps."""

@@ -10,8 +10,6 @@ from photogram.arguments.types import Bools, Indices
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness
 
-__all__ = ["IMAGES", "PHOTOS", "image_rows", "kept_images", "of_photos"]
-
 PHOTOS = (
     *("photo_positions", "photo_attitudes", "photo_position_sd", "photo_attitude_sd"),
     *("photo_positions_observed", "photo_attitudes_observed", "principal_distances", "photo_cameras"),

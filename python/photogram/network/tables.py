@@ -15,19 +15,6 @@ from photogram.messages import listed
 from photogram.network.cameras import Camera
 from photogram.network.geometry import Spheroid
 
-__all__ = [
-    "ATTITUDE_COLUMNS",
-    "GEOGRAPHIC_COLUMNS",
-    "RECTANGULAR_COLUMNS",
-    "Table",
-    "checked_cameras",
-    "different",
-    "numbered",
-    "photo_indices",
-    "table_arguments",
-]
-
-
 RECTANGULAR_COLUMNS = ("X", "Y", "Z")
 GEOGRAPHIC_COLUMNS = ("longitude_deg", "latitude_deg", "height")
 ATTITUDE_COLUMNS = ("omega_deg", "phi_deg", "kappa_deg")

@@ -6,8 +6,6 @@ import numpy as np
 
 from photogram.network.block import Block
 
-__all__ = ["FEWEST_TIES", "ties"]
-
 FEWEST_TIES = 3
 """Points that the orientation of a photo needs at least."""
 

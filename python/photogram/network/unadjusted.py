@@ -8,8 +8,6 @@ from typing import Protocol
 from photogram.arguments.types import Floats, Indices
 from photogram.network.observations import Observation
 
-__all__ = ["Given"]
-
 
 class Given(Protocol):
     """P photos, n points and m image points that are adjusted together: a block or a collection."""

@@ -17,8 +17,6 @@ from photogram.perspective_center.batch import Run, Stop
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
 from photogram.perspective_center.solution import INTERIOR, SINGULAR, PerspectiveCenter
 
-__all__ = ["listing"]
-
 NEW_PAGE = "\f"
 NOT_CONVERGED = "SORRY - SOLUTION DOES NOT CONVERGE"
 _MATRIX_ROW = fortranformat.FortranRecordWriter("(I3,3X,9D15.8)")

@@ -14,8 +14,6 @@ from photogram.show.judgement import judged, remarks_section
 from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Judgement, Layers, Page, Part, Section, Table, significant
 
-__all__ = ["run_page"]
-
 
 @page_of.register(Run)
 def run_page(run: Run) -> Page:

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.perspective_center.solution import PerspectiveCenter
 
-__all__ = ["draw", "figure"]
-
 WIDTH, ROW = 11.0, 5.0
 """Inches of a figure, and of one set in it."""
 LONGEST = 0.12

@@ -19,9 +19,6 @@ from photogram.show.quantity import Axis, Quantity, component, records
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["cycles", "points", "size_of", "summary", "to_json", "unknowns"]
-
-
 _PLACE = tuple(map(Axis, "XYZ"))
 _PLAN = _PLACE[:2]
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["Plan", "plan"]
-
 
 @dataclass(frozen=True)
 class Plan(Paged):

@@ -26,8 +26,6 @@ from photogram.show.page import (
     significant,
 )
 
-__all__ = ["plan_page"]
-
 NOTICED = 1.05
 """Ratio of standard deviations below which patterns are called alike."""
 

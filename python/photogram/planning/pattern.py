@@ -26,8 +26,6 @@ from photogram.planning.statistics import (
 )
 from photogram.results.result import Result
 
-__all__ = ["Pattern"]
-
 
 @dataclass(frozen=True, eq=False)
 class Pattern:

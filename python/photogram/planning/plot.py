@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 
     from photogram.planning.pattern import Pattern
 
-__all__ = ["figure"]
-
-
 _PANEL = 6.0
 """Longer side of a panel, inches."""
 _ELONGATED = 2.5

@@ -21,19 +21,6 @@ from photogram.network.trajectories import Readout
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
 
-__all__ = [
-    "ControlQuality",
-    "MotionQuality",
-    "PhotoQuality",
-    "PointQuality",
-    "control_quality",
-    "locations",
-    "motion_quality",
-    "photo_quality",
-    "point_quality",
-    "with_known_readout",
-]
-
 LOCATIONS = ("corner", "edge", "interior")
 
 

@@ -15,8 +15,6 @@ from photogram.show.sections import composed, headline
 if TYPE_CHECKING:
     from photogram.planning.pattern import Pattern
 
-__all__ = ["axis_figures", "counts", "motion_shown", "on_the_ground", "remarks", "report", "what_next"]
-
 _NOTICED = 1.005
 """Ratio of standard deviations that two decimals show."""
 _MUCH = 1.1

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["PICTURES", "Plots", "figures", "picture_files"]
-
 PICTURES: dict[str, Callable[..., Any]] = {
     "network": network,
     "residuals": residuals,

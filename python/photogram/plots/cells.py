@@ -7,8 +7,6 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Cells", "cells"]
-
 
 @dataclass(frozen=True, eq=False)
 class Cells:

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.image import AxesImage
 
-__all__ = ["correlations"]
-
 CAMERAS = 4
 """That have a panel at most."""
 WRITTEN = 14

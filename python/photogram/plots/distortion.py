@@ -15,8 +15,6 @@ from photogram.show.style import COLOURS, FAINT, INK
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["distortion", "draw_curves", "rows_of"]
-
 CAMERAS = 3
 """That are drawn at most, side by side."""
 

@@ -14,8 +14,6 @@ from photogram.show.style import COLOURS, FAINT
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["features"]
-
 SHOWN = 4
 """Features that have a panel at most."""
 NAMED = 40

@@ -15,8 +15,6 @@ from photogram.show.style import FAINT, INK
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["films"]
-
 SHOWN = 6
 """Fields that have a panel at most."""
 ROOM = 0.14

@@ -16,8 +16,6 @@ from photogram.show.style import BLUE, FAINT, INK, ORDERED, PURPLE, SOFT, VERMIL
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["network", "thinned", "view_of_plan"]
-
 POINTS, PHOTOS, FOOTPRINTS, ELLIPSES, VECTORS = 6000, 2000, 400, 150, 300
 """How many of each are drawn at most."""
 NAMED = 40

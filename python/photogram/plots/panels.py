@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     Where: TypeAlias = Axes | Sequence[Axes] | NDArray[Any] | Figure | SubFigure | None
 
-__all__ = ["NOWHERE", "Where", "figure_of", "handed_out", "labels", "note", "panels", "placed", "scale_bars"]
-
 if not TYPE_CHECKING:
     Where = Any
     """Axes, as many as there are panels, a figure to put them in, or None: a new one of pyplot."""

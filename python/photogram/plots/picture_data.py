@@ -17,8 +17,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.methods import Way
 from photogram.statistics.outliers import Observations
 
-__all__ = ["Correlated", "Curve", "Curves", "Deviations", "Images", "Pictured", "Plan", "pictured"]
-
 
 @dataclass(frozen=True, eq=False)
 class Plan:

@@ -18,8 +18,6 @@ from photogram.show.style import INK, ORDERED
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["redundancy"]
-
 SINGLE = 600
 """Image points that are drawn one by one at most."""
 CELLS = 16

@@ -16,8 +16,6 @@ from photogram.show.style import FAINT, INK, MARKED
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["frame", "largest_cameras", "residuals"]
-
 SINGLE = 900
 """Image points of a camera whose residuals are drawn one by one at most; of more, the means of cells."""
 CELLS = 16

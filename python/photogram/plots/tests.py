@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from photogram.statistics.outliers import Observations
 
-__all__ = ["tests"]
-
 QUANTILES = 1500
 """Test values that are drawn against the normal distribution at most; the largest are always among them."""
 ENDS = 200

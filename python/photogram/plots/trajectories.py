@@ -10,8 +10,6 @@ from photogram.errors import InputError
 from photogram.plots.panels import Where, handed_out, panels
 from photogram.show.style import INK
 
-__all__ = ["trajectory"]
-
 TIMES = 160
 """At which corrections and their bands are computed."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73")

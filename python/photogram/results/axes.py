@@ -5,8 +5,6 @@ from __future__ import annotations
 from photogram.network.block import Block
 from photogram.show.quantity import Axis
 
-__all__ = ["TURNS", "component_axis", "image_axes", "point_axes"]
-
 TURNS = tuple(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa"))
 """Of attitudes."""
 

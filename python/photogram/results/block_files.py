@@ -62,8 +62,6 @@ from photogram.results.tables import TABLES
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.methods import files_of
 
-__all__ = ["CLASSES", "KIND", "STANDS", "KeptTrajectory", "block_files", "read_block_result"]
-
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
 CHECK_SD = "standard deviation of the given {} of a check point; NaN where not known"

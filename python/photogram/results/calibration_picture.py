@@ -21,8 +21,6 @@ from photogram.show.style import BLUE, INK
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_distortion", "draw_lens_field"]
-
 
 def draw_distortion(
     result: Result, camera: AdjustedCamera, path: Path | None = None, ax: Where = None

@@ -15,8 +15,6 @@ from photogram.results.result import Result
 from photogram.show.quantity import members
 from photogram.show.sections import Section
 
-__all__ = ["calibration_members", "calibration_sections", "law_of", "outcome", "values_written"]
-
 LISTED = 20
 """Cameras that a report describes in full; the table of cameras and the JSON document have all."""
 NAMED = 3

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from photogram.show.quantity import Axis
     from photogram.statistics.findings import Agreement
 
-__all__ = ["CheckPoints", "check_points", "point_kinds", "tested_together"]
-
 MOST = 1000
 """Check points that are tested together: of more every second, third ..."""
 

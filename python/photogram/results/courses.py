@@ -15,8 +15,6 @@ from photogram.results.trajectories import corrections
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.quantity import Axis, Quantity, of_each
 
-__all__ = ["POSES", "Course", "courses", "courses_table", "notable", "notable_courses"]
-
 POSES = (
     "Of photos on trajectories these are the poses at their own times; of scanners without one, in the middle"
     " of their images."

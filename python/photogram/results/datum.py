@@ -11,9 +11,10 @@ from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, counted, listed
-from photogram.network.block import ATTITUDE_COLUMNS, Block
+from photogram.network.block import Block
 from photogram.network.datum import DatumRow, InnerConstraints
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
+from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.results.covariance import Failure
 from photogram.results.selection import photo_components
 

@@ -21,8 +21,6 @@ from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.methods import document_of
 from photogram.show.quantity import Quantity, Table, chosen, members, records
 
-__all__ = ["block_members", "network_members", "to_json"]
-
 
 @document_of.register(Result)
 def to_json(result: Result) -> bytes:

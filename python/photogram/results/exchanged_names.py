@@ -23,8 +23,6 @@ from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, meet
 from photogram.statistics.distributions import critical_chi_square
 
-__all__ = ["Exchange", "exchanged_names"]
-
 MOST = 40
 """Images of a photo that are out; with more of them it is the photo."""
 LEVEL, CHANCE = 0.001, 1e-4

@@ -12,8 +12,6 @@ from photogram.show.page import decimals_of, fixed
 from photogram.show.quantity import members
 from photogram.show.sections import Section
 
-__all__ = ["features_document", "features_sections", "through", "written"]
-
 SHOWN = 4
 """Points that are named of each feature."""
 

@@ -15,8 +15,6 @@ from photogram.results.network_trial import OBSERVATION
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
 
-__all__ = ["MarkResiduals", "film_patterns", "mark_residuals", "mean_mark_residuals"]
-
 STEPS = 9
 """Places of a pattern along a side of the format."""
 

@@ -13,17 +13,6 @@ from photogram.results.result import Result
 from photogram.show.lines import field, stacked, table_lines
 from photogram.show.quantity import Axis, Quantity, members
 
-__all__ = [
-    "fiducial_members",
-    "film_lines",
-    "film_members",
-    "film_table",
-    "form_table",
-    "mark_table",
-    "scanner_members",
-    "scanner_table",
-]
-
 _UNITS = ("mm", "mm", "rad", "", "", "")
 _SAID = (*(Axis("scale x"), Axis("scale y")), *(Axis.of("between axes", "rad"), Axis.of("rotation", "rad")))
 _DEVICE = (Axis.of("Sx", ""), Axis.of("Sy", ""), Axis.of("alpha", "rad"))

@@ -17,8 +17,6 @@ from photogram.network.observations import Fiducial
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.unknowns import AdjustedUnknown
 
-__all__ = ["OnFilm", "numbers_of_film"]
-
 
 class OnFilm:
     """What a result says of scanned films and plates, and of their fiducial marks."""

@@ -23,8 +23,6 @@ from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["HARMFUL", "block_findings", "groups_tested", "has_redundancy", "network_findings", "unseen"]
-
 ROBUST = "a robust loss changes the weights"
 """Why there is no global test with one."""
 

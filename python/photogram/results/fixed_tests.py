@@ -26,22 +26,6 @@ from photogram.results.result import Result
 from photogram.results.scores import score
 from photogram.statistics.findings import Tested
 
-__all__ = [
-    "HELD",
-    "SUSPECTED",
-    "Held",
-    "as_adjusted",
-    "fall_by_lens",
-    "held_remark",
-    "held_tested",
-    "held_tests",
-    "how_to_calibrate",
-    "is_suspected",
-    "lens_partials",
-    "station_partials",
-    "usual_parameters",
-]
-
 HELD = "held values"
 """The kind of these tests."""
 SUSPECTED = 5

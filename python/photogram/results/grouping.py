@@ -15,8 +15,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.unadjusted import Given
 from photogram.statistics.components import GroupsOf
 
-__all__ = ["BASES", "Grouping", "GroupsArgument", "Observables", "grouped"]
-
 GroupsArgument = str | Sequence[str] | Mapping[str, Any]
 """A basis, several of them (every combination is a group), or labels by part of the network."""
 

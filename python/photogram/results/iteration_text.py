@@ -10,8 +10,6 @@ from photogram.results.iteration import Iteration
 from photogram.show.lines import field, table_lines
 from photogram.show.quantity import Quantity, Table
 
-__all__ = ["iteration_lines", "iteration_table"]
-
 
 def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
     """Return numbers, sums after the corrections, largest changes, damping; first the start, if given."""

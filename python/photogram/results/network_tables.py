@@ -15,24 +15,6 @@ from photogram.results.observation_kinds import ObservedKind
 from photogram.show.methods import Way
 from photogram.show.quantity import Axis, Link, Quantity
 
-__all__ = [
-    "TABLES",
-    "Terms",
-    "control",
-    "deviation",
-    "difference",
-    "images",
-    "iterations",
-    "names",
-    "part",
-    "photos",
-    "points",
-    "redundancy",
-    "stations",
-    "terms_of",
-    "test_value",
-]
-
 _FREE = {np.inf: "free", 0.0: "fixed"}
 
 

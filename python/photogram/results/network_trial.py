@@ -23,17 +23,6 @@ from photogram.statistics.snooping.suspects import (
     Tests,
 )
 
-__all__ = [
-    "ATTITUDE",
-    "CONTROL",
-    "IMAGE",
-    "KINDS",
-    "OBSERVATION",
-    "POSITION",
-    "NamedSuspects",
-    "NetworkTrial",
-]
-
 KINDS = ("image", "control", "position", "attitude", "observation", "camera", "unknown")
 """What the suspects of the core are of, by their numbers."""
 IMAGE, CONTROL, POSITION, ATTITUDE, OBSERVATION = range(5)

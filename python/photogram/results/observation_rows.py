@@ -19,19 +19,6 @@ from photogram.statistics.findings import Tested, by_t, by_w
 from photogram.statistics.outliers import Observations
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = [
-    "NOTABLE",
-    "control_lines",
-    "image_lines",
-    "is_held",
-    "largest",
-    "largest_of",
-    "observed_lines",
-    "suspect_lines",
-    "tested_observations",
-    "tested_singly",
-]
-
 NOTABLE = 3.0
 """Test values above are listed; what decides is the limit of the tests, which stands in the verdict."""
 SUSPECTS = 20

@@ -28,8 +28,6 @@ from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.patterns import durbin_watson, frame_pattern, moran
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["DrawnPattern", "drawn_patterns"]
-
 CLIPPED = 3.0
 """Larger test values count as this one."""
 TOGETHER = 20

@@ -23,8 +23,6 @@ from photogram.statistics.findings import Systematic
 from photogram.statistics.patterns import SPEAKING, Fit, frame_pattern, group_patterns, normality, regression
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["CameraImages", "patterns"]
-
 LEVEL_OF_PATTERNS = 0.001
 """Patterns are looked for in many ways: only what is very unlikely by chance is told."""
 NOTABLE = 0.3

@@ -34,8 +34,6 @@ from photogram.results.observation_rows import tested_observations
 from photogram.results.result import Result
 from photogram.statistics.outliers import Observations
 
-__all__ = ["PicturedBlock", "PicturedNetwork", "curves_of"]
-
 
 class PicturedNetwork(Pictured):
     """What is drawn alike of all adjusted networks."""

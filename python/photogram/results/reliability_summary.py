@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-__all__ = ["KindReliability", "ReliabilitySummary", "WeakObservation", "reliability_summary"]
-
 LISTED = 5
 """Observations of each kind that are listed."""
 PAIRS = 10

@@ -50,20 +50,6 @@ if TYPE_CHECKING:
 FLOWN, WORST = 100, 20
 """Observations of trajectories up to which all are listed, and components that are where they are more."""
 
-__all__ = [
-    "ORDERINGS",
-    "bandwidths",
-    "details",
-    "first_sections",
-    "problems_of",
-    "reliability_lines",
-    "report",
-    "rms_of",
-    "size_of",
-    "summary",
-    "suspects_section",
-]
-
 ORDERINGS = {
     "input": "in input order",
     "rcm": "by reverse Cuthill-McKee",

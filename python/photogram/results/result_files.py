@@ -28,22 +28,6 @@ from photogram.network.frame import Frame
 from photogram.results.network import AdjustedNetwork
 from photogram.show.quantity import Table
 
-__all__ = [
-    "GIVEN_SD",
-    "REDUNDANCY",
-    "SUMMARY",
-    "TRIANGLE",
-    "Part",
-    "Saved",
-    "image_parts",
-    "point_parts",
-    "read_saved",
-    "read_summary",
-    "rows_of",
-    "sheet",
-    "written",
-]
-
 FORMAT = 2
 SUMMARY = "summary.json"
 _STATE = "state"

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from photogram import _photocore
     from photogram.arguments.types import Floats, Indices
 
-__all__ = ["Scores", "quadratic", "score"]
-
 TAKEN_UP = 1e-9
 """Of the partials; what is left of them beside the unknowns is rounding below it."""
 

@@ -12,18 +12,8 @@ from photogram.arguments.arrays import names, shown
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.block import ATTITUDE_COLUMNS, Block, position_columns
-
-__all__ = [
-    "Adjusted",
-    "Item",
-    "Selected",
-    "Selection",
-    "Things",
-    "Wanted",
-    "photo_components",
-    "point_components",
-]
+from photogram.network.block import Block, position_columns
+from photogram.network.tables import ATTITUDE_COLUMNS
 
 Wanted = str | int | Sequence[str] | Sequence[int] | None
 """A name, names, or None for all; the photos and points of collections are called by their numbers."""

@@ -20,8 +20,9 @@ from photogram.show.summary import Brief, Rows, few
 from photogram.statistics.findings import Findings, Removed
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
-from photogram.statistics.snooping.snooping import Outcome, Settings
+from photogram.statistics.snooping.snooping import Outcome
 from photogram.statistics.snooping.suspects import Standing, Suspects
+from photogram.statistics.snooping.taking_out import Settings
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -23,8 +23,6 @@ from photogram.results.network_trial import (
 )
 from photogram.statistics.snooping.suspects import Suspects
 
-__all__ = ["block_suspects", "network_trial", "observations_of_core"]
-
 ANGLES = ("omega", "phi", "kappa")
 
 

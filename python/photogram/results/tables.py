@@ -32,17 +32,6 @@ from photogram.show.methods import columns_of
 from photogram.show.quantity import Axis, Quantity, component, frame, joined, long
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = [
-    "TABLES",
-    "camera_parameters",
-    "check_points",
-    "observations",
-    "observed_components",
-    "redundancy_by_kind",
-    "unheld",
-    "unknowns",
-]
-
 _EITHER = "standard deviation that was given, or is assumed: {}"
 _FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
     "feature": ("name", "name of the feature"),

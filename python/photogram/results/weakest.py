@@ -14,16 +14,6 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.show.methods import Way
 
-__all__ = [
-    "Determined",
-    "WeakestPhoto",
-    "WeakestPoint",
-    "determined",
-    "weakest_lines",
-    "weakest_photos",
-    "weakest_points",
-]
-
 WORST = 10
 NEAR = 1e-3
 """Distance from a station, in the median of such distances, below which a point stands first."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["ARCSEC", "degrees_minutes_seconds"]
-
 ARCSEC = math.pi / 648000.0
 """One second of arc in radians."""
 

@@ -15,8 +15,6 @@ from photogram.show.page import Cell, Column, Table, decimals_of, fixed, signifi
 from photogram.show.quantity import Axis, Quantity, long
 from photogram.show.quantity import Table as Quantities
 
-__all__ = ["LISTED", "long_table", "page_table", "unit_written"]
-
 LISTED = 120
 """Rows of a table with a row for each component at most."""
 _SIGNS = {

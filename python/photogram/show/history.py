@@ -23,18 +23,6 @@ if TYPE_CHECKING:
     from photogram.statistics.history import History
     from photogram.statistics.verdict import Verdict
 
-__all__ = [
-    "charts_section",
-    "control_charts",
-    "history_document",
-    "history_page",
-    "history_text",
-    "series",
-    "series_lines",
-    "series_table",
-    "values_table",
-]
-
 ACROSS = 3
 """Charts beside each other."""
 

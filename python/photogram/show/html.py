@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-__all__ = ["inlined", "page_html"]
-
 LONG = 16
 """Characters of a word that a table may break; shorter ones give the least width of their column."""
 

@@ -10,8 +10,6 @@ from photogram.show.page import Cell, Column, Judgement, Remarks, Section, Table
 if TYPE_CHECKING:
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["judged", "remarks_section", "signs_of", "tests_section", "verdict_table"]
-
 MARKS: dict[Tone, str] = {
     "good": "Usable",
     "look": "Usable, but look first",

@@ -16,8 +16,6 @@ from photogram.show.quantity import Axis, Quantity
 if TYPE_CHECKING:
     from photogram.show.page import Fact
 
-__all__ = ["Field", "fact_lines", "field", "marks", "stacked", "table_lines"]
-
 
 @dataclass(frozen=True)
 class Field:

@@ -21,22 +21,6 @@ if TYPE_CHECKING:
     from photogram.statistics.findings import Findings
     from photogram.statistics.verdict import Verdict
 
-__all__ = [
-    "Judged",
-    "Paged",
-    "Shown",
-    "Way",
-    "axes_of",
-    "columns_of",
-    "document_of",
-    "files_of",
-    "findings_of",
-    "page_of",
-    "report_of",
-    "statement_of",
-]
-
-
 P = ParamSpec("P")
 R = TypeVar("R")
 F = TypeVar("F", bound=Callable[..., Any])

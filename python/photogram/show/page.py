@@ -17,28 +17,6 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = [
-    "Cell",
-    "Column",
-    "Drawing",
-    "Fact",
-    "Facts",
-    "Judgement",
-    "Layers",
-    "Page",
-    "Part",
-    "Picture",
-    "Remarks",
-    "Row",
-    "Section",
-    "Table",
-    "Text",
-    "Tone",
-    "decimals_of",
-    "fixed",
-    "significant",
-]
-
 T = TypeVar("T")
 
 Tone = Literal["", "good", "look", "bad"]

@@ -26,8 +26,6 @@ from photogram.show.page import Drawing, Facts, Judgement, Layers, Page, Part, R
 from photogram.show.style import styled
 from photogram.show.vectors import FigureFlowable
 
-__all__ = ["page_pdf"]
-
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 INK, SOFT, RULE = "#17212b", "#55626e", "#d6dce1"
 TONES = {"good": "#00694a", "look": "#8a5200", "bad": "#a3201a", "": INK}

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.quiver import Quiver
 
-__all__ = ["arrows", "decimal_sign", "drawn", "ellipses", "files", "new_figure", "round_length"]
-
 DPI = 120
 """Dots an inch of pictures that are made of dots."""
 SILENT: dict[str, dict[str, Any]] = {

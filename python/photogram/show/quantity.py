@@ -17,23 +17,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.angles import ARCSEC
 
-__all__ = [
-    "Axis",
-    "Link",
-    "Quantity",
-    "Table",
-    "chosen",
-    "component",
-    "frame",
-    "joined",
-    "labelled",
-    "long",
-    "members",
-    "of_each",
-    "records",
-]
-
-
 Kind = Literal["value", "deviation", "difference", "number", "name"]
 
 

@@ -13,8 +13,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import printable
 from photogram.show.page import Column, Fact, Facts, Part, Section, Table
 
-__all__ = ["InputFile", "Run", "input_files", "reproducibility"]
-
 PIECE = 1 << 20
 LISTED = 200
 """Input files that are listed at most."""

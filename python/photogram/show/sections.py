@@ -10,8 +10,6 @@ from photogram.statistics.evidence import Test
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
 
-__all__ = ["Section", "composed", "headline", "problems", "problems_or_none", "verdict_sections"]
-
 Section = tuple[str, list[str]]
 """A title and lines."""
 

@@ -14,23 +14,6 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
 
-__all__ = [
-    "BLUE",
-    "COLOURS",
-    "FAINT",
-    "INK",
-    "MARKED",
-    "ORDERED",
-    "PURPLE",
-    "SKY",
-    "SOFT",
-    "VERMILION",
-    "in_style",
-    "need_matplotlib",
-    "signed",
-    "styled",
-]
-
 P = ParamSpec("P")
 T = TypeVar("T")
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence, Sized
 from dataclasses import fields
 from textwrap import wrap
 
-__all__ = ["Brief", "Rows", "few", "told"]
-
 Rows = list[tuple[str, str]]
 """What is told, and the telling, each in a line."""
 

@@ -14,8 +14,6 @@ from reportlab.platypus import Flowable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FigureFlowable"]
-
 POINTS = 72
 """A PDF point is a dot of a figure of so many an inch."""
 CAPS = {"butt": 0, "round": 1, "projecting": 2}

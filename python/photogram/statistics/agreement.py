@@ -18,8 +18,6 @@ from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Agreement, Tested
 from photogram.statistics.limits import global_test
 
-__all__ = ["SINGULAR", "agreement", "quadratic", "root_of", "scale_of"]
-
 SINGULAR = 1e-12
 """Variance, in those of the components, below which a direction has none: known without error, and held."""
 BORDER = 2.0 / SINGULAR

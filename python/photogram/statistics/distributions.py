@@ -25,21 +25,6 @@ from numpy.typing import ArrayLike, NDArray
 from photogram import _photocore
 from photogram.errors import InputError
 
-__all__ = [
-    "LEVEL",
-    "b_method",
-    "benjamini_hochberg",
-    "bonferroni",
-    "critical_chi_square",
-    "critical_fisher",
-    "critical_normal",
-    "critical_student",
-    "critical_tau",
-    "lambda0",
-    "log_chi_square",
-    "log_fisher",
-]
-
 LEVEL = 0.05
 """Probability of a false alarm of the global test, and of any single test among all of an adjustment."""
 

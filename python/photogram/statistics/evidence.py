@@ -21,8 +21,6 @@ from photogram.statistics.findings import Findings, Systematic, Tested, by_f, by
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.statistics.outliers import Observations
 
-__all__ = ["Evidence", "Test"]
-
 NAMED = 5
 """Observations that a sentence names at most."""
 

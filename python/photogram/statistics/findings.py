@@ -20,19 +20,6 @@ from photogram.statistics.groups import GroupTests
 from photogram.statistics.limits import GlobalTest, externally_studentized
 from photogram.statistics.outliers import Observations
 
-__all__ = [
-    "Agreement",
-    "Findings",
-    "GroupFactor",
-    "Removed",
-    "Systematic",
-    "Tested",
-    "by_f",
-    "by_t",
-    "by_w",
-    "of_groups",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class Tested:

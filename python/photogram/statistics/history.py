@@ -34,8 +34,6 @@ from photogram.statistics.findings import Systematic
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["Change", "Dates", "History", "Series", "changed_of", "dates_of", "history", "unchanged_of"]
-
 YEAR = 365.2425
 """Days."""
 MOST = 3

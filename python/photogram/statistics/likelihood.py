@@ -19,8 +19,6 @@ from collections.abc import Sequence
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import global_test
 
-__all__ = ["CHANCE", "IMPROVEMENT", "RIVAL", "TESTED", "Judged", "judged", "likelihood"]
-
 IMPROVEMENT = 25.0
 """The sum of squares must fall by this factor, residuals to a fifth."""
 CHANCE = 1e-4

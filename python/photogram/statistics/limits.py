@@ -31,8 +31,6 @@ from photogram.statistics.distributions import (
     log_fisher,
 )
 
-__all__ = ["GlobalTest", "externally_studentized", "global_test", "normal_limit", "studentized_limit"]
-
 NOTABLE_FACTOR = 1.25
 """With many degrees of freedom the test finds disagreements that harm nobody: residuals larger than the
 standard deviations allow by less than this are no problem."""

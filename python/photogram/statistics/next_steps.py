@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from photogram.statistics.findings import Findings
 
-__all__ = ["next_steps"]
-
 _NEXT = {
     "not-converged": (
         "Do not use any of these figures: they are those of the last iteration, not of a solution.",

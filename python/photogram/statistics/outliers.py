@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
-__all__ = ["Observations", "outliers"]
-
 
 @dataclass(frozen=True)
 class Observations:

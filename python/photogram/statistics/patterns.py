@@ -16,20 +16,6 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = [
-    "SPEAKING",
-    "Fit",
-    "FramePattern",
-    "Normality",
-    "durbin_watson",
-    "frame_pattern",
-    "group_patterns",
-    "moran",
-    "moran_index",
-    "normality",
-    "regression",
-]
-
 MOST = 20_000
 """Values whose distribution is looked at; of more every so many-th."""
 

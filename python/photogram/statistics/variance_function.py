@@ -23,8 +23,6 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["FunctionEstimate", "Residuals", "estimate_function", "nonnegative"]
-
 LEAST = 1e-6
 """A redundancy number below this takes no part."""
 CLOSE = 0.01

@@ -17,8 +17,6 @@ from photogram.statistics.findings import Findings
 from photogram.statistics.limits import NOTABLE_FACTOR
 from photogram.statistics.next_steps import next_steps
 
-__all__ = ["EXIT_NOT_CONVERGED", "EXIT_NOT_USABLE", "Test", "Verdict", "verdict", "worst"]
-
 EXIT_NOT_CONVERGED, EXIT_NOT_USABLE = 3, 4
 """How a command ends: figures that are no results; results that must not be used as they are."""
 

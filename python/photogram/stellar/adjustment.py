@@ -19,8 +19,6 @@ from photogram.stellar.problem import Problem, degrees_of_freedom
 from photogram.stellar.result import PreRun, Result, Stage
 from photogram.stellar.state import Solved
 
-__all__ = ["calibrate"]
-
 
 def calibrate(
     problem: Problem, *, threads: int | None = None, progress: Callable[..., None] | None = None

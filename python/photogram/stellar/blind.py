@@ -23,9 +23,6 @@ from photogram.stellar.places import Earth, equatorial_axes, sidereal_time, to_d
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 
-__all__ = ["ATTITUDE", "FIELD", "Located", "locate"]
-
-
 ATTITUDE, FIELD = math.radians(1.5), 0.05
 """What attitudes and principal distances that are found so may be wrong: radians, and a share."""
 _STEP = 1.3

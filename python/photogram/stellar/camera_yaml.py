@@ -21,8 +21,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 
-__all__ = ["WITH_YAML", "YamlForm", "read_yaml", "to_yaml"]
-
 YamlForm = Literal["opencv", "ros"]
 """What the file is for."""
 

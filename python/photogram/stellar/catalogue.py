@@ -14,8 +14,6 @@ from photogram.io.rows import Row, read_rows
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import ARCSEC
 
-__all__ = ["Catalogue"]
-
 _MAS = 1e-3 * ARCSEC
 _ERRORS = ("ra_error_mas", "dec_error_mas", "pm_ra_error_mas", "pm_dec_error_mas")
 _COLUMNS = ("id", "ra_deg", "dec_deg", "pm_ra_mas", "pm_dec_mas", "parallax_mas", "magnitude")

@@ -13,17 +13,6 @@ from photogram.stellar.parameters import INDEX
 from photogram.stellar.result import Result
 from photogram.stellar.sky import TAU, refraction
 
-__all__ = [
-    "DistortionCurves",
-    "Histogram",
-    "RefractionCurves",
-    "distortion_curves",
-    "histogram",
-    "refraction_curves",
-    "residual_classes",
-    "star_means",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class DistortionCurves:

@@ -16,8 +16,6 @@ from photogram.stellar.parameters import GRAD, NAMES
 from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
 from photogram.stellar.sky import Air, Site
 
-__all__ = ["read_deck"]
-
 
 class Card(Record):
     """A card: fields are taken by their first and last column, counted from 1."""

@@ -24,8 +24,6 @@ from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.result import Ellipse, Result, Stage
 
-__all__ = ["to_json"]
-
 
 def to_json(result: Result) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""

@@ -14,9 +14,6 @@ from photogram.stellar.curves import histogram
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "band", "bell", "panels", "vectors"]
-
-
 _LENGTH = 0.05
 """Length of a residual of the mean size, of the extent of the picture."""
 

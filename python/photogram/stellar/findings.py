@@ -15,8 +15,6 @@ from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.outliers import studentized
 from photogram.stellar.result import SIGNIFICANT, Result
 
-__all__ = ["night_findings", "plate_findings"]
-
 Named = Callable[[tuple[int, ...]], str]
 
 

@@ -8,8 +8,6 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.stellar.sky import Site
 
-__all__ = ["HOUR", "landmark"]
-
 HOUR = 0.0
 """Sidereal time of all images of a landmark, radians: it does not turn with the sky."""
 _STEP = 1e-6

@@ -29,20 +29,6 @@ from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky_cameras import SkyCamera
 
-__all__ = [
-    "DECISIVE",
-    "LEVEL",
-    "POSITIVE",
-    "LensFit",
-    "LensTest",
-    "as_lens",
-    "compared_lenses",
-    "equal",
-    "test_scale",
-    "test_terms",
-]
-
-
 LEVEL = 0.01
 """Probability that terms that are zero are kept."""
 NOTABLE = 0.2

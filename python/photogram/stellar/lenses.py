@@ -8,8 +8,6 @@ from collections.abc import Callable
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["LENSES", "Lens", "lens_named"]
-
 
 @dataclass(frozen=True)
 class Lens:

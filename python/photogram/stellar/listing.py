@@ -14,8 +14,6 @@ from photogram.stellar.lens_choice import LEVEL, equal
 from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.result import SIGNIFICANT, Result, Stage
 
-__all__ = ["descriptors", "listing", "plate_list", "summary"]
-
 
 def listing(result: Result) -> str:
     """Return the listing of a calibration."""

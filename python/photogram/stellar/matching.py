@@ -12,9 +12,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.odds import ACCEPTED, CERTAIN, CROWDED, expected_false, star_probabilities
 
-__all__ = ["FEWEST", "STRETCH", "Match", "Search", "match"]
-
-
 _SEEDS = 25
 """Brightest images that make hypotheses; three times as many vote for them."""
 _EXACT = 20

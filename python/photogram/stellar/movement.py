@@ -14,9 +14,6 @@ from photogram.stellar.problem import Problem
 from photogram.stellar.result import FictitiousPoint, Movement, Result
 from photogram.stellar.state import Solved
 
-__all__ = ["combine", "constraints", "fictitious_points", "modify", "movement", "pairs_to_combine"]
-
-
 _DIAGONAL = np.arange(9) * 0.01
 """x = y of the fictitious points, metres."""
 PAIRS = ((0, 1), (1, 2), (0, 2))

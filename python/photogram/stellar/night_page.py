@@ -38,8 +38,6 @@ from photogram.stellar.night_tables import (
 )
 from photogram.stellar.page import plate_pictures
 
-__all__ = ["night_page"]
-
 WORST = 25
 """Images in the table of the worst."""
 LISTED = 200

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.show.style import FAINT, INK, in_style
-from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
+from photogram.show.style import COLOURS, FAINT, INK, in_style
+from photogram.stellar.drawing import band, bell, panels, vectors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from photogram.stellar.night_result import CalibratedNight
-
-__all__ = ["figures"]
 
 _NAMED = len(COLOURS)
 """Exposures that have a colour of their own; more are drawn alike."""

@@ -32,8 +32,6 @@ from photogram.stellar.night_tables import (
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
 from photogram.stellar.parameters import GRAD
 
-__all__ = ["report", "summary", "to_json"]
-
 
 def to_json(result: CalibratedNight) -> bytes:
     """Return the whole result as JSON (UTF-8). What is not a number is null."""

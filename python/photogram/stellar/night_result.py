@@ -24,9 +24,6 @@ from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import SkyCamera
 
-__all__ = ["SIGNIFICANT", "CalibratedNight", "Night"]
-
-
 CORRELATED = 0.95
 """Correlations above this are named."""
 SIGNIFICANT = 1.96

@@ -21,9 +21,6 @@ from photogram.stellar.pointing import turn_between
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, calibrate_exposures
 from photogram.stellar.sky_cameras import SkyCamera
 
-__all__ = ["Run", "Seen", "adjusted", "setting_of"]
-
-
 _ROUNDS = 20
 _REACH = 3.0
 """Distance from a predicted image up to which a measured one is called its star at least, pixels."""

@@ -17,21 +17,6 @@ from photogram.stellar.pointing import axis_of
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "attitudes",
-    "exposure_table",
-    "exposures",
-    "facts",
-    "fit",
-    "image_table",
-    "images",
-    "inertial",
-    "largest",
-    "lens_tests",
-    "lenses",
-    "stars",
-]
-
 _PIXELS = (Axis.of("x", "px", "_px"), Axis.of("y", "px", "_px"))
 _PLACE = (Axis.of("ra", "arcsec"), Axis.of("dec", "arcsec"))
 

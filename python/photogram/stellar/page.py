@@ -32,8 +32,6 @@ from photogram.stellar.parameters import GRAD, INDEX, NAMES, UNITS
 from photogram.stellar.plots import figures
 from photogram.stellar.result import Ellipse, Result
 
-__all__ = ["plate_page", "plate_pictures"]
-
 WORST = 25
 """Plate coordinates in the table of the worst."""
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["COMMON", "GRAD", "GROUPS", "INDEX", "NAMES", "TAU", "UNITS"]
-
 GRAD = math.pi / 200.0
 """One grad in radians."""
 

@@ -19,18 +19,6 @@ from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.pointing import pole_matrix, terrestrial
 from photogram.stellar.sky import Effects, Site
 
-__all__ = [
-    "Earth",
-    "InertialAttitude",
-    "apparent_places",
-    "epoch",
-    "equatorial_axes",
-    "inertial_attitude",
-    "sidereal_time",
-    "to_date",
-]
-
-
 _ALL = Effects()
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d(?:\.\d*)?)Z?")
 

@@ -26,9 +26,6 @@ from photogram.stellar.problem import Axis, Problem, default_parameters, rejecte
 from photogram.stellar.sky import Site
 from photogram.stellar.tomlfile import effects, pole_arcsec, site
 
-__all__ = ["inputs", "read_plain"]
-
-
 _OPTIONS: dict[str, Callable[[Table, str], Any]] = {
     "common_scale": Table.switch,
     "refraction": Table.switch,

@@ -8,8 +8,6 @@ from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.stellar.parameters import NAMES, UNITS
 
-__all__ = ["plate_camera"]
-
 _INTERIOR = NAMES[9:22]
 _IN_MODEL = {"cx": "c", "cy": "c_y"}
 _METRE = 1000.0

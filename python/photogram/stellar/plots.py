@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.show.angles import ARCSEC
-from photogram.show.style import FAINT, in_style
+from photogram.show.style import COLOURS, FAINT, in_style
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
-from photogram.stellar.drawing import COLOURS, band, bell, panels, vectors
+from photogram.stellar.drawing import band, bell, panels, vectors
 from photogram.stellar.parameters import GROUPS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from photogram.stellar.result import Result
-
-__all__ = ["figures"]
 
 
 @in_style

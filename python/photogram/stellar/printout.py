@@ -18,8 +18,6 @@ from photogram.stellar.parameters import GROUPS
 from photogram.stellar.result import Result, Stage
 from photogram.stellar.sky import Site
 
-__all__ = ["exponential", "printout"]
-
 WIDTH = 132
 
 

@@ -18,9 +18,6 @@ from photogram.errors import AdjustmentError
 from photogram.stellar.problem import Problem, degrees_of_freedom, failure, singular
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["DIVERGED", "SETTLED", "iterate", "residual_cycle", "stop_reason"]
-
-
 DIVERGED = "FOUR DIVERGENT STEPS OCCURRED"
 SETTLED = "ITERATION RESULTS DIFFER BY LESS THAN TOLERANCE SETTING"
 PASSES = 6

@@ -16,9 +16,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
 
-__all__ = ["ABERRATION", "HECTOPASCAL", "TAU", "Air", "Effects", "Site", "refraction"]
-
-
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
 """Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""
 ABERRATION = 0.320 * ARCSEC

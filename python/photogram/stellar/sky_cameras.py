@@ -20,8 +20,6 @@ from photogram.network.cameras import Camera
 from photogram.stellar.lenses import LENSES, Lens, lens_named
 from photogram.stellar.sky import TAU
 
-__all__ = ["COMMON", "BrownCamera", "SkyCamera", "read_any", "read_camera", "read_document", "weight_of"]
-
 
 def weight_of(covariance: Floats) -> Floats:
     """Return the weight matrix of a covariance whose rows differ by orders of magnitude.

@@ -10,8 +10,6 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.stellar.problem import Problem
 
-__all__ = ["Level", "Solved"]
-
 
 @dataclass(frozen=True)
 class Level:

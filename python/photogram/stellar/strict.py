@@ -13,9 +13,6 @@ from photogram.arguments.types import Bools, Floats
 from photogram.stellar.problem import Problem, degrees_of_freedom, failure
 from photogram.stellar.state import Level, Solved
 
-__all__ = ["iterate"]
-
-
 _EXPECTED = 1e-6
 """Mean error of a direction to begin with, radians."""
 _ROUGH, _FINE, _FINEST = 1e-3, 1e-4, 1e-9

@@ -22,26 +22,6 @@ from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.result import Ellipse, Result, ellipse
 
-__all__ = [
-    "axis",
-    "comparator",
-    "degrees",
-    "directions",
-    "distortion",
-    "fictitious",
-    "hours",
-    "images",
-    "inverse",
-    "means",
-    "movement",
-    "parameters",
-    "pre_run",
-    "refraction",
-    "residual_histogram",
-    "stars",
-    "transformed",
-]
-
 
 def _shown(name: str, value: float) -> float:
     return value / GRAD if UNITS[name] == "rad" else value

@@ -10,8 +10,6 @@ from photogram.io.toml_tables import Table
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 
-__all__ = ["effects", "pole_arcsec", "site"]
-
 _STATION = {
     "latitude_deg",
     "longitude_east_deg",

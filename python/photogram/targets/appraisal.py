@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.results.result import Result
 
-__all__ = ["appraise", "cross_validate", "median_distance"]
-
 FEWEST = 3
 """Views of a part."""
 

@@ -19,8 +19,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.summary import Brief, Rows
 
-__all__ = ["Board", "BoardKind", "Shape"]
-
 BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric_circles", "points"]
 Shape = Literal["held", "bend", "points"]
 """What of a board is unknown: nothing, the two deflections of its middle lines, or every point."""

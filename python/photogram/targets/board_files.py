@@ -17,8 +17,6 @@ from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import nearest
 from photogram.targets.board import Board
 
-__all__ = ["is_board", "picture_size", "read_board"]
-
 BOARD_FILE = "board.toml"
 _WORDS = ("kind", "unit", "shape")
 _COUNTS = ("columns", "rows")

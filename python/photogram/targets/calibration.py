@@ -27,8 +27,6 @@ from photogram.targets.regularisation import regularised
 from photogram.targets.start import Start
 from photogram.targets.vision import FLIP, photo_poses
 
-__all__ = ["Calibration", "simulate_corners", "weighted_block"]
-
 
 class Calibration(Start):
     """Corners of a board in pictures of K cameras, with values to start from: what is adjusted.

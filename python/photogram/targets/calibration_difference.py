@@ -17,8 +17,6 @@ from photogram.targets.motion_fit import Criterion, Fitted, differences_at, fitt
 from photogram.targets.projection import fixed_points, of_functions, point_partials, worst
 from photogram.targets.vision import imaged, unknown_of, values_of
 
-__all__ = ["CameraDifference", "Side", "compared"]
-
 DEFINED = 1e-5
 """Of the largest: what the cofactors of differences over a grid say less of is rounding."""
 TESTED = (12, 8)

@@ -34,15 +34,6 @@ from photogram.targets.projection import DatumName
 from photogram.targets.start import CLOCK, Start
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
-__all__ = [
-    "Calibrated",
-    "UnknownWeight",
-    "Worth",
-    "WorthOptions",
-    "deviation_of_corners",
-    "with_unknown_weight",
-]
-
 
 @dataclass(frozen=True)
 class WorthOptions:

@@ -39,8 +39,6 @@ from photogram.targets.motion_fit import Fitted, points_at
 from photogram.targets.output.rig import Rig
 from photogram.targets.vision import TURNED
 
-__all__ = ["Conversion", "convert_lens"]
-
 FIRMEST = 1e-2
 """Of the mean covariance of the images: what is added to each, so that no pixel weighs everything."""
 

@@ -21,8 +21,6 @@ from photogram.targets.board_files import is_board
 from photogram.targets.corner_views import Measured
 from photogram.targets.opencv_corners import BEGIN, is_npz, is_storage, read_npz, read_storage
 
-__all__ = ["KEY", "Form", "files_at", "holds_targets", "is_picture", "read_table", "read_vnl", "sorted_files"]
-
 _SYNONYMS: Mapping[str, str] = {
     **dict.fromkeys(("photo", "picture", "file", "filename", "img", "image_name"), "image"),
     **dict.fromkeys(("corner", "corner_id", "id", "target", "marker", "point_id"), "point"),

@@ -17,8 +17,6 @@ from photogram.messages import Message, listed
 from photogram.targets.board import Board
 from photogram.targets.corners import Corners
 
-__all__ = ["Grouping", "Measured", "ViewBy", "grouped"]
-
 ViewBy = Literal["name", "time"]
 Size = tuple[int, int]
 

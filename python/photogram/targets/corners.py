@@ -15,8 +15,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.show.summary import Brief, Rows, few
 
-__all__ = ["Corners"]
-
 FEWEST = 6
 """Corners with which a view says something of the camera."""
 _FLAT = 1e-3

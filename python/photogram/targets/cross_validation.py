@@ -26,16 +26,6 @@ from photogram.targets.housing import Housing
 from photogram.targets.projection import common_partials, datum_rows
 from photogram.targets.vision import unknown_of, values_of
 
-__all__ = [
-    "CrossValidation",
-    "DifferenceTest",
-    "Into",
-    "changes_between",
-    "cross_map",
-    "parts_agree",
-    "splits",
-]
-
 EXPLAINED = 0.01
 """Probability beyond which calibrations differ as they should."""
 

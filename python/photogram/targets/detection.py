@@ -26,8 +26,6 @@ from photogram.messages import Message, counted, listed
 from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured
 
-__all__ = ["detected"]
-
 Picture = NDArray[np.uint8]
 STEPS, STEP = 50, 1e-4
 """Iterations of a corner, and the step in pixels that ends them."""

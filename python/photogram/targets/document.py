@@ -22,8 +22,6 @@ from photogram.targets.maps import UncertaintyMap, map_name
 from photogram.targets.new_views import Suggestions
 from photogram.targets.tables import STRETCHES, board_fit, prior_shift, splines, views
 
-__all__ = ["calibration_document", "to_json", "worth_files", "worth_members"]
-
 
 @document_of.register(Calibrated)
 def to_json(calibrated: Calibrated) -> bytes:

@@ -24,8 +24,6 @@ from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.picture_parts import PARTS, parts_of
 from photogram.targets.vision import rays
 
-__all__ = ["findings", "judged", "showings"]
-
 TILTED, FEWEST = 15.0, 3
 """Degrees from which a view tells focal length and distance apart, and how many such views are enough."""
 FARTHER = 1.3

@@ -25,8 +25,6 @@ from photogram.targets.regularisation import WEAK
 from photogram.targets.sightings import LISTED, Listings, Sightings, frontal_tilts, nearest_rotations
 from photogram.targets.vision import composed, inverted
 
-__all__ = ["FirstCalibration", "connected", "first_values", "mean_pose", "nominal_camera", "weakly_known"]
-
 WIDE = "fisheye"
 """The family of lenses beyond the fields of perspective ones: equidistant."""
 SHARE = 0.1

@@ -31,21 +31,6 @@ from photogram.targets.sightings import (
 )
 from photogram.targets.vision import photo_poses, vision_poses
 
-__all__ = [
-    "NARROW",
-    "POOR",
-    "WIDEST",
-    "adjusted_views",
-    "first_camera",
-    "from_axis",
-    "misfits",
-    "picture_size",
-    "rays_of",
-    "trials",
-    "usual_models",
-    "wide",
-]
-
 ROUGHLY = 1e-3
 """Of a standard deviation: where steps end of what is only to be begun with."""
 

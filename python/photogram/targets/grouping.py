@@ -24,8 +24,6 @@ from photogram.show.quantity import Axis, Quantity
 from photogram.targets.calibration import weighted_block
 from photogram.targets.calibration_result import Calibrated
 
-__all__ = ["Groups", "corner_components", "mean_residuals", "residual_groups"]
-
 Groups = Literal["camera", "level", "point", "cell", "radius"]
 """What residuals are summed up by."""
 

@@ -15,8 +15,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
 from photogram.targets.vision import cross_matrices, imaged, motion_partials, unknown_of
 
-__all__ = ["Housing", "SeenCorners", "mean_motion", "transformed"]
-
 
 @dataclass(frozen=True, eq=False)
 class SeenCorners:

@@ -13,8 +13,6 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.vision import sensor_steps, unknown_of
 
-__all__ = ["camera_number", "housed_with", "housing_of", "size_of"]
-
 
 def camera_number(calibrated: Calibrated, camera: int | str) -> int:
     """Return the number of a camera by its number or name; an InputError where there is no such one."""

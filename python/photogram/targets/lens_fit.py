@@ -24,23 +24,6 @@ from photogram.targets.housing import transformed
 from photogram.targets.maps import image_grid
 from photogram.targets.vision import TURNED, motion_partials, moved_by, rays, values_of
 
-__all__ = [
-    "GRID",
-    "HELD",
-    "KNOTS",
-    "Moved",
-    "Points",
-    "field_of",
-    "fitted",
-    "fitted_in_stages",
-    "free_names",
-    "grid_of_pixels",
-    "is_perspective",
-    "lens_of",
-    "shows",
-    "within",
-]
-
 STEPS, CLOSE, NEAR = 100, 1e-10, 1e-6
 """Steps of a fit at the most, and the relative fall of the sum of squares with which it ends; of knots."""
 WEAKEST, FIRST, STRONGEST = 1e-14, 1e-6, 1e8

@@ -14,8 +14,6 @@ from photogram.network.hull import hull, outside
 from photogram.show.summary import Brief, Rows
 from photogram.targets.projection import DatumName, worst
 
-__all__ = ["UncertaintyCurve", "UncertaintyMap", "distance_text", "image_grid", "map_name"]
-
 
 def image_grid(size: tuple[int, int], grid: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
     """Return (w,) columns, (h,) rows and (h w, 2) pixels of a grid over a picture, from edge to edge."""

@@ -22,17 +22,6 @@ from photogram.network.unknowns import Sensor
 from photogram.targets.corners import Corners
 from photogram.targets.vision import FLIP, composed, photo_poses
 
-__all__ = [
-    "NEAR",
-    "POWERS",
-    "dated",
-    "errors_of_speeds",
-    "motion_of",
-    "moved",
-    "moving",
-    "pictures_in_motion",
-]
-
 NEAR = 0.2
 """Seconds: views that are farther from each other say nothing of how the board moves between them."""
 EACH_SIDE = 2

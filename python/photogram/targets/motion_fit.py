@@ -17,8 +17,6 @@ from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.vision import imaged, motion_partials, moved_by, rays
 
-__all__ = ["Criterion", "Fitted", "differences_at", "fitted_motion", "points_at"]
-
 Criterion = Literal["pixels", "mrcal"]
 """What is least: squares of the differences in pixels, or fourth powers of angles as mrcal 2 has it."""
 

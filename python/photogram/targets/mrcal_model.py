@@ -28,8 +28,6 @@ from photogram.targets.corners import Corners
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.vision import inverted, of_vectors
 
-__all__ = ["PREFIX", "read_lens", "read_model"]
-
 PREFIX = "LENSMODEL_"
 CORE = ("fx", "fy", "cx", "cy")
 LENSES = {

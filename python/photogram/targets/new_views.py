@@ -22,8 +22,6 @@ from photogram.targets.maps import distance_text
 from photogram.targets.projection import of_functions, worst
 from photogram.targets.vision import TURNED, motion_partials, rays
 
-__all__ = ["Candidate", "NewView", "Suggestions", "best_views", "shown_of", "view_rows"]
-
 FEWEST = 12
 """Corners that a picture must have to count."""
 MARGIN = 5.0

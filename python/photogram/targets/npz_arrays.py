@@ -16,8 +16,6 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.memory import require
 
-__all__ = ["Arrays", "read_arrays"]
-
 
 class Arrays:
     """The arrays of an archive by their names, with the file for errors."""

@@ -20,8 +20,6 @@ from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured
 from photogram.targets.npz_arrays import read_arrays
 
-__all__ = ["BEGIN", "is_npz", "is_storage", "read_npz", "read_storage"]
-
 POINTS = "image_points"
 BEGIN = 1 << 20
 """Bytes in which a name that tells a format is looked for."""

@@ -11,8 +11,6 @@ from photogram.network.cameras import Camera
 from photogram.targets.first_camera import POOR, adjusted_views, rays_of
 from photogram.targets.sightings import LISTED, Sightings, angles_apart, centres, poses, ray_homographies
 
-__all__ = ["Pictures", "rays_shown"]
-
 ROUNDING = 1e-6
 """Radians: pictures that fit to this fit."""
 CLEAR = 1.5

@@ -23,8 +23,6 @@ from photogram.targets.tables import board_facts, prior_shift, spline_lines, vie
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["calibration_page", "drawings", "worth_facts"]
-
 
 @page_of.register(Calibrated)
 @np.errstate(over="ignore", invalid="ignore")

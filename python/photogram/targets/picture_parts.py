@@ -6,8 +6,6 @@ from collections.abc import Iterator
 
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["PARTS", "PicturePart", "parts_of"]
-
 PARTS = (5, 4)
 """Across and down."""
 ACROSS = ("left", "left of the middle", "", "right of the middle", "right")

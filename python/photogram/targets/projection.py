@@ -17,18 +17,6 @@ from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
 from photogram.targets.vision import cross_matrices, imaged, motion_partials, rays, unknown_of
 
-__all__ = [
-    "DatumName",
-    "common_partials",
-    "datum_rows",
-    "fixed_points",
-    "housing_rows",
-    "of_functions",
-    "point_partials",
-    "projection_cofactors",
-    "worst",
-]
-
 DatumName = Literal["corners", "mean-frames", "image", "axes"]
 """What holds still: the corners that the camera saw, the mean of the boards, rays of the whole image, or the
 axes of the camera themselves."""

@@ -25,8 +25,6 @@ from photogram.targets.opencv_corners import read_npz
 from photogram.targets.regularisation import with_knot_sd
 from photogram.targets.start import Regularisation, Synchronisation
 
-__all__ = ["read"]
-
 NO_BOARD_SEEN = "pictures, but no board: write board.toml or give --board 9x6 --spacing 0.025"
 NO_BOARD = "corners, but no board: write board.toml or give --board 10x10 --spacing 0.077"
 

@@ -25,8 +25,6 @@ from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
 
-__all__ = ["WEAK", "regularised", "with_knot_sd"]
-
 CORE = ("fx", "fy", "f", "cx", "cy")
 DENOMINATOR = ("k4", "k5", "k6")
 SHARE, ROUGH, FAR = 0.0025, 4.0, 500.0

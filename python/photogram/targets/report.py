@@ -13,8 +13,6 @@ from photogram.show.sections import Section, composed, headline
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.tables import board_facts, moved_lines, spline_lines, views, worst_points
 
-__all__ = ["calibration_summary", "report"]
-
 TITLE = "calibration with targets"
 ON_TOP = 2
 """Sections of what snooping says that every summary has: the verdict, and what to do next."""

@@ -19,20 +19,6 @@ from photogram.targets.board import Board
 from photogram.targets.corners import Corners
 from photogram.targets.vision import composed
 
-__all__ = [
-    "LISTED",
-    "Listings",
-    "Sightings",
-    "angles_apart",
-    "centres",
-    "focal_lengths",
-    "frontal_tilts",
-    "homographies",
-    "nearest_rotations",
-    "poses",
-    "ray_homographies",
-]
-
 
 def homographies(places: Floats, xy: Floats) -> Floats:
     """Return (P, 3, m + 1) the homography of the board to each picture, by direct linear transformation.

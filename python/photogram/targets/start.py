@@ -27,8 +27,6 @@ from photogram.targets.corners import Corners
 from photogram.targets.motion import NEAR, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.vision import FLIP, photo_poses
 
-__all__ = ["CLOCK", "Regularisation", "Start", "Synchronisation"]
-
 Synchronisation = Literal["known", "none", "offset"]
 Regularisation = Literal["mrcal"]
 

@@ -23,8 +23,6 @@ from photogram.targets.projection import common_partials, datum_rows, worst
 from photogram.targets.uncertainty import checked_distance
 from photogram.targets.vision import composed, inverted, rays
 
-__all__ = ["GRID", "TILTS", "candidate_views", "suggest_views", "views_over_picture", "views_towards"]
-
 DISTANCES = (0.1, 0.5, 0.9)
 """Quantiles of how far boards were, which are the distances of candidates."""
 TILT, TURN = 30.0, 90.0

@@ -22,18 +22,6 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.lens_fit import field_of, grid_of_pixels
 from photogram.targets.vision import TURNED
 
-__all__ = [
-    "board_facts",
-    "board_fit",
-    "moved_lines",
-    "prior_shift",
-    "spline_lines",
-    "splines",
-    "view_rms",
-    "views",
-    "worst_points",
-]
-
 LISTED = 10
 """Points of the board that a report names at most: those that fit worst."""
 NOTABLE = 3.0

@@ -29,8 +29,6 @@ from photogram.targets.maps import image_grid
 from photogram.targets.projection import housing_rows
 from photogram.targets.vision import imaged, motion_partials, rays
 
-__all__ = ["Triangulated", "distance_uncertainty", "triangulate", "triangulated"]
-
 STEPS = 30
 CLOSE = 1e-12
 """Of the distance: a point that moves by less has arrived."""

@@ -21,14 +21,6 @@ from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
 from photogram.targets.motion_fit import Criterion, points_at
 from photogram.targets.projection import DatumName, datum_rows, projection_cofactors, worst
 
-__all__ = [
-    "checked_distance",
-    "difference",
-    "projection_uncertainty",
-    "uncertainty_against_distance",
-    "uncertainty_map",
-]
-
 IMAGE = (60, 40)
 """Rays of the whole picture that hold still in the datum `image`."""
 

@@ -24,8 +24,6 @@ from photogram.targets.page import drawings, worth_facts
 from photogram.targets.plan_drawing import draw_planned_views
 from photogram.targets.view_plan_result import ViewPlan
 
-__all__ = ["plan_drawings", "plan_files", "plan_sections"]
-
 CAPTION = "Where the corners of the board are in each picture; red: its point 0."
 NOTHING = "No picture has been taken: standard deviations follow from where the board is held alone."
 _PIXELS = (Axis.of("px", "px"),)

@@ -12,8 +12,6 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.new_views import Candidate
 
-__all__ = ["PlannedView", "ViewPlan"]
-
 
 @dataclass(frozen=True, eq=False)
 class PlannedView:

@@ -14,26 +14,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 
-__all__ = [
-    "FLIP",
-    "TURNED",
-    "composed",
-    "cross_matrices",
-    "imaged",
-    "inverted",
-    "motion_partials",
-    "moved_by",
-    "of_vectors",
-    "photo_poses",
-    "rays",
-    "sensor_pose",
-    "sensor_steps",
-    "unknown_of",
-    "values_of",
-    "view_steps",
-    "vision_poses",
-]
-
 FLIP: Floats = np.diag([1.0, -1.0, -1.0])
 
 

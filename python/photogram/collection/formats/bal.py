@@ -20,8 +20,6 @@ from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import require
 
-__all__ = ["FORMAT"]
-
 ROOM = 64
 """Characters that a number and the white space after it take at the most, in the mean over a file."""
 HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3

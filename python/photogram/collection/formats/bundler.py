@@ -22,8 +22,6 @@ from photogram.errors import InputError
 from photogram.io.packed_numbers import at, whole
 from photogram.memory import require
 
-__all__ = ["FORMAT"]
-
 HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
 VERSION = b"0.3"
 COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4

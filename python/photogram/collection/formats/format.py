@@ -8,8 +8,6 @@ from pathlib import Path
 from photogram.collection.collection import Collection
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Format"]
-
 
 @dataclass(frozen=True)
 class Format:

@@ -12,8 +12,6 @@ from photogram.errors import InputError
 from photogram.io.packed_numbers import packed, pieces
 from photogram.memory import turned
 
-__all__ = ["FORMATS", "read", "recognised", "to_bytes"]
-
 FORMATS: dict[str, Format] = {
     name: import_module(f"photogram.collection.formats.{name}").FORMAT
     for name in (

@@ -12,9 +12,6 @@ from photogram.comparator.calibration import CaseResult
 from photogram.comparator.fits import Residuals
 from photogram.show.angles import degrees_minutes_seconds
 
-__all__ = ["angle", "centred", "nearest", "number", "residual_lines", "residual_page", "triangle"]
-
-
 WIDTH = 110
 
 

@@ -17,19 +17,6 @@ from photogram.comparator.variance import AxisSigma, CaseVarianceTest, Polynomia
 from photogram.show.angles import ARCSEC
 from photogram.show.lines import field, table_lines
 
-__all__ = [
-    "case_linear_page",
-    "case_polynomial_page",
-    "combined_linear_page",
-    "combined_polynomial_page",
-    "correction_table",
-    "joint_page",
-    "summary_page",
-    "table_nodes",
-    "tests_page",
-]
-
-
 NAMES = ("SCALE X", "SCALE Y", "ALPHA")
 LETTERS = "ABCDEFGHJ"
 

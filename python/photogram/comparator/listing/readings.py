@@ -16,9 +16,6 @@ from photogram.comparator.grid import Grid
 from photogram.comparator.listing.forms import centred, nearest, number
 from photogram.comparator.pointing import Precision
 
-__all__ = ["averages_page", "input_page", "pointing_pages", "title_page"]
-
-
 COLUMNS = 3
 """Readings in a line of the input listing."""
 ROTATIONS = "EXACTLY 90 DEGREE ROTATION CASES"

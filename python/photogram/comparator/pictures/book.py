@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from photogram.comparator.calibration import Calibration
 
-__all__ = ["figures", "pdf_report"]
-
 
 def figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
     """Make the pictures one after the other, with short names.

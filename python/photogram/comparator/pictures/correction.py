@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.listing.parameters import table_nodes
-from photogram.comparator.pictures.style import FAINT, MAIN, MM, key, plain
+from photogram.comparator.pictures.style import MAIN, MM, key, plain
 from photogram.show.pictures import new_figure, round_length
-from photogram.show.style import signed
+from photogram.show.style import FAINT, signed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.polynomial import Polynomial
-
-__all__ = ["correction_surface", "distorted_grid"]
 
 FINE = 121
 MAGNIFICATION = 10_000

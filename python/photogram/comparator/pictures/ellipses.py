@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import ACCENT, FAINT, MAIN, MM, key, panels, plain
+from photogram.comparator.pictures.style import ACCENT, MAIN, MM, key, panels, plain
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
 from photogram.show.pictures import new_figure, round_length
+from photogram.show.style import FAINT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.pointing import Ellipse, Precision
-
-__all__ = ["operator_ellipses", "pointing_ellipses", "pooled_ellipses", "total_ellipses"]
 
 LEVELS = " / ".join(str(percent) for percent in CONFIDENCE_FACTORS)
 LEAST = 39

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from photogram.comparator.calibration import Calibration
 
-__all__ = ["residual_histogram", "variance_bars"]
-
 
 def residual_histogram(calibration: Calibration) -> Figure:
     """Draw histograms of the final residuals against the normal curve of their standard deviation."""

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from photogram.arguments.types import Floats
 
-__all__ = ["ACCENT", "FAINT", "MAIN", "arrows", "key", "panels", "plain"]
-
 MAIN, ACCENT = BLUE, VERMILION
 MM = 1000.0
 ACROSS = 4

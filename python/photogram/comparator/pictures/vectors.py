@@ -8,25 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.case import exchanged
-from photogram.comparator.pictures.style import (
-    ACCENT,
-    FAINT,
-    MM,
-    arrows,
-    key,
-    magnification,
-    panels,
-    plain,
-)
+from photogram.comparator.pictures.style import ACCENT, MM, arrows, key, magnification, panels, plain
 from photogram.show.pictures import new_figure, round_length
+from photogram.show.style import FAINT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
-
-__all__ = ["average_vectors", "comparator_vectors", "grid_vectors", "joint_grid"]
 
 
 def comparator_vectors(calibration: Calibration) -> Figure:

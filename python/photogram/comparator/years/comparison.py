@@ -30,9 +30,6 @@ from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.history import History, dates_of, history
 
-__all__ = ["Comparison", "compare"]
-
-
 DEGREE = 4
 NODES = 7
 """In each direction: what is taken apart is a polynomial of fourth degree."""

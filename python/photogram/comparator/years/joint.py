@@ -28,8 +28,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.memory import require
 from photogram.statistics.limits import GlobalTest, global_test
 
-__all__ = ["Together", "adjust_together"]
-
 
 @dataclass(frozen=True, eq=False)
 class Together:

@@ -23,8 +23,6 @@ from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
-__all__ = ["RecordedCalibration", "RecordedCase"]
-
 ISO = re.compile(r"(\d{4})-(\d{1,2})-(\d{1,2})$")
 OF_THE_REPORT = re.compile(r"(\d{1,2})/(\d{1,2})/(\d{2}|\d{4})$")
 _WHAT = "calibration of a comparator"

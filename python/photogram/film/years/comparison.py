@@ -27,9 +27,6 @@ from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.history import History, dates_of, history
 
-__all__ = ["CameraComparison", "DatedCamera", "compare_cameras", "figures_of"]
-
-
 NODES = 9
 """Radii, by Gauss and Legendre."""
 AZIMUTHS = 12

@@ -9,8 +9,6 @@ import numpy as np
 from photogram.film.certificate import Certificate
 from photogram.film.lens_table import RadialTable
 
-__all__ = ["simulated_certificates"]
-
 DAYS = ("1974-03-12", "1977-05-03", "1980-02-27", "1983-05-11", "1986-04-08", "1989-06-20")
 ANGLES = (7.5, 15.0, 22.7, 30.0, 35.0, 40.0)
 FOCAL_LENGTH, STEP = 152.375, 0.015

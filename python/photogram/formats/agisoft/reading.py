@@ -21,8 +21,6 @@ from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Observation, Position
 
-__all__ = ["read"]
-
 LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6
 """Metres from the origin beyond which a world is geocentric."""

@@ -24,8 +24,6 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 
-__all__ = ["ORIENTATIONS", "read"]
-
 ORIENTATIONS = {
     "XRightYDown": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
     "XRightYUp": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),

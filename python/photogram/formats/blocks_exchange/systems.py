@@ -15,8 +15,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.observations import Control, Observation, Position
 
-__all__ = ["PhotoRecord", "PointRecord", "Systems"]
-
 LOCAL = "local"
 
 

@@ -20,8 +20,6 @@ from photogram.formats.rotations import Y_DOWN
 from photogram.network.cameras import Camera
 from photogram.network.observations import Position
 
-__all__ = ["cannot_hold", "write"]
-
 
 def cannot_hold(project: Project) -> list[str]:
     """Return what of a project the file has no place for."""

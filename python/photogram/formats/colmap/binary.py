@@ -25,8 +25,6 @@ from photogram.formats.colmap.content import (
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 
-__all__ = ["binary_files", "read_binary"]
-
 _Made = TypeVar("_Made")
 _SENSORS = {0: CAMERA, 1: IMU}
 _NUMBERS = {name: number for number, name in _SENSORS.items()}

@@ -9,20 +9,6 @@ from photogram.arguments.types import Floats, Indices
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 
-__all__ = [
-    "CAMERA",
-    "IMU",
-    "MODELS",
-    "NO_POINT",
-    "Camera",
-    "Frame",
-    "Images",
-    "Model",
-    "Points",
-    "Pose",
-    "Rig",
-]
-
 MODELS: tuple[tuple[str, int], ...] = (
     ("SIMPLE_PINHOLE", 3),
     ("PINHOLE", 4),

@@ -23,8 +23,6 @@ from photogram.messages import Message, listed
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.unknowns import Sensor
 
-__all__ = ["TITLE", "place_of", "read"]
-
 TITLE = "COLMAP model"
 LONGEST, SHORT = 1e-2, 1e-6
 """What the length of a quaternion may differ from 1 by, and what is not worth a remark."""

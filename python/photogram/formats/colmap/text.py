@@ -24,8 +24,6 @@ from photogram.formats.colmap.content import (
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 
-__all__ = ["read_text", "text_files"]
-
 _EMPTY = 2**64 - 1
 _HEADS = {
     "cameras": "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]",

@@ -40,8 +40,6 @@ from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.rigs import Mount
 from photogram.results.result import Result
 
-__all__ = ["cannot_hold", "covariance_files", "write", "write_as_text"]
-
 _NAMES = dict(MODELS)
 
 

@@ -9,17 +9,6 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.network.attitudes import Attitudes
 
-__all__ = [
-    "Polynomials",
-    "angle_axes",
-    "fitted",
-    "fitted_angles",
-    "of_angles",
-    "of_quaternions",
-    "to_angles",
-    "to_quaternions",
-]
-
 RECORDS = 64
 """Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits."""
 BEYOND = 4

@@ -26,8 +26,6 @@ from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation, increasing, rotations
 
-__all__ = ["is_cube", "read_cube", "read_label", "read_positions", "read_turns", "serial_number"]
-
 PIECE = 1 << 16
 LONGEST = 1 << 26
 """Bytes of a label, at most."""

@@ -16,8 +16,6 @@ from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation
 
-__all__ = ["Detector", "Framelets", "Isd", "Jitter", "Pixels", "Plane", "Positions", "Turns"]
-
 Pixels = Literal["isis", "csm"]
 """How pixels are counted: the middle of the first is 1 (ISIS) or 0.5, half a pixel of the detector apart."""
 HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}

@@ -10,8 +10,6 @@ from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.moving_photos import Lines
 
-__all__ = ["Drift", "fitting", "read_drift", "read_lines"]
-
 APART = 0.01
 """Of the span of a table: by how much that of the lines may differ."""
 

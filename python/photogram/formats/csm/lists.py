@@ -11,8 +11,6 @@ from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.reading import read_isd
 from photogram.io.files import read_lines
 
-__all__ = ["listed_lines", "read_list", "read_support"]
-
 
 def read_support(path: Path) -> Isd:
     """Read the support data of an image, of a cube or an ISD.

@@ -18,8 +18,6 @@ from photogram.network.moving_photos import LineSensor, Timed
 from photogram.network.projecting import projected
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
 
-__all__ = ["SupportedImage", "to_camera", "trajectory_of", "with_polynomial_pointing"]
-
 _OURS = np.diag([1.0, -1.0, -1.0])
 """From the axes of cameras that look along +z, y down, to those of photos; and back."""
 _JOINED: dict[str, Interpolation] = {"csm": "lagrange", "isis": "linear"}

@@ -17,8 +17,6 @@ from photogram.io.places import at_place
 from photogram.network.lens import Lens, LensModel
 from photogram.network.trajectories import increasing, rotations
 
-__all__ = ["UNITS", "from_pixels", "not_zero", "read_isd", "transformed"]
-
 _TRANSX = re.compile(r"(INS-?\d+)_TRANSX")
 _KINDS = {
     "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL": "line",

@@ -22,8 +22,6 @@ from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 
-__all__ = ["Content", "Sensor", "project_of", "sensor_of", "sensors_of_table"]
-
 
 @dataclass(frozen=True)
 class Sensor:

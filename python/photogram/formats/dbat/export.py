@@ -23,8 +23,6 @@ from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 
-__all__ = ["TITLE", "is_export", "read_export"]
-
 TITLE = "PhotoModeler export"
 _HEAD = (2, 9, 10, 10)
 """Numbers of lines 2 to 5, at least."""

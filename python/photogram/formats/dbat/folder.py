@@ -20,8 +20,6 @@ from photogram.io.places import Place
 from photogram.io.rows import cells
 from photogram.messages import Message
 
-__all__ = ["is_folder", "is_measurements", "read_folder", "read_measurements"]
-
 IMAGES, PHOTOS, POSES, CONTROL = "markpts.txt", "images.txt", "stations.txt", "control.txt"
 MEASURED, COMPUTED = "-2dpts.txt", "-3dpts.txt"
 _HEADER = "object point id,photo #,"

@@ -15,8 +15,6 @@ from photogram.io.delimited import ColumnTable
 from photogram.io.places import at_place
 from photogram.messages import Message, quoted
 
-__all__ = ["TITLE", "read_camera_file", "read_script"]
-
 TITLE = "DBAT script"
 PLAIN, AFFINE = 1, 3
 """Models: Brown's terms of measured coordinates; the same after an affinity."""

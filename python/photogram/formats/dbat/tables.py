@@ -13,8 +13,6 @@ from photogram.formats.dbat.content import Content
 from photogram.io.delimited import NAMELESS, ColumnTable, read_columns, read_rows
 from photogram.io.numbers import whole_number
 
-__all__ = ["take_images", "take_photos", "take_points", "take_poses", "titled", "untitled"]
-
 _KNOWN = {
     "image": "im",
     "photo": "im",

@@ -27,8 +27,6 @@ from photogram.network.geometry import Cartesian, Spheroid
 from photogram.network.motion import about
 from photogram.network.moving_photos import Timed
 
-__all__ = ["read"]
-
 
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a control network, and the support data of the images that a list names."""

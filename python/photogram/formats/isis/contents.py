@@ -17,8 +17,6 @@ from photogram.formats.isis.settings import Settings
 from photogram.formats.isis.solving import Solving
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["PITCHES", "Image", "PlanetaryContents", "contents_of", "rows_of_each"]
-
 DETAILS = "control network"
 PITCHES = 1.4
 """Standard deviation of image coordinates, in pixels of the detector."""

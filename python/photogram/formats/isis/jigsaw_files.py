@@ -14,8 +14,6 @@ from photogram.formats.isis.parameters import KM, Parameter, parameters
 from photogram.formats.isis.settings import PARAMETERS, Settings
 from photogram.io.csv_text import csv_text
 
-__all__ = ["jigsaw_files"]
-
 _WORDS = {"first": "ANGLES", "second": "VELOCITIES", "third": "ACCELERATIONS", "all": "ALL", "none": "NONE"}
 _AXES = ("Latitude", "Longitude", "Radius")
 _CELLS = ("initial", "correction", "final", "apriori sigma", "adj sigma")

@@ -13,21 +13,6 @@ from photogram.errors import InputError
 from photogram.io.pvl import Group
 from photogram.lazy_dataclasses import dataclass, field, fields
 
-__all__ = [
-    "HEADER",
-    "MEASURE_TYPES",
-    "MESSAGE",
-    "POINT_TYPES",
-    "SOURCES",
-    "ControlMeasures",
-    "ControlNetwork",
-    "ControlPoints",
-    "columns_of_measures",
-    "columns_of_points",
-    "measures_of",
-    "points_of",
-]
-
 POINT_TYPES = ("Tie", "Ground", "Free", "Constrained", "Fixed")
 """What types of points mean; `Tie` and `Ground` are what old networks have for `Free` and `Fixed`."""
 SOURCES = (

@@ -15,8 +15,6 @@ from photogram.formats.csm.photos import trajectory_of
 from photogram.messages import quoted
 from photogram.network.motion import given_poses
 
-__all__ = ["observation_number", "observations_of", "one_flight"]
-
 _KEYWORDS: Mapping[str, int | None] = {
     r"LO[345]/[HM]RC/": 3,
     r"MRO/HIRISE/": 3,

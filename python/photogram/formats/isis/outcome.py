@@ -14,8 +14,6 @@ from photogram.network.geometry import Cartesian, local_frames
 from photogram.network.motion import focal_images
 from photogram.results.result import Result
 
-__all__ = ["Outcome", "spherical"]
-
 
 @dataclass(frozen=True, eq=False)
 class Outcome:

@@ -14,8 +14,6 @@ from photogram.network.motion import about
 from photogram.network.trajectories import Trajectory
 from photogram.results.trajectories import AdjustedTrajectory
 
-__all__ = ["Parameter", "parameters"]
-
 KM = 1000.0
 _NAMES = (("X", "Y", "Z"), ("RA", "DEC", "TWIST"))
 _UNITS = ("km", "deg")

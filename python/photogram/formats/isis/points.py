@@ -15,8 +15,6 @@ from photogram.messages import Message, counted, listed
 from photogram.network.geometry import Cartesian, Spheroid, local_frames
 from photogram.network.observations import Control
 
-__all__ = ["KnownPoints", "full_matrices", "given_starts", "known_points", "per_metre"]
-
 _LOCAL = [1, 0, 2]
 """Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius."""
 

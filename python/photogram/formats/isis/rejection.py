@@ -18,8 +18,6 @@ from photogram.messages import Message, counted
 from photogram.network.block import Block
 from photogram.results.result import Result
 
-__all__ = ["flagged", "rejecting", "rejection_limit"]
-
 NORMAL = 1.4826
 """Standard deviations of normal errors in their median absolute deviation."""
 FEWEST = 2

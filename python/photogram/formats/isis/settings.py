@@ -14,8 +14,6 @@ from photogram.io.files import read_lines
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import nearest
 
-__all__ = ["OTHERWISE", "PARAMETERS", "REFUSED", "Settings", "Sigmas", "Solved", "read_settings"]
-
 Solved = Literal["none", "first", "second", "third", "all"]
 """Which coefficients are unknown: none, that of degree 0, those to degree 1, to degree 2, all."""
 Sigmas = tuple[float | None, float | None, float | None]

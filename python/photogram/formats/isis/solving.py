@@ -14,8 +14,6 @@ from photogram.formats.isis.settings import Settings
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.trajectories import Polynomial, Trajectory
 
-__all__ = ["Solving", "solving"]
-
 
 @dataclass(frozen=True, eq=False)
 class Solving:

@@ -21,8 +21,6 @@ from photogram.io.json import read_json
 from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.trajectories import AdjustedTrajectory
 
-__all__ = ["CLOSE", "updated_support"]
-
 CLOSE = 0.01
 """Pixels: how far what is seen with the new tables may be from what the trajectory sees."""
 GRID = 32

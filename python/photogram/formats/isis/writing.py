@@ -16,8 +16,6 @@ from photogram.formats.isis.network import (
 from photogram.formats.isis.reading import LABEL_BYTES
 from photogram.io.pvl import Group, Value, label_text
 
-__all__ = ["binary_network", "network_text"]
-
 _VERSION = 5
 _END = "End_Object\nEnd\n"
 

@@ -17,8 +17,6 @@ from photogram.formats.isis.writing import binary_network, network_text
 from photogram.formats.project import Project
 from photogram.results.result import Result
 
-__all__ = ["results"]
-
 _UPPER = np.triu_indices(3)
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-__all__ = ["LAYERS", "style"]
-
 _Symbol = tuple[str, str, Mapping[str, str]]
 """Type of the symbol, class of its one layer, and properties of this."""
 

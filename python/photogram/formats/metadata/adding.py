@@ -21,8 +21,6 @@ from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 from photogram.network.unknowns import LeverArm, Shift
 
-__all__ = ["with_photo_files", "with_wished_photos"]
-
 DETERMINED = 3.0
 """How much wider than their misfit positions must spread across their line to turn a model."""
 

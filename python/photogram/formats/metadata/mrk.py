@@ -22,8 +22,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 from photogram.network.geometry import Spheroid, lengths_of_units
 
-__all__ = ["Exposure", "number_of", "prefix_of", "read_exposures"]
-
 _NUMBER = re.compile(r"(?<!\d)\d{4}(?!\d)")
 _NAME = re.compile(r"(.*?)_?Timestamp", re.IGNORECASE)
 _NAMED = ("N", "E", "V", "Lat", "Lon", "Ellh", "Q")

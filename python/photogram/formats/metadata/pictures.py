@@ -29,8 +29,6 @@ from photogram.io.files import reading
 from photogram.io.places import Place
 from photogram.messages import quoted
 
-__all__ = ["ENDINGS", "said_by_packet", "said_by_picture", "said_by_tags"]
-
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff", ".dng")
 GPS = 0x8825
 """The tag of EXIF that leads to those of GPS."""

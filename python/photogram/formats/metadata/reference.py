@@ -31,8 +31,6 @@ from photogram.io.numbers import finite_number
 from photogram.io.places import Place
 from photogram.messages import Message
 
-__all__ = ["GEO_TXT", "is_reference", "read_geo_txt", "read_reference"]
-
 SOURCE = "reference"
 GEO_TXT = "geo.txt"
 """Of OpenDroneMap: positions in the system of the first line."""

@@ -16,8 +16,6 @@ from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, counted, listed, quoted
 
-__all__ = ["Found", "Photos", "found_in"]
-
 _TEXTS = (".csv", ".txt")
 _EXPOSURES = ".mrk"
 

@@ -20,8 +20,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.network.geometry import Spheroid
 
-__all__ = ["GROUPS", "LEVER_SD", "SHIFT_SD", "Located", "gnss_files", "located"]
-
 SHIFT_SD = 0.05
 """Metres: a priori standard deviation of the shift that positions of a flight have in common."""
 LEVER_SD = 0.01

@@ -20,8 +20,6 @@ from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation, Position
 
-__all__ = ["MODEL", "TITLE", "TRACKS", "place_of", "read"]
-
 TITLE = "OpenSfM reconstruction"
 MODEL, TRACKS = "reconstruction.json", "tracks.csv"
 UNKNOWN_DOP = 15.0

@@ -20,8 +20,6 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.network.observations import Position
 
-__all__ = ["cannot_hold", "write"]
-
 CONTROL = "gcp_list.txt"
 VERSION = "OPENSFM_TRACKS_VERSION_v2"
 

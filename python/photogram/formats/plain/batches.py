@@ -36,8 +36,6 @@ from photogram.network.block import checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.observations.photos import with_epochs
 
-__all__ = ["Streamed", "streamable"]
-
 TIES = ("distances", "height_differences", "coordinate_differences")
 """Tables of observations between points."""
 HELD = (

@@ -16,17 +16,6 @@ from photogram.network.passages import Bend, Figure
 from photogram.targets.board import Board, BoardKind, Shape
 from photogram.targets.start import Regularisation
 
-__all__ = [
-    "ASSUMED",
-    "REGULARISED",
-    "TIMES",
-    "boards_table",
-    "levels",
-    "read_bends",
-    "read_boards",
-    "read_regularised",
-]
-
 ASSUMED = "sd of corners assumed"
 """The detail of a project whose standard deviations of corners nobody has given: levels tell ratios."""
 REGULARISED = "regularise"

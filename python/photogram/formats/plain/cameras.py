@@ -27,8 +27,6 @@ from photogram.network.moving_photos import LineSensor, Shutter
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-__all__ = ["Cameras", "knots_table", "read_cameras", "spread_over_photos", "with_knots"]
-
 _MODELS = dict(_photocore.camera_models())
 _EACH = ("all", "photo", "group")
 OTHER_LENS = 5.0

@@ -26,8 +26,6 @@ from photogram.network.observations import KnownTogether, Observation
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-__all__ = ["Fiducials", "certified", "definite", "read_certificates", "read_fiducials"]
-
 _MODELS = ("brown_forward", "brown")
 _ITSELF = "a camera of another year is a camera by itself"
 SD_MARK = 0.002

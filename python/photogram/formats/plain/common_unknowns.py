@@ -13,8 +13,6 @@ from photogram.io.delimited import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.unknowns import Unknown
 
-__all__ = ["Shared", "called", "made", "word_of"]
-
 _Made = TypeVar("_Made")
 _Kind = TypeVar("_Kind", bound=Unknown)
 

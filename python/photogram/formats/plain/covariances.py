@@ -22,8 +22,6 @@ from photogram.network.observations import Observation, Prior
 from photogram.network.trajectories import GyroBias, RotationCoefficient
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift, Unknown
 
-__all__ = ["Covariances", "covariance_tables", "read_covariances"]
-
 CAMERA = "camera"
 OF_FILMS = ("scanner", "fiducials", "film")
 """Kinds of things whose covariances readers of their tables ask for by name."""

@@ -22,8 +22,6 @@ from photogram.network.cameras import Camera
 from photogram.network.moving_photos import Direction, LineSensor, Shutter
 from photogram.network.trajectories import Readout
 
-__all__ = ["LINE", "OF_LINES", "Exposure", "exposure_columns", "line_sensors", "of_cameras", "shutters"]
-
 LINE = "line"
 """The model of a line of sensors behind the lens `brown`."""
 OF_LINES = ("x0", "y0", "s0")

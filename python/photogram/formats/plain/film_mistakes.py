@@ -18,8 +18,6 @@ from photogram.network.cameras import Camera
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-__all__ = ["beyond_message", "mark_remarks", "scale_message"]
-
 SHRUNK = 0.01
 """No film has changed its size by more."""
 INCH = 25.4

@@ -20,8 +20,6 @@ from photogram.io.delimited import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
 
-__all__ = ["Expected", "Laid", "Lying", "MarkReadings", "ScannedPhoto", "Seen", "way_by_images"]
-
 BETTER = 4.0
 """Times by which images must be farther from their places in every other way to lie."""
 NEAR = 0.1

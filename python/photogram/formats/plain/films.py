@@ -42,8 +42,6 @@ from photogram.network.films import (
 )
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 
-__all__ = ["Scanned", "on_film", "read_scanned"]
-
 LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}
 """Marks that determine a film."""
 _START = ("start_t1", "start_t2", "start_theta")

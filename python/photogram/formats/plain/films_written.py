@@ -18,8 +18,6 @@ from photogram.network.films import Film, Mark, Reseau, Scan
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 from photogram.network.unknowns import Unknown
 
-__all__ = ["INSIDE", "WrittenFilms"]
-
 INSIDE = "films inside"
 """In the details of a project that takes films as errorless: all that was read of them."""
 _Seen = TypeVar("_Seen")

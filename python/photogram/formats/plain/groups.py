@@ -21,18 +21,6 @@ from photogram.network.observations import Attitude, Position, Rate, Velocity
 from photogram.network.trajectories import Clock, GyroBias
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Shift, Unknown
 
-__all__ = [
-    "Antenna",
-    "Inertial",
-    "antenna_columns",
-    "antenna_of",
-    "antennas",
-    "grouped",
-    "inertial_columns",
-    "inertial_groups",
-    "inertials",
-]
-
 _ANGLES = ANGLES["omega_phi_kappa"]
 _ROTATIONS = deviation_columns(ROTATIONS)
 _Group = TypeVar("_Group", "Antenna", "Inertial")

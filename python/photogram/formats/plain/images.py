@@ -13,9 +13,6 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 
-__all__ = ["Images", "image_coordinates", "read_images", "sd_is_given"]
-
-
 _SD = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 

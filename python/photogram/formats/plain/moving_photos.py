@@ -28,8 +28,6 @@ from photogram.network.moving_photos import Lines, Timed
 from photogram.network.trajectories import Clock, Readout, Trajectory
 from photogram.network.unknowns import Sensor
 
-__all__ = ["line_times_table", "moving_columns", "placed", "read_timed"]
-
 _MOTION = (*VELOCITY, *RATE)
 _SD = deviation_columns(_MOTION)
 

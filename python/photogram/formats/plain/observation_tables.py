@@ -42,8 +42,6 @@ from photogram.network.observations import (
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine, Unknown
 
-__all__ = ["kind_tables", "read_kinds"]
-
 _THROUGH = "through"
 """The field that is a place, in the frame of the project."""
 

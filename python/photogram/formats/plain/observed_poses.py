@@ -54,8 +54,6 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity
 
-__all__ = ["observed_tables", "read_observations"]
-
 _ROTATIONS = deviation_columns(ROTATIONS)
 _ANGLES = ANGLES["omega_phi_kappa"]
 _Columns = dict[str, dict[str, Any]]

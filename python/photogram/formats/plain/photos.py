@@ -19,8 +19,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed, quoted
 from photogram.network.observations import Attitude, Observation
 
-__all__ = ["Photos", "read_photos"]
-
 _SD = deviation_columns(AXES)
 
 

@@ -51,8 +51,6 @@ from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
 
-__all__ = ["read", "read_control", "read_tables"]
-
 LEVELS = "no standard deviation of an image of level 0: 1 px is assumed (--sd images=...)"
 """What is told of images whose table has levels alone."""
 DIFFER = 1e-6

@@ -22,8 +22,6 @@ from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
-__all__ = ["Rigs", "read_bases", "read_frames", "read_rigs", "times_of_frames", "times_said"]
-
 _ANGLES = ANGLES["omega_phi_kappa"]
 FRAME = "frame itself"
 """What the first sensor of a rig is called where sensors have names of their own."""

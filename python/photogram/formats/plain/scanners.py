@@ -20,8 +20,6 @@ from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, S
 from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 
-__all__ = ["BENDS", "CURVES", "DEVICE", "GRID", "LOCAL", "FilmKind", "Machine", "read_films", "read_scanners"]
-
 DEVICE = ("sx", "sy", "alpha_rad")
 """Columns of scales and obliqueness of a scanner."""
 CURVES = tuple(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj")

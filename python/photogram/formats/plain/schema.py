@@ -10,23 +10,6 @@ from collections.abc import Collection, Mapping, Sequence
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass, field
 
-__all__ = [
-    "ALL_ANGLES",
-    "ANGLES",
-    "AXES",
-    "BASES",
-    "BIAS",
-    "FACTORS",
-    "POSE",
-    "RATE",
-    "ROTATIONS",
-    "TABLES",
-    "VELOCITY",
-    "Schema",
-    "covariance_columns",
-    "deviation_columns",
-]
-
 AXES = ("x", "y", "z")
 ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
 POSE = (*AXES, *ROTATIONS)

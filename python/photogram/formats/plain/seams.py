@@ -17,8 +17,6 @@ from photogram.network.moving_photos import Timed
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
 
-__all__ = ["Seam", "mounted_halves", "with_seams"]
-
 _LINES = ("column", "row")
 
 

@@ -22,8 +22,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, nearest
 from photogram.results.features import KINDS, Definition
 
-__all__ = ["LENGTHS", "Settings", "read_settings", "unread_tables"]
-
 VERSION = 1
 WITH_CRS = tuple(name for name, each in TABLES.items() if each.has_system)
 WITH_SD = {name: each.deviations for name, each in TABLES.items() if each.deviations} | {"check": (1, 3)}

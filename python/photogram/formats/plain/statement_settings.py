@@ -15,8 +15,6 @@ from photogram.io.toml import Sections, TomlFile, quoted_text
 from photogram.results.statement.request import Asked, length_of
 from photogram.results.statement.texts import Texts
 
-__all__ = ["KEYS", "asked_files", "asked_lines", "read_asked", "read_sentences"]
-
 KEYS: Mapping[str, tuple[str, ...]] = {
     "check": ("survey_common_sd", "survey_common_in_control", "independent"),
     "statement": (

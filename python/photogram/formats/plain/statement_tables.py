@@ -13,16 +13,6 @@ from photogram.io.toml import TomlFile
 from photogram.messages import counted, quoted
 from photogram.results.statement.request import Asked
 
-__all__ = [
-    "COVERS",
-    "asked_by_other_names",
-    "asked_of",
-    "lengths_table",
-    "parts_of_asked",
-    "read_cover",
-    "with_cover",
-]
-
 COVERS = ("open", "vegetated")
 """What check points lie in; the first is the default (ASPRS, Edition 2: NVA and VVA)."""
 _ENDS = ("from", "to")

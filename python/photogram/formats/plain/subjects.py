@@ -14,8 +14,6 @@ from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Range, Rate, Velocity
 from photogram.network.trajectories import Clock, Readout, Trajectory
 
-__all__ = ["Subjects", "clocked", "scalar_columns", "scalars", "subject_columns"]
-
 _Scalar = TypeVar("_Scalar", Clock, Readout)
 _COLUMNS: Mapping[type, tuple[str, str]] = {Clock: ("clock", "time_offset"), Readout: ("scan", "line_rate")}
 """What names clocks, and line rates of scans, and their numbers."""

@@ -24,20 +24,6 @@ from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 
-__all__ = [
-    "DEGREE",
-    "Tables",
-    "angles_of",
-    "columns_of",
-    "correlations",
-    "covariances_of",
-    "different",
-    "indices_of",
-    "matrices_of",
-    "places_written",
-    "vectors_of",
-]
-
 DEGREE = 180 / np.pi
 """Of a radian."""
 

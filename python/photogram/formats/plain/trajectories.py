@@ -29,8 +29,6 @@ from photogram.network.trajectories import (
     Trajectory,
 )
 
-__all__ = ["read_smoothness", "read_trajectories"]
-
 _SD = deviation_columns(AXES)
 _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),

@@ -17,8 +17,6 @@ from photogram.network.observations import Observation, Smoothness, all_trajecto
 from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
 
-__all__ = ["lost_smoothness", "shared_trajectories", "smoothness_table", "trajectory_tables"]
-
 _ANGLES = ANGLES["omega_phi_kappa"]
 _SD = deviation_columns(AXES)
 Place = tuple[str, str, int]

@@ -14,8 +14,6 @@ from photogram.formats.project import Frame
 from photogram.io.delimited import ColumnTable
 from photogram.messages import Message
 
-__all__ = ["Transform"]
-
 _HINT = "; are east and north exchanged (--columns x=..,y=..), or is a zone before the eastings?"
 
 

@@ -35,8 +35,6 @@ from photogram.network.moving_photos import LineSensor
 from photogram.network.observations import Control, Position
 from photogram.results.features import Definition
 
-__all__ = ["attitude_matrices", "camera_table", "cannot_hold", "control_table", "known_cameras", "write"]
-
 _ANGLES = ("omega", "phi", "kappa")
 
 

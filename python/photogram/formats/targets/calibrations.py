@@ -30,16 +30,6 @@ from photogram.targets.reading import read
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 
-__all__ = [
-    "MIDDLE",
-    "adjusted_project",
-    "calibration_of",
-    "project_of",
-    "read_project",
-    "shifted",
-    "tied_photos",
-]
-
 MIDDLE = 0.5
 """Of the first pixel, from the upper-left corner: projects count from there."""
 NEAR = 1e-6

@@ -13,8 +13,6 @@ from photogram.network.unknowns import Sensor
 from photogram.targets.output.rig import Rig
 from photogram.targets.vision import sensor_pose
 
-__all__ = ["lost_beside_cameras", "rig_of_project"]
-
 
 def rig_of_project(project: Project) -> Rig:
     """Return the cameras of a project whose images are pixels, and where those on frames are to camera 0."""

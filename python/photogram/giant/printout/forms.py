@@ -11,24 +11,6 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import degrees_minutes_seconds
 
-__all__ = [
-    "MATRIX",
-    "VALUE",
-    "Page",
-    "Space",
-    "attitude",
-    "attitude_name",
-    "counts_and_rms",
-    "dms",
-    "exponential",
-    "fixed",
-    "headed",
-    "matrix_rows",
-    "paginate",
-    "printout",
-]
-
-
 Page = list[str]
 """The lines of a page below its banner."""
 

@@ -22,9 +22,6 @@ from photogram.giant.printout.forms import (
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
 
-__all__ = ["Station", "control_pages", "frame_pages", "options_page", "warning_pages"]
-
-
 UNIT_VARIANCE: dict[str, str] = {
     "free": "UNIT VARIANCE WILL BE BASED ON COMPLETELY FREE CAMERA PARAMETERS",
     "constrained": "UNIT VARIANCE WILL BE BASED ON CONSTRAINED CAMERA PARAMETERS",

@@ -11,9 +11,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 from photogram.results.result import SumsOfSquares
 
-__all__ = ["PointResiduals", "iteration_pages", "residual_pages", "statistics"]
-
-
 TITLE = "CAMERA STATIONS CORRECTIONS"
 
 

@@ -23,8 +23,6 @@ from photogram.giant.printout.results import (
 from photogram.network.block import Block
 from photogram.results.result import Result
 
-__all__ = ["listing"]
-
 NOTICES = {
     "converged": "",
     "not converged": "SOLUTION HAS NOT CONVERGED",

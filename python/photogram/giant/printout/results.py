@@ -20,9 +20,6 @@ from photogram.giant.printout.forms import (
     paginate,
 )
 
-__all__ = ["correction_pages", "point_pages", "propagated_point_pages", "station_pages"]
-
-
 POSITION, ATTITUDE = VALUE + 5, VALUE + 7
 """Columns of `LNG =` and `OMEGA =` with their values."""
 

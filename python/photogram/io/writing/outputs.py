@@ -30,8 +30,6 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-__all__ = ["ENDING", "Content", "OutputSet", "abandon_all", "deferred", "write_whole"]
-
 Content = bytes | Callable[[BinaryIO], None]
 """What goes into a file: bytes, or what writes them piece by piece to the file that it is given."""
 

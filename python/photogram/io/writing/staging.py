@@ -17,18 +17,6 @@ from photogram.io.writing.targets import naming
 if sys.platform != "win32":
     import fcntl
 
-__all__ = [
-    "Staging",
-    "alive",
-    "clear_marks",
-    "doubtful",
-    "mark",
-    "remove_leftovers",
-    "sync_directory",
-    "try_lock",
-    "unmark",
-]
-
 NAME = re.compile(r"\.photogram-([0-9a-f]{16})")
 LOCK = "lock"
 NEW = os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)

@@ -13,8 +13,6 @@ from pathlib import Path
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["Guard", "Target", "check_outputs", "follow", "naming"]
-
 MOST_LINKS = 40
 """Symbolic links that are followed, as by Linux."""
 _Identity = tuple[int, int]

@@ -15,8 +15,6 @@ from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Unknown
 
-__all__ = ["FILM", "Fiducial", "KnownFilm", "KnownTogether"]
-
 FILM = ("t1", "t2", "theta", "m", "b1", "b2")
 """The unknowns of the film of a photo: mm, radians, ratios."""
 

@@ -16,18 +16,6 @@ from photogram.network.moving_photos import Moment
 from photogram.network.trajectories import Clock, Trajectory
 from photogram.network.unknowns import Unknown, rotation
 
-__all__ = [
-    "AXES",
-    "ROTATIONS",
-    "Group",
-    "Observation",
-    "all_trajectories",
-    "moments",
-    "observation_rows",
-    "of_records",
-    "with_unknowns",
-]
-
 Group = tuple[str, Indices, Indices, Indices, Floats, Floats]
 """A kind, (k, p) indices of points, (k, q) photos, (k, c) unknowns; (k, v) values, (k, r, r) covariances."""
 

@@ -13,8 +13,6 @@ from photogram.network.observations.observation import AXES, ROTATIONS, Observat
 from photogram.network.trajectories import Clock, GyroBias, Trajectory
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Shift, Unknown
 
-__all__ = ["Attitude", "Position", "Range", "Rate", "Relative", "Velocity", "epochs_of", "with_epochs"]
-
 
 @dataclass(frozen=True, eq=False)
 class Position(Observation):

@@ -8,8 +8,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.observation import AXES, Observation
 from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine
 
-__all__ = ["Control", "Difference", "Distance", "EqualHeight", "OnLevel", "OnLine", "OnPlane", "OnPlumbLine"]
-
 
 @dataclass(frozen=True, eq=False)
 class Control(Observation):

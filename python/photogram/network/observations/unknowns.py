@@ -17,8 +17,6 @@ from photogram.network.observations.observation import Observation, all_trajecto
 from photogram.network.trajectories import Coefficient, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
 
-__all__ = ["Base", "Prior", "Smoothness", "smoothness_of", "with_knots", "with_smoothness"]
-
 
 @dataclass(frozen=True, eq=False)
 class Prior(Observation):

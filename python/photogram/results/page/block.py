@@ -41,8 +41,6 @@ from photogram.show.page import (
     significant,
 )
 
-__all__ = ["block_page"]
-
 
 @page_of.register(Result)
 @np.errstate(over="ignore", invalid="ignore")

@@ -35,8 +35,6 @@ from photogram.statistics.findings import Tested
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["drawings", "network_page", "size_section"]
-
 _NOT_CHECKED = 0.01
 
 

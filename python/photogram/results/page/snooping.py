@@ -9,8 +9,6 @@ from photogram.show.methods import page_of
 from photogram.show.page import Column, Fact, Page, Part, Remarks, Section, Table
 from photogram.statistics.snooping.log import Removal
 
-__all__ = ["snooped_page"]
-
 
 @page_of.register(Snooped)
 def snooped_page(found: Snooped) -> Page:

@@ -20,15 +20,6 @@ from photogram.show.cells import long_table, page_table, unit_written
 from photogram.show.page import Column, Layers, Row, Section, Table
 from photogram.show.quantity import Quantity, chosen, labelled
 
-__all__ = [
-    "beside_section",
-    "check_section",
-    "control_section",
-    "photos_section",
-    "points_section",
-    "stations_section",
-]
-
 ALL = 200
 """Photos or points up to which all have a row."""
 SOME = 100

@@ -12,8 +12,6 @@ from photogram.show.judgement import judged
 from photogram.show.methods import page_of
 from photogram.show.page import Column, Drawing, Page, Part, Remarks, Section, Table
 
-__all__ = ["components_page", "components_section", "reweighed_page", "weighed_page"]
-
 
 @page_of.register(VarianceComponents)
 def components_page(found: VarianceComponents) -> Page:

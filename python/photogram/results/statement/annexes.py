@@ -35,16 +35,6 @@ from photogram.show.page import (
     decimals_of,
 )
 
-__all__ = [
-    "adjustment_annex",
-    "budgets_annex",
-    "camera_annex",
-    "checks_annex",
-    "files_annex",
-    "left_out_annex",
-    "survey_annex",
-]
-
 SOURCES = 12
 """Sources of a budget at a finer level than kinds that the page lists, those that contribute most."""
 RADII = 11

@@ -19,20 +19,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.freedom import rmse_interval
 
-__all__ = [
-    "ENOUGH",
-    "Accuracy",
-    "Remark",
-    "accuracy",
-    "control_good_enough",
-    "points_asked_for",
-    "remarks",
-    "survey_good_enough",
-    "three_d",
-    "verdict",
-    "wording",
-]
-
 ENOUGH = 30
 """Check points with which a product is tested (7.13); with fewer it is produced to meet a class."""
 POINTS_BY_AREA = (

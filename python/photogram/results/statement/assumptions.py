@@ -17,8 +17,6 @@ from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import Lengths
 from photogram.results.statement.texts import Texts
 
-__all__ = ["assumptions"]
-
 
 def assumptions(
     result: Result,

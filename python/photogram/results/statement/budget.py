@@ -27,8 +27,6 @@ from photogram.results.statement.texts import Texts
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 
-__all__ = ["Budget", "Freedom", "Single", "Source", "budget_line", "budgets"]
-
 LARGEST = 5
 """Single observations that are listed."""
 EXACT = 5000

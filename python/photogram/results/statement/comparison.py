@@ -26,17 +26,6 @@ from photogram.results.covariance import Covariances
 from photogram.results.result import Result
 from photogram.results.statement.request import METRES, Asked
 
-__all__ = [
-    "PARTS",
-    "Compared",
-    "compared",
-    "control_places",
-    "in_order",
-    "plan_positions",
-    "turned_jointly",
-    "turned_to_east",
-]
-
 PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
 """Components that are tested together."""
 MOST = 5000

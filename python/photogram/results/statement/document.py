@@ -16,8 +16,6 @@ from photogram.results.statement.statement import Statement
 from photogram.show.methods import document_of
 from photogram.show.quantity import members
 
-__all__ = ["kinds_of", "to_json"]
-
 
 @document_of.register(Statement)
 def to_json(found: Statement) -> bytes:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["differences", "lengths", "overlap", "photos_per_place"]
-
 WIDTH = 6.3
 """Inches of a picture."""
 REACH = 0.08

@@ -33,8 +33,6 @@ from photogram.statistics.error_radii import (
     upper_order,
 )
 
-__all__ = ["Figures", "Radius", "Sized", "figures", "root_mean"]
-
 PROBABILITIES = (0.9, 0.95)
 INSIDE = 0.95
 

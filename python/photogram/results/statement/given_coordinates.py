@@ -13,8 +13,6 @@ from photogram.results.axes import point_axes
 from photogram.results.result import Result
 from photogram.results.statement.comparison import Compared, in_order
 
-__all__ = ["NOTHING", "Survey", "System", "surveyed"]
-
 
 @dataclass(frozen=True)
 class System:

@@ -21,8 +21,6 @@ from photogram.statistics.distributions import critical_normal
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import effective_freedom, rmse_interval
 
-__all__ = ["Bias", "PointTests", "Prediction", "Surface", "bias", "point_tests", "prediction", "surface"]
-
 LEVEL = 0.05
 LEAST = 6
 """Points with heights that a surface takes."""

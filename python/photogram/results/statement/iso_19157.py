@@ -11,8 +11,6 @@ from typing import Any
 
 from photogram.errors import InputError
 
-__all__ = ["ABSOLUTE", "MEASURES", "RELATIVE", "measures"]
-
 ABSOLUTE = "absolute (external) positional accuracy"
 """Of check points."""
 RELATIVE = "relative (internal) positional accuracy"

@@ -24,8 +24,6 @@ from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.statistics.distributions import critical_normal
 
-__all__ = ["Judged", "Said", "judged"]
-
 NOT_USABLE = 4
 """Exit code of a statement that must not be handed over as it is."""
 Said = list[tuple[str, str]]

@@ -18,8 +18,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
 from photogram.network.neighbours import nearest
 
-__all__ = ["Layout", "area_in_plan", "layout"]
-
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
 FAR = 1 / 3
 """Of the diagonal: farther from a check point the block is not checked."""

@@ -20,8 +20,6 @@ from photogram.results.result import Result
 from photogram.results.statement.comparison import in_order, turned_to_east
 from photogram.results.statement.honest import LEVEL
 
-__all__ = ["LeftOut", "leave_one_out", "limit_of"]
-
 PREDICTABLE = 0.01
 """Eigenvalue of R_g below which the rest does not predict a direction: the point holds the datum along it."""
 

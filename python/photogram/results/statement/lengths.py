@@ -20,8 +20,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.agreement import agreement
 from photogram.statistics.limits import GlobalTest
 
-__all__ = ["LengthTest", "Limit", "angle_to_diagonal", "at_reference", "length_test", "measured_lengths"]
-
 LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
 """Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
 ALONG = math.radians(15.0)

@@ -14,8 +14,6 @@ from photogram.results.statement.leave_one_out import LeftOut
 from photogram.show.quantity import members
 from photogram.statistics.freedom import coverage_factor
 
-__all__ = ["budget_member", "figures_member", "left_out_rows", "point_rows"]
-
 
 def figures_member(found: Figures | None, nssda: Mapping[str, Any] | None = None) -> dict[str, Any] | None:
     """Return the figures of check points; None where there are none."""

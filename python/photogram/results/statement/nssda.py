@@ -16,8 +16,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.error_radii import circular_error
 
-__all__ = ["ENOUGH", "Nssda", "nssda"]
-
 ENOUGH = 20
 """Check points that are asked for."""
 VERTICAL, RADIAL, EITHER = 1.9600, 1.7308, 2.4477

@@ -43,8 +43,6 @@ from photogram.show.page import (
     decimals_of,
 )
 
-__all__ = ["statement_page"]
-
 _CLASSES = {"h": "v", "plan": "h", "all": "3d"}
 """Parts of the components with classes."""
 

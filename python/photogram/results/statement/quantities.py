@@ -18,8 +18,6 @@ from photogram.results.cameras import units
 from photogram.results.result import Result, adjusted
 from photogram.results.selection import Item
 
-__all__ = ["Wanted", "chosen", "hint", "wanted"]
-
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
 """What coordinates may be called, beside the names that they have in the block."""
 PRINCIPAL = ("f", "fx", "c")

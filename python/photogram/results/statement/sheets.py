@@ -20,8 +20,6 @@ from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Cell, Column, decimals_of
 
-__all__ = ["Written", "decimals_for", "files_of_statement"]
-
 _AXES = ("e", "n", "h")
 decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
 """With how many decimals a table is written: no value in it loses the digits of its standard deviation."""

@@ -15,8 +15,6 @@ from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, KINDS, OBS
 from photogram.results.result import Result
 from photogram.results.suspects import block_suspects, observations_of_core
 
-__all__ = ["Rows", "kind_of"]
-
 PHOTOS = 100
 """Photos that are listed, those that contribute most."""
 _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", ATTITUDE: "photo attitudes"}

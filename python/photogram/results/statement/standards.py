@@ -33,8 +33,6 @@ from photogram.results.statement.quantities import hint
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
 
-__all__ = ["Asprs", "Lengths", "Standards", "standards"]
-
 _METRES_OF = {"h": "class_h_m", "v": "class_v_m", "3d": "class_3d_m"}
 _NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
 

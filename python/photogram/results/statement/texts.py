@@ -16,8 +16,6 @@ from photogram.errors import InputError
 from photogram.messages import MOST_NAMES, nearest
 from photogram.show.page import fixed
 
-__all__ = ["LANGUAGES", "Texts", "fields_of", "table_of"]
-
 LANGUAGES = ("en", "de")
 NOTHING = "–"
 """What stands for a number that there is not."""

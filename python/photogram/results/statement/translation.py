@@ -19,23 +19,6 @@ from photogram.results.result import Result
 from photogram.results.statement.texts import Texts
 from photogram.statistics.verdict import Verdict
 
-__all__ = [
-    "axis",
-    "datum",
-    "feature",
-    "frame",
-    "held",
-    "kind",
-    "named",
-    "observation",
-    "parameter",
-    "quantity",
-    "read",
-    "refraction",
-    "test",
-    "verdict",
-]
-
 SHOWN, LISTED = 4, 20
 """Points of a feature, and things that are held, that are told by name."""
 PLAIN = ("check points", "pattern by photo")

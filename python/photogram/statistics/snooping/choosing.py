@@ -23,8 +23,6 @@ from photogram.statistics.distributions import LEVEL, critical_chi_square, criti
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial
 
-__all__ = ["Choice", "Choosing", "Level", "hides"]
-
 ON_POINT = 2
 """Groups that go from one point in a round, at the most, where R of all rows is too large."""
 AHEAD = 10

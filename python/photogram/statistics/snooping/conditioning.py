@@ -19,8 +19,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.groups import INVISIBLE, GroupTests, group_tests
 
-__all__ = ["Chosen", "Conditional", "UnitWeight"]
-
 SAME = 1e-3
 """Relative; logarithms of probabilities that differ by less are equal, and the order of the input decides:
 the images of a point on two photos, but for what an adjustment that ended early has left."""

@@ -21,8 +21,6 @@ from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out,
 from photogram.statistics.snooping.taking_out import Settings, TakingOut, log_probability
 from photogram.statistics.snooping.whole_photos import log_photo, take_photo
 
-__all__ = ["begun"]
-
 BENT = 10.0
 """Standard deviations; a median of all test values beyond it is of a bent network, or of absurd weights."""
 

@@ -20,8 +20,6 @@ from photogram.statistics.snooping.suspects import (
     Tests,
 )
 
-__all__ = ["LinearTrial"]
-
 
 class LinearTrial:
     """Observations l = A x with standard deviations, in groups.

@@ -13,18 +13,6 @@ from photogram.statistics.snooping.choosing import Choice
 from photogram.statistics.snooping.suspects import LostSupportError, Standing, Tests
 from photogram.statistics.snooping.taking_out import TakingOut, take_back
 
-__all__ = [
-    "ENOUGH",
-    "MEDIAN_OF_TWO",
-    "OPTIMISTIC",
-    "needs_robust_start",
-    "robust_factor",
-    "scales",
-    "start_robustly",
-    "start_without",
-    "values",
-]
-
 MEDIAN = 0.6744897501960817
 """Of the absolute value of a standard normal variable."""
 MEDIAN_OF_TWO = 1.1774100225154747

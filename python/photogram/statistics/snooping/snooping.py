@@ -19,8 +19,6 @@ from photogram.statistics.snooping.taking_out import (
 )
 from photogram.statistics.snooping.whole_photos import take_bad_photos_out, take_photos_out
 
-__all__ = ["Outcome", "Settings", "snooped"]
-
 
 @dataclass(frozen=True, eq=False)
 class Outcome:

@@ -12,8 +12,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.statistics.reliability import TESTABLE
 
-__all__ = ["Aside", "LostSupportError", "Out", "Prediction", "Standing", "Suspects", "Tests", "Trial"]
-
 
 @dataclass(frozen=True, eq=False)
 class Suspects:

@@ -24,16 +24,6 @@ from photogram.statistics.snooping.suspects import (
     Trial,
 )
 
-__all__ = [
-    "Settings",
-    "TakingOut",
-    "agreeing",
-    "log_probability",
-    "note_return",
-    "take_back",
-    "with_prediction",
-]
-
 
 @dataclass(frozen=True)
 class Settings:

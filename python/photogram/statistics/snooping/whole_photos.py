@@ -12,8 +12,6 @@ from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.suspects import LostSupportError, Out, Standing
 from photogram.statistics.snooping.taking_out import TakingOut
 
-__all__ = ["log_photo", "take_bad_photos_out", "take_photo", "take_photos_out"]
-
 FAR = 5.0
 LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
 """Images of a photo that are out, by number and share, from which on the whole photo goes."""

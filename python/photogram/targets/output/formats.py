@@ -16,8 +16,6 @@ from photogram.targets.output.rig import Rig, rig_of
 from photogram.targets.output.ros import ros_camera_info
 from photogram.targets.uncertainty import uncertainty_map
 
-__all__ = ["CAMERA_FORMATS", "FILE", "camera_files", "cameras_covariance"]
-
 CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyType(
     {
         "opencv_yaml": opencv_yaml,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from photogram.targets.output.rig import Rig, Terms, figures, terms_of
 
-__all__ = ["kalibr_camchain"]
-
 TITLE = "camchain.yaml of Kalibr"
 TERMS = 4
 

@@ -19,8 +19,6 @@ from photogram.targets.maps import UncertaintyMap
 from photogram.targets.mrcal_model import INDICES, PREFIX
 from photogram.targets.output.rig import TERMS, Rig, terms_of
 
-__all__ = ["mrcal_models", "valid_region"]
-
 TITLE = "a .cameramodel of mrcal"
 CORE = frozenset({"f", "fx", "fy", "cx", "cy"})
 COUNTS = (0, 4, 5, 8, 12)

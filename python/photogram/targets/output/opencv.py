@@ -12,8 +12,6 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.output.rig import TERMS, Rig, Terms, matrix, terms_of
 from photogram.targets.vision import cross_matrices
 
-__all__ = ["opencv_yaml"]
-
 TITLE = "YAML of OpenCV"
 _matrix = partial(matrix, opencv=True)
 COUNTS = (4, 5, 8, 12)

@@ -18,8 +18,6 @@ from photogram.network.cameras import Camera
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.vision import inverted
 
-__all__ = ["TERMS", "Rig", "Terms", "figures", "matrix", "rig_of", "terms_of"]
-
 TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
 """Of a pinhole, in the order of OpenCV; k4, k5, k6 are of the denominator."""
 FISHEYE_TERMS = ("k1", "k2", "k3", "k4")

@@ -8,8 +8,6 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.targets.output.rig import Rig, Terms, matrix, terms_of
 
-__all__ = ["ros_camera_info"]
-
 TITLE = "camera_info of ROS"
 PLUMB_BOB, RATIONAL, EQUIDISTANT = 5, 8, 4
 """Terms of the models `plumb_bob`, `rational_polynomial` and `equidistant`."""
