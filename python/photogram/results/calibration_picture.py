@@ -31,10 +31,8 @@ def draw_distortion(
     ----------
     result, camera
         An adjusted block, and one of its cameras.
-    path
-        Of a file for the picture, in the format that its suffix names; None: none is written.
-    ax
-        Axes, one for each panel, or a figure to put them in; a new figure when None.
+    path, ax
+        As of :func:`photogram.results.components_picture.draw_components`; axes for each panel.
 
     Returns
     -------
@@ -42,8 +40,8 @@ def draw_distortion(
 
     Raises
     ------
-    InputError
-        A suffix that names no format.
+    InputError, ModuleNotFoundError
+        As of :func:`photogram.results.components_picture.draw_components`.
     ValueError
         The camera has no radial terms, or no images.
     """
@@ -62,10 +60,8 @@ def draw_lens_field(
     ----------
     result, camera
         An adjusted block, and one of its cameras.
-    path
-        Of a file for the picture, in the format that its suffix names; None: none is written.
-    ax
-        Axes, or a figure to put them in; a new figure when None.
+    path, ax
+        As of :func:`photogram.results.components_picture.draw_components`.
 
     Returns
     -------
@@ -73,8 +69,8 @@ def draw_lens_field(
 
     Raises
     ------
-    InputError
-        A suffix that names no format.
+    InputError, ModuleNotFoundError
+        As of :func:`photogram.results.components_picture.draw_components`.
     ValueError
         The camera has no such terms, or no images.
     """

@@ -187,10 +187,8 @@ def draw_variance_function(found: VarianceFunction, path: Path | None = None, ax
     ----------
     found
         A variance function.
-    path
-        Of a file for the picture, in the format that its suffix names; None: none is written.
-    ax
-        Axes, or a figure to put them in; a new figure when None.
+    path, ax
+        As of :func:`photogram.results.components_picture.draw_components`.
 
     Returns
     -------
@@ -198,8 +196,8 @@ def draw_variance_function(found: VarianceFunction, path: Path | None = None, ax
 
     Raises
     ------
-    InputError
-        A suffix that names no format.
+    InputError, ModuleNotFoundError
+        As of :func:`photogram.results.components_picture.draw_components`.
     """
     return placed(partial(_drawn, found), path, ax)
 

@@ -26,10 +26,8 @@ def draw_planned_views(plan: ViewPlan, path: Path | None = None, ax: Where = Non
     ----------
     plan
         The plan.
-    path
-        Of a file for the picture, in the format that its suffix names; None: none is written.
-    ax
-        Axes, four for each four views begun, or a figure to put them in; a new figure when None.
+    path, ax
+        As of :func:`photogram.targets.draw_uncertainty`; four axes for each four views begun.
 
     Returns
     -------
@@ -37,10 +35,8 @@ def draw_planned_views(plan: ViewPlan, path: Path | None = None, ax: Where = Non
 
     Raises
     ------
-    InputError
-        A suffix that names no format.
-    ModuleNotFoundError
-        matplotlib is absent.
+    InputError, ModuleNotFoundError
+        As of :func:`photogram.targets.draw_uncertainty`.
     """
     return placed(partial(_views, plan), path, ax)
 

@@ -35,10 +35,8 @@ def draw_board_residuals(calibrated: Calibrated, path: Path | None = None, ax: W
     ----------
     calibrated
         The adjusted calibration.
-    path
-        Of a file for the picture, in the format that its suffix names; None: none is written.
-    ax
-        Axes, or a figure to put them in; a new figure when None.
+    path, ax
+        As of :func:`photogram.targets.draw_uncertainty`.
 
     Returns
     -------
@@ -46,10 +44,8 @@ def draw_board_residuals(calibrated: Calibrated, path: Path | None = None, ax: W
 
     Raises
     ------
-    InputError
-        A suffix that names no format.
-    ModuleNotFoundError
-        matplotlib is absent.
+    InputError, ModuleNotFoundError
+        As of :func:`photogram.targets.draw_uncertainty`.
     """
     return placed(partial(_board, calibrated), path, ax)
 
