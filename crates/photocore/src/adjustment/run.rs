@@ -337,8 +337,12 @@ impl<'a> Run<'a, '_> {
     fn finish(mut self, mut end: End<'a>, initial_sum_of_squares: f64) -> Result<Adjustment, AdjustError> {
         let (problem, options) = (self.problem, self.options);
         let mut unknowns = end.unknowns.clone();
+        let is_at_target = end.state.as_ref().is_some_and(|state| state.linearized.basis.is_some());
+        if let Some(state) = end.state.as_mut().filter(|_| !is_at_target) {
+            // Nothing is solved for any more: what elimination has left makes room for the results.
+            state.linearized.factor.forget();
+        }
         let basis = end.state.as_ref().and_then(|state| state.linearized.basis.as_ref());
-        let is_at_target = basis.is_some();
         if let Some((_, step)) = &mut end.last {
             basis.into_iter().for_each(|basis| basis.take(step));
             problem.model.advance(&mut unknowns, step);
