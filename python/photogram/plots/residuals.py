@@ -96,7 +96,7 @@ def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
     Of a scanner they are samples and lines, upwards: so residuals point as they do in its focal plane.
     """
     margin = ROOM * float((edges[1] - edges[0]).max())
-    limits = edges + [[-margin], [margin]]
+    limits = edges + margin * np.array([[-1.0], [1.0]])
     if images.down and not scanned:
         limits[:, 1] = limits[::-1, 1]
     across, up = ("sample", "line") if scanned else (f"x, {images.unit}", f"y, {images.unit}")

@@ -11,7 +11,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.letters import widest, width, wrapped
-from photogram.show.sketch.marks import Mark
+from photogram.show.sketch.marks import Band, Level, Line, Mark, Markers
 from photogram.show.sketch.names import Box
 from photogram.show.sketch.ticks import Ticks, ticks
 
@@ -86,8 +86,6 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     for _, column, panel in cells:
         left, right = _sides(panel, most, 72.0 * sketch.height / sketch.rows)
         lefts[column], rights[column] = max(lefts[column], left), max(rights[column], right)
-    for column in range(sketch.columns - 1):
-        rights[column] += GAP
     beside = sum(lefts) + sum(rights) + (OF_COLOURS if sketch.shades else 0.0)
     wide = max((72.0 * sketch.width - beside) / sketch.columns, SMALLEST)
     titles = [wrapped(panel.title, TITLE, wide + rights[column] - GAP) for _, column, panel in cells]
@@ -135,7 +133,7 @@ def below(panel: Panel, numbered: bool) -> float:
 def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float]:
     """Return how much room a panel needs at its left and right side, of a cell so wide and high."""
     across, up = _ticks(panel, 0.75 * wide, high)
-    left = widest(up.texts, NUMBER) + 8.0 + (LABEL + 5.0 if named_axis(panel.up, up.power) else 0.0)
+    left = widest(up.texts, NUMBER) + 7.0 + (LABEL + 6.0 if named_axis(panel.up, up.power) else 0.0)
     if panel.legend == "beside":
         return left, GAP + legend_size(labelled(panel))[0] + GAP
     return left, GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
@@ -182,13 +180,16 @@ def legend_box(placed: Placed) -> Box:
 
 
 def _curves(panel: Panel) -> list[Floats]:
-    """Return (n, 2) places on what a legend should not hide, close to each other."""
-    found = []
+    """Return (n, 2) places on what a legend should not hide."""
+    found: list[Floats] = []
     for mark in panel.marks:
-        if hasattr(mark, "low"):
+        if isinstance(mark, Band):
             found += [np.column_stack([mark.across, each]) for each in (mark.low, mark.high)]
-        elif hasattr(mark, "places"):
+        elif isinstance(mark, (Line, Markers)):
             found.append(mark.places)
+        elif isinstance(mark, Level):
+            across = np.linspace(*panel.limits[:, 0].tolist(), 60)
+            found.append(np.column_stack([across, np.full(60, mark.height)]))
     return found
 
 

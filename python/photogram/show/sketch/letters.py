@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-# Advance widths of DejaVu Sans 2.37 from space to tilde, in thousandths of the size. Of the letters that pages
-# have it is the widest, so that what fits with it fits with the others.
+# Advance widths of DejaVu Sans 2.37 from space to tilde, in thousandths of the size. Of the letters that
+# pages have it is the widest, so that what fits with it fits with the others.
 _ASCII = (
     "318 401 460 838 636 950 780 275 390 390 500 838 318 361 318 337 636 636 636 636 636 636 636 636 636 636"
     " 337 337 838 838 838 531 1000 684 686 698 770 632 575 775 752 295 295 656 557 863 748 787 603 787"

@@ -108,7 +108,7 @@ def _axes(placed: Placed) -> str:
             text(0.5 * (left + right), down, named_axis(panel.across, placed.across.power), **middle)
         )
     if up := named_axis(panel.up, placed.up.power):
-        x = left - 9.0 - max(width(each, NUMBER) for each in placed.up.texts)
+        x = left - 12.0 - max(width(each, NUMBER) for each in placed.up.texts)
         y = 0.5 * (top + low)
         found.append(text(x, y, up, **middle, transform=f"rotate(-90 {number(x)} {number(y)})"))
     return "".join(found)

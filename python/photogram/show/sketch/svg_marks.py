@@ -34,6 +34,8 @@ from photogram.show.sketch.names import Box, free_side
 
 LEVELS = 48
 """Colours that values are given of a map."""
+MANY = 300
+"""Places of a line whose coordinates are rounded to a tenth of a point, those of others to a hundredth."""
 FAR = 1e5
 """Points, beyond which no line is drawn."""
 DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}
@@ -68,8 +70,8 @@ def path(data: str, **attributes: str | float) -> str:
 
 def _joined(places: Floats, end: str = "") -> str:
     """Return a line through (n, 2) points of the picture."""
-    known = np.clip(places[np.isfinite(places).all(axis=1)], -FAR, FAR)
-    return "M" + " ".join(f"{x:.2f} {y:.2f}" for x, y in known.tolist()) + end if len(known) > 1 else ""
+    known = np.clip(places[np.isfinite(places).all(axis=1)], -FAR, FAR).round(1 if len(places) > MANY else 2)
+    return "M" + " ".join(f"{x:g} {y:g}" for x, y in known.tolist()) + end if len(known) > 1 else ""
 
 
 def _each(places: Floats, sign: str) -> str:
@@ -107,7 +109,8 @@ def _signs(mark: Markers, at: Floats, colour: str) -> str:
     if mark.shape in "o." and not mark.face:
         # Half of the size and an outline: what matplotlib makes of a `.`.
         across = size if mark.shape == "o" else 0.5 * size + mark.edge
-        look: Attributes = {"stroke": colour, "stroke_width": across, "stroke_linecap": "round"}
+        # As a style: figures of matplotlib on the same page have a rule for the ends of all lines.
+        look: Attributes = {"stroke": colour, "stroke_width": across, "style": "stroke-linecap:round"}
         return path(_each(at, "h0"), **look, opacity=opacity)
     if mark.shape == "+":
         data = _each(at - [0.5 * size, 0.0], f"h{number(size)}m-{half}-{half}v{number(size)}")

@@ -48,7 +48,7 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool) -> Ticks:
         if len(values) < 2:
             # An axis that is too short for two of these has its ends.
             return _written(np.array([low, high]), step / 10.0)
-        fits = not across or widest(found.texts, size) + size < step / extent * length
+        fits = not across or widest(found.texts, size) + 1.6 * size < step / extent * length
         if step >= least * (1 - 1e-9) and fits:
             break
     return found
