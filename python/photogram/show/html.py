@@ -28,7 +28,7 @@ LONG = 16
 def page_html(page: Page) -> bytes:
     """Return a page as an HTML file (UTF-8) that needs no network and no other file.
 
-    It takes jinja2 and matplotlib (`pip install 'photogram[report]'`).
+    It takes jinja2, and matplotlib for drawings that are no sketches (`pip install 'photogram[report]'`).
     """
     environment = _environment()
     sections = [drawn for section in page.sections if (drawn := _drawn(section)).parts]

@@ -5,6 +5,8 @@ All in points, from the upper left corner, downwards.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from photogram.arguments.types import Floats
@@ -76,43 +78,43 @@ def named_axis(name: str, power: str) -> str:
 
 def laid_out(sketch: Sketch) -> list[Placed]:
     """Return the panels of a picture with their places."""
-    cells = [
-        (*divmod(k, sketch.columns), panel) for k, panel in enumerate(sketch.panels) if panel is not None
-    ]
+    cells = [(*divmod(k, sketch.columns), each) for k, each in enumerate(sketch.panels) if each is not None]
+    lefts, rights, wide = _columns(sketch, cells)
     lowest = {column: row for row, column, _ in cells}
-    numbered = [not sketch.shared or lowest[column] == row for row, column, _ in cells]
-    lefts, rights = [0.0] * sketch.columns, [GAP] * sketch.columns
-    most = 72.0 * sketch.width / sketch.columns
-    for _, column, panel in cells:
-        left, right = _sides(panel, most, 72.0 * sketch.height / sketch.rows)
-        lefts[column], rights[column] = max(lefts[column], left), max(rights[column], right)
-    beside = sum(lefts) + sum(rights) + (OF_COLOURS if sketch.shades else 0.0)
-    wide = max((72.0 * sketch.width - beside) / sketch.columns, SMALLEST)
-    titles = [wrapped(panel.title, TITLE, wide + rights[column] - GAP) for _, column, panel in cells]
-    notes = [
-        [line for note in panel.notes for line in wrapped(note, NOTE, wide + rights[column] - GAP)]
-        for _, column, panel in cells
-    ]
-    tops, belows = [0.0] * sketch.rows, [0.0] * sketch.rows
-    for (row, _, panel), title, lines, own in zip(cells, titles, notes, numbered, strict=True):
+    tops, belows, said = [0.0] * sketch.rows, [0.0] * sketch.rows, list[tuple[bool, list[str], list[str]]]()
+    for row, column, panel in cells:
+        room = wide + rights[column] - GAP
+        numbered = not sketch.shared or lowest[column] == row
+        title = wrapped(panel.title, TITLE, room)
+        notes = [line for each in panel.notes for line in wrapped(each, NOTE, room)]
+        said.append((numbered, title, notes))
         tops[row] = max(tops[row], above(panel, title))
-        belows[row] = max(belows[row], below(panel, own) + NOTE_LINE * len(lines) + GAP)
+        belows[row] = max(belows[row], below(panel, numbered) + NOTE_LINE * len(notes) + GAP)
     high = max((72.0 * sketch.height - sum(tops) - sum(belows)) / sketch.rows, SMALLEST)
     sizes = [_size(panel, wide, high) for *_, panel in cells]
     # Panels that are lower than there is room leave none of it between them.
-    heights = [
-        max(size[1] for (own, *_), size in zip(cells, sizes, strict=True) if own == row)
-        for row in range(sketch.rows)
-    ]
+    heights = [0.0] * sketch.rows
+    for (row, *_), size in zip(cells, sizes, strict=True):
+        heights[row] = max(heights[row], size[1])
     found = []
-    for (row, column, panel), size, own, title, lines in zip(
-        cells, sizes, numbered, titles, notes, strict=True
-    ):
+    for (row, column, panel), size, words in zip(cells, sizes, said, strict=True):
         left = sum(lefts[: column + 1]) + sum(rights[:column]) + column * wide
         top = sum(tops[: row + 1]) + sum(belows[:row]) + sum(heights[:row])
         box = (left, top, left + size[0], top + size[1])
-        found.append(Placed(panel, box, *_ticks(panel, *size), own, title, lines))
+        found.append(Placed(panel, box, *_ticks(panel, *size), *words))
     return found
+
+
+def _columns(
+    sketch: Sketch, cells: Sequence[tuple[int, int, Panel]]
+) -> tuple[list[float], list[float], float]:
+    """Return the margins of each column, and what is between them of each."""
+    lefts, rights = [0.0] * sketch.columns, [GAP] * sketch.columns
+    for _, column, panel in cells:
+        left, right = _sides(panel, 72.0 * sketch.width / sketch.columns, 72.0 * sketch.height / sketch.rows)
+        lefts[column], rights[column] = max(lefts[column], left), max(rights[column], right)
+    beside = sum(lefts) + sum(rights) + (OF_COLOURS if sketch.shades else 0.0)
+    return lefts, rights, max((72.0 * sketch.width - beside) / sketch.columns, SMALLEST)
 
 
 def above(panel: Panel, title: list[str]) -> float:

@@ -44,7 +44,7 @@ LETTERS = ", ".join([*SETTINGS["font.sans-serif"], "sans-serif"])
 
 
 def svg_of(sketch: Sketch, name: str, title: str) -> str:
-    """Return a picture as an SVG element.
+    """Return a picture as an SVG element; nothing where no panel has anything.
 
     Parameters
     ----------
@@ -56,6 +56,8 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
         Says to those who do not see it what it is.
     """
     panels = laid_out(sketch)
+    if not panels:
+        return ""
     parts = [_panel(placed, f"{name}-{k}") for k, placed in enumerate(panels)]
     wide, high = max(map(right_end, panels)), max(map(low_end, panels))
     if sketch.shades is not None:
