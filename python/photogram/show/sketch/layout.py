@@ -97,11 +97,12 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     for (row, *_), size in zip(cells, sizes, strict=True):
         heights[row] = max(heights[row], size[1])
     found = []
-    for (row, column, panel), size, words in zip(cells, sizes, said, strict=True):
+    for (row, column, panel), size, (numbered, title, notes) in zip(cells, sizes, said, strict=True):
         left = sum(lefts[: column + 1]) + sum(rights[:column]) + column * wide
         top = sum(tops[: row + 1]) + sum(belows[:row]) + sum(heights[:row])
         box = (left, top, left + size[0], top + size[1])
-        found.append(Placed(panel, box, *_ticks(panel, *size), *words))
+        across, up = _ticks(panel, *size)
+        found.append(Placed(panel, box, across, up, numbered, title, notes))
     return found
 
 
@@ -190,8 +191,8 @@ def _curves(panel: Panel) -> list[Floats]:
         elif isinstance(mark, (Line, Markers)):
             found.append(mark.places)
         elif isinstance(mark, Level):
-            across = np.linspace(*panel.limits[:, 0].tolist(), 60)
-            found.append(np.column_stack([across, np.full(60, mark.height)]))
+            left, right = panel.limits[:, 0].tolist()
+            found.append(np.column_stack([np.linspace(left, right, 60), np.full(60, mark.height)]))
     return found
 
 
