@@ -242,6 +242,21 @@ def test_ticks_are_even_steps_of_1_2_or_5_that_are_written_as_they_are(limits, l
     assert len(set(found.texts)) == len(found.texts)
 
 
+@pytest.mark.parametrize("equal", [True, False])
+@pytest.mark.parametrize(
+    "limits", [[[5e5, 5e5], [5e5, 5e5]], [[0.0, 0.0], [0.0, 1.0]], [[0.0, 0.0], [1e-9, 1e9]]]
+)
+def test_panels_of_one_value_or_far_from_square_are_drawn(limits, equal):
+    panel = Panel(np.array(limits), [Markers(np.array(limits[:1]), "+", 3.0)], equal=equal)
+    drawn = svg_of(Sketch(5.0, 4.0, [panel]), "name", "")
+    assert ElementTree.fromstring(drawn) is not None
+    assert "nan" not in drawn
+
+
+def test_a_picture_without_panels_is_nothing():
+    assert svg_of(Sketch(5.0, 4.0, [None]), "name", "") == ""
+
+
 def test_a_command_with_its_page_loads_no_matplotlib(tmp_path):
     code = (
         "import sys; from photogram.cli import app\n"

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.letters import widest, width, wrapped
 from photogram.show.sketch.marks import Band, Level, Line, Mark, Markers
@@ -78,7 +78,8 @@ def named_axis(name: str, power: str) -> str:
 
 def laid_out(sketch: Sketch) -> list[Placed]:
     """Return the panels of a picture with their places."""
-    cells = [(*divmod(k, sketch.columns), each) for k, each in enumerate(sketch.panels) if each is not None]
+    there = [(k, each) for k, each in enumerate(sketch.panels) if each is not None]
+    cells = [(*divmod(k, sketch.columns), _opened(panel)) for k, panel in there]
     lefts, rights, wide = _columns(sketch, cells)
     lowest = {column: row for row, column, _ in cells}
     tops, belows, said = [0.0] * sketch.rows, [0.0] * sketch.rows, list[tuple[bool, list[str], list[str]]]()
@@ -104,6 +105,13 @@ def laid_out(sketch: Sketch) -> list[Placed]:
         across, up = _ticks(panel, *size)
         found.append(Placed(panel, box, across, up, numbered, title, notes))
     return found
+
+
+def _opened(panel: Panel) -> Panel:
+    """Return a panel whose limits are apart: of one value they are a little beside it."""
+    first, last = panel.limits
+    room = np.where(first == last, 1e-6 * np.maximum(np.abs(first), 1.0), 0.0)
+    return replace(panel, limits=np.stack([first - room, last + room])) if room.any() else panel
 
 
 def _columns(
