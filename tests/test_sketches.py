@@ -102,7 +102,7 @@ def test_no_word_lies_over_another_or_is_cut(sketches):
         assert over == [], name
 
 
-def test_axes_of_matplotlib_have_the_limits_and_words_of_the_picture(sketches):
+def test_numbers_along_axes_lie_within_their_limits(sketches):
     for sketch in sketches.values():
         for placed in laid_out(sketch):
             low, high = np.sort(placed.panel.limits, axis=0)

@@ -25,18 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PICTURES: dict[str, Callable[..., Any]] = {
-    "network": network,
-    "residuals": residuals,
-    "redundancy": redundancy,
-    "tests": tests,
-    "correlations": correlations,
-    "distortion": distortion,
-    "features": features,
-    "films": films,
-}
-"""The pictures by name, in the order in which a reader looks at them."""
-SKETCHES: dict[str, Callable[[object], Sketch]] = {
+PICTURES: dict[str, Callable[[object], Sketch]] = {
     "network": network_sketch,
     "residuals": residuals_sketch,
     "redundancy": redundancy_sketch,
@@ -46,7 +35,7 @@ SKETCHES: dict[str, Callable[[object], Sketch]] = {
     "features": features_sketch,
     "films": films_sketch,
 }
-"""The same, as they are declared."""
+"""What declares each picture, by name, in the order in which a reader looks at them."""
 
 
 class Plots:
@@ -127,7 +116,7 @@ class Plots:
 def sketch_of(result: object, name: str) -> Sketch | None:
     """Return a picture of a result before it is drawn; None where there is nothing of it."""
     try:
-        return SKETCHES[name](result)
+        return PICTURES[name](result)
     except InputError:
         return None
 
