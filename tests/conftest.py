@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import browser as browsers
 from photogram import Block, simulate
 from photogram.cli import app
+from photogram.show.html import inlined
 from photogram.show.page import Picture
 from photogram.show.style import styled
 from shared_data import SHARED
@@ -60,12 +61,14 @@ def run(monkeypatch, tmp_path):
 
 @pytest.fixture
 def sketched(monkeypatch):
-    """Draw the pictures of reports, but leave out what matplotlib writes of them: half of a command's time.
+    """Draw figures of reports, but leave out what matplotlib writes of them: half of a command's time.
 
     For tests of what commands read, print and end with; in tests/reports all pages have their pictures.
     """
 
     def sketch(drawing):
+        if drawing.sketch is not None:
+            return inlined(drawing)
         with styled():
             figure = drawing.draw()
         return figure and Picture(drawing.name, drawing.title, drawing.caption, "<svg></svg>")

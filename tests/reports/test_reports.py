@@ -13,7 +13,6 @@ import browser as browsers
 import photogram
 from photogram import InnerConstraints, adjust, simulate
 from photogram.adjustment.snooping import snoop
-from photogram.cli import documents
 
 EXAMPLES = str(Path(photogram.__file__).parent / "examples")
 NETWORK = ["Verdict", "Plan of the network", "How much, how good", "Image residuals", "Redundancy", "Tests"]
@@ -327,15 +326,14 @@ def test_the_report_goes_where_it_is_asked_for_or_nowhere(run, tmp_path):
 def test_without_the_extra_there_is_a_remark_and_an_error_only_where_it_was_asked_for(
     run, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(documents, "find_spec", lambda name: None)
+    from photogram.show import html
+
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    html._environment.cache_clear()
     done = run("giant", "--example")
     assert done.exit_code == 0
     assert "no report.html: pip install 'photogram[report]'" in done.stderr
     assert "report.html" not in done.stdout
-    monkeypatch.setitem(sys.modules, "jinja2", None)
-    from photogram.show import html
-
-    html._environment.cache_clear()
     asked = run("giant", "--example", "--html", "report.html", "--out", "o")
     assert asked.exit_code == 1
     assert "jinja2 is needed: pip install 'photogram[report]'" in asked.stderr

@@ -223,20 +223,24 @@ def html_files(
     Raises
     ------
     ModuleNotFoundError
-        jinja2 or matplotlib is absent, and the report was asked for.
+        jinja2, or matplotlib of a page that takes it, is absent, and the report was asked for.
     """
     if place is None:
-        return {}
-    if not asked and not all(map(find_spec, NEEDED)):
-        if not job.quiet:
-            print_remark(f"no {HTML}: pip install 'photogram[report]'")
         return {}
     from photogram.show.html import page_html
     from photogram.show.run import reproducibility
 
-    with job.status("drawing the report"):
-        page = make()
-        content = page_html(page.with_sections(reproducibility(job.run(command), page.phases)))
+    try:
+        with job.status("drawing the report"):
+            page = make()
+            content = page_html(page.with_sections(reproducibility(job.run(command), page.phases)))
+    except ModuleNotFoundError as error:
+        # Most pages have no picture that takes matplotlib: which do is known when they are drawn.
+        if asked or error.name not in NEEDED:
+            raise
+        if not job.quiet:
+            print_remark(f"no {HTML}: pip install 'photogram[report]'")
+        return {}
     return {place.with_stem(place.stem + mark): content}
 
 

@@ -8,32 +8,34 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photogram.errors import InputError
-from photogram.plots.correlations import correlations
-from photogram.plots.distortion import distortion
-from photogram.plots.features import features
-from photogram.plots.films import films
-from photogram.plots.network import network
+from photogram.plots.correlations import correlations, correlations_sketch
+from photogram.plots.distortion import distortion, distortion_sketch
+from photogram.plots.features import features, features_sketch
+from photogram.plots.films import films, films_sketch
+from photogram.plots.network import network, network_sketch
+from photogram.plots.on_axes import on_axes
 from photogram.plots.panels import Where, figure_of
-from photogram.plots.redundancy import redundancy
-from photogram.plots.residuals import residuals
-from photogram.plots.tests import tests
+from photogram.plots.redundancy import redundancy, redundancy_sketch
+from photogram.plots.residuals import residuals, residuals_sketch
+from photogram.plots.tests import tests, tests_sketch
 from photogram.plots.trajectories import trajectory
+from photogram.show.sketch.declared import Sketch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PICTURES: dict[str, Callable[..., Any]] = {
-    "network": network,
-    "residuals": residuals,
-    "redundancy": redundancy,
-    "tests": tests,
-    "correlations": correlations,
-    "distortion": distortion,
-    "features": features,
-    "films": films,
+PICTURES: dict[str, Callable[[object], Sketch]] = {
+    "network": network_sketch,
+    "residuals": residuals_sketch,
+    "redundancy": redundancy_sketch,
+    "tests": tests_sketch,
+    "correlations": correlations_sketch,
+    "distortion": distortion_sketch,
+    "features": features_sketch,
+    "films": films_sketch,
 }
-"""The pictures by name, in the order in which a reader looks at them."""
+"""What declares each picture, by name, in the order in which a reader looks at them."""
 
 
 class Plots:
@@ -111,6 +113,14 @@ class Plots:
         return list(written)
 
 
+def sketch_of(result: object, name: str) -> Sketch | None:
+    """Return a picture of a result before it is drawn; None where there is nothing of it."""
+    try:
+        return PICTURES[name](result)
+    except InputError:
+        return None
+
+
 def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str, Figure]:
     """Return pictures of a result by name, each a figure that belongs to no window.
 
@@ -136,13 +146,8 @@ def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str,
     """
     if unknown := [name for name in names if name not in PICTURES]:
         raise InputError(f"there is no picture {', '.join(unknown)}, but {', '.join(PICTURES)}")
-    found = {}
-    for name in names:
-        try:
-            found[name] = figure_of(partial(PICTURES[name], result))
-        except InputError:
-            continue
-    return found
+    found = {name: sketch for name in names if (sketch := sketch_of(result, name)) is not None}
+    return {name: figure_of(partial(on_axes, sketch)) for name, sketch in found.items()}
 
 
 def picture_files(result: object, folder: Path, ending: str = "png") -> dict[Path, bytes]:

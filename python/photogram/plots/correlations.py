@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.panels import Where, handed_out, note, panels
+from photogram.plots.on_axes import on_axes
+from photogram.plots.panels import Where
 from photogram.plots.picture_data import Correlated, pictured
-from photogram.show.style import signed
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.marks import Mark, Mesh, Shades, Texts
 
 CAMERAS = 4
 """That have a panel at most."""
 WRITTEN = 14
 """Parameters whose coefficients are written into the matrix at most."""
+SHADES = Shades(-1.0, 1.0, "correlation, -1 to 1", "signed")
 
 
 def correlations(result: object, ax: Where = None) -> Any:
@@ -42,6 +43,11 @@ def correlations(result: object, ax: Where = None) -> Any:
     TypeError
         A result without photos and points.
     """
+    return on_axes(correlations_sketch(result), ax)
+
+
+def correlations_sketch(result: object) -> Sketch:
+    """Return the picture of correlations; see :func:`correlations`."""
     cameras = pictured(result).correlations
     if not cameras:
         raise InputError("there are no correlations to draw: no camera has two estimated parameters")
@@ -49,36 +55,32 @@ def correlations(result: object, ax: Where = None) -> Any:
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
     side = 2.2 + 0.36 * max(len(each.names) for each in shown)
-    with panels(ax, rows, columns, columns * side + 0.9, rows * (side + 0.2)) as found:
-        drawn = [_matrix(axes, each) for axes, each in zip(found, shown, strict=False)]
-        for unused in found[len(shown) :]:
-            unused.set_visible(False)
-        figure = found[0].get_figure()
-        assert figure is not None
-        figure.colorbar(
-            drawn[0], ax=found[: len(shown)], label="correlation, -1 to 1", aspect=30, shrink=0.85
-        )
-        if len(cameras) > len(shown):
-            note(found[len(shown) - 1], [f"the first {len(shown)} of {len(cameras)} cameras are drawn"])
-    return handed_out(found[: len(shown)])
+    left_out = len(cameras) > len(shown)
+    said = f"the first {len(shown)} of {len(cameras)} cameras are drawn" if left_out else ""
+    found = [_matrix(each, said if each is shown[-1] else "") for each in shown]
+    return Sketch(columns * side + 0.9, rows * (side + 0.2), found, columns, SHADES, beside_all=True)
 
 
-def _matrix(axes: Axes, each: Correlated) -> AxesImage:
-    image = axes.imshow(each.coefficients, cmap=signed(), vmin=-1.0, vmax=1.0)
-    axes.set_anchor("NW")
-    places = range(len(each.names))
-    axes.set_xticks(places, each.names, rotation=90 if max(map(len, each.names)) > 3 else 0)
-    axes.set_yticks(places, each.names)
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
-    axes.set_title(", ".join(part for part in (each.camera, each.remark) if part))
-    if len(each.names) <= WRITTEN:
-        for i in places:
-            for j in places:
-                if i == j:
-                    continue
-                value = float(each.coefficients[i, j])
-                text = f"{value:.2f}".replace("0.", ".", 1) if abs(value) < 0.995 else f"{value:.3f}"
-                colour = "white" if abs(value) > 0.7 else "black"
-                axes.text(j, i, text, ha="center", va="center", fontsize=6.5, color=colour)
-    return image
+def _matrix(each: Correlated, said: str) -> Panel:
+    count = len(each.names)
+    first, last = -0.5, count - 0.5
+    marks: list[Mark] = [Mesh(np.array([[first, first], [last, last]]), each.coefficients, SHADES)]
+    if count <= WRITTEN:
+        rows, columns = np.nonzero(~np.eye(count, dtype=bool))
+        values = each.coefficients[rows, columns].tolist()
+        texts = [
+            f"{value:.2f}".replace("0.", ".", 1) if abs(value) < 0.995 else f"{value:.3f}" for value in values
+        ]
+        colours = ["white" if abs(value) > 0.7 else "black" for value in values]
+        marks.append(Texts(np.column_stack([columns, rows]).astype(float), texts, colours, 6.5))
+    return Panel(
+        np.array([[first, last], [last, first]]),
+        marks,
+        ", ".join(part for part in (each.camera, each.remark) if part),
+        equal=True,
+        notes=[said],
+        across_names=each.names,
+        up_names=each.names,
+        turned=max(map(len, each.names)) > 3,
+        bare=True,
+    )

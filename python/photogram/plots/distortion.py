@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.panels import Where, handed_out, panels
-from photogram.plots.picture_data import Curves, pictured
+from photogram.plots.on_axes import on_axes
+from photogram.plots.panels import Where
+from photogram.plots.picture_data import Curve, Curves, pictured
+from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.marks import Band, Level, Line, Mark
 from photogram.show.style import COLOURS, FAINT, INK
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 CAMERAS = 3
 """That are drawn at most, side by side."""
@@ -45,59 +46,70 @@ def distortion(result: object, ax: Where = None) -> Any:
     TypeError
         A result without photos and points.
     """
+    return on_axes(distortion_sketch(result), ax)
+
+
+def distortion_sketch(result: object) -> Sketch:
+    """Return the picture of distortion; see :func:`distortion`."""
     cameras = pictured(result).distortion[:CAMERAS]
     if not cameras:
         raise InputError("there is no distortion to draw: no camera has radial terms, or they are all zero")
-    rows, columns = max(rows_of(each) for each in cameras), len(cameras)
-    width = 6.4 if columns == 1 else 4.8 * columns
-    with panels(ax, rows, columns, width, 0.6 + 2.3 * rows, sharex="col") as found:
-        for column, each in enumerate(cameras):
-            draw_curves(found[column::columns], each)
-    return handed_out(found)
+    found = side_by_side(cameras)
+    width = 6.4 if len(cameras) == 1 else 4.8 * len(cameras)
+    return Sketch(width, 0.6 + 2.3 * (len(found) // len(cameras)), found, len(cameras), shared=True)
 
 
-def rows_of(curves: Curves) -> int:
-    """Return how many panels the curves of a camera have: one for each, and one for standard deviations."""
-    return len(curves.curves) + any(curve.bands for curve in curves.curves)
+def side_by_side(cameras: Sequence[Curves]) -> list[Panel | None]:
+    """Return the panels of cameras, a column for each: its curves below each other, and their deviations."""
+    columns = [_column(each) for each in cameras]
+    rows = max(map(len, columns))
+    return [own[row] if row < len(own) else None for row in range(rows) for own in columns]
 
 
-def draw_curves(panels: list[Axes], curves: Curves) -> None:
-    """Draw the curves of one camera into panels below each other."""
+def _column(curves: Curves) -> list[Panel]:
     factor, unit = curves.shown_as
     seen = curves.radii <= curves.observed
     taken = 0
-    for number, (axes, curve) in enumerate(zip(panels, curves.curves, strict=False)):
-        for other in curves.others:
-            axes.plot(curves.radii, factor * other, color=FAINT, linewidth=0.5, alpha=0.5)
+    across = spread(curves.radii)
+    found, deviations, sizes = list[Panel](), list[Mark](), list[Floats]()
+    named = f"radius, {curves.unit}; dashed beyond {curves.observed:.4g}, where images end"
+    banded = any(curve.bands for curve in curves.curves)
+    for number, curve in enumerate(curves.curves):
+        marks: list[Mark] = [
+            Line(np.column_stack([curves.radii, factor * other]), FAINT, 0.5, opacity=0.5)
+            for other in curves.others
+        ]
         for name, sd in curve.bands.items():
             low, high = factor * (curve.values - sd), factor * (curve.values + sd)
             colour = COLOURS[taken % len(COLOURS)]
             taken += 1
-            axes.fill_between(
-                curves.radii, low, high, alpha=0.3, linewidth=0, color=colour, label=f"± sd of the {name}"
-            )
+            marks.append(Band(curves.radii, low, high, colour, 0.3, f"± sd of the {name}"))
             # Bands are thin on curves of hundreds of micrometres: once more by themselves.
-            _dashed(panels[-1], curves.radii, factor * sd, seen, colour, f"sd of the {name}")
-        _dashed(axes, curves.radii, factor * curve.values, seen, INK, "")
-        axes.axhline(0.0, color=FAINT, linewidth=0.5)
-        if len(curves.others):
-            # Single photos whose curves go astray do not set the scale.
-            ends = np.quantile(factor * curves.others, [0.1, 0.9], axis=0)
-            bottom = min(0.0, float(ends.min()), float(factor * curve.values.min()))
-            top = max(0.0, float(ends.max()), float(factor * curve.values.max()))
-            axes.set_ylim(bottom - 0.1 * (top - bottom), top + 0.1 * (top - bottom))
-        axes.set_title(curve.name if number else f"Radial distortion of {curves.camera}")
-        if curve.bands:
-            axes.legend(loc="best")
-        axes.set_ylabel(unit)
-    if taken:
-        panels[rows_of(curves) - 1].set_ylim(bottom=0.0)
-        panels[-1].set_ylabel(f"sd, {unit}")
-        panels[-1].legend(loc="best")
-    panels[-1].set_xlabel(f"radius, {curves.unit}; dashed beyond {curves.observed:.4g}, where images end")
+            deviations += _dashed(curves.radii, factor * sd, seen, colour, f"sd of the {name}")
+            sizes.append(factor * sd)
+        marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), Level(0.0, FAINT)]
+        title = curve.name if number else f"Radial distortion of {curves.camera}"
+        below = "" if banded or number + 1 < len(curves.curves) else named
+        limits = np.column_stack([across, _reach(curves, curve)])
+        found.append(Panel(limits, marks, title, below, unit, legend="best" if curve.bands else ""))
+    if banded:
+        limits = np.column_stack([across, (0.0, spread(*sizes)[1])])
+        found.append(Panel(limits, deviations, "", named, f"sd, {unit}", legend="best"))
+    return found
 
 
-def _dashed(axes: Axes, radii: Floats, values: Floats, seen: Any, colour: str, label: str) -> None:
-    last = max(int(np.count_nonzero(seen)), 1)
-    axes.plot(radii[:last], values[:last], color=colour, label=label or None)
-    axes.plot(radii[last - 1 :], values[last - 1 :], color=colour, linestyle="--")
+def _reach(curves: Curves, curve: Curve) -> tuple[float, float]:
+    """Return what a panel shows of a curve; single photos whose curves go astray do not set its scale."""
+    factor, _ = curves.shown_as
+    if not len(curves.others):
+        bands = (factor * (curve.values + sign * sd) for sd in curve.bands.values() for sign in (-1, 1))
+        return spread(0.0, factor * curve.values, *bands)
+    ends = np.quantile(factor * curves.others, [0.1, 0.9], axis=0)
+    bottom = min(0.0, float(ends.min()), float(factor * curve.values.min()))
+    top = max(0.0, float(ends.max()), float(factor * curve.values.max()))
+    return bottom - 0.1 * (top - bottom), top + 0.1 * (top - bottom)
+
+
+def _dashed(radii: Floats, values: Floats, seen: Bools, colour: str, label: str) -> list[Mark]:
+    last, places = max(int(np.count_nonzero(seen)), 1), np.column_stack([radii, values])
+    return [Line(places[:last], colour, label=label), Line(places[last - 1 :], colour, dash="--")]

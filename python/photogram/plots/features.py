@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.panels import Where, handed_out, note, panels
+from photogram.plots.on_axes import on_axes
+from photogram.plots.panels import Where
 from photogram.plots.picture_data import Deviations, pictured
+from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.marks import Level, Mark, Markers, Segments
 from photogram.show.style import COLOURS, FAINT
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SHOWN = 4
 """Features that have a panel at most."""
@@ -44,36 +44,41 @@ def features(result: object, ax: Where = None) -> Any:
     TypeError
         A result without photos and points.
     """
+    return on_axes(features_sketch(result), ax)
+
+
+def features_sketch(result: object) -> Sketch:
+    """Return the picture of features; see :func:`features`."""
     every = pictured(result).deviations
     if not every:
         raise InputError("there are no deviations to draw: no feature is fitted to more than two points")
     shown = every[:SHOWN]
-    with panels(ax, len(shown), 1, 7.0, 0.4 + 2.5 * len(shown)) as found:
-        for axes, each in zip(found, shown, strict=True):
-            _panel(axes, each)
-        if len(every) > SHOWN:
-            note(found[-1], [f"the first {SHOWN} of {len(every)} features are drawn"])
-    return handed_out(found)
+    said = f"the first {SHOWN} of {len(every)} features are drawn" if len(every) > SHOWN else ""
+    panels = [_panel(each, said if each is shown[-1] else "") for each in shown]
+    return Sketch(7.0, 0.4 + 2.5 * len(shown), panels)
 
 
-def _panel(axes: Axes, each: Deviations) -> None:
+def _panel(each: Deviations, said: str) -> Panel:
     factor, unit = each.shown_as
-    places = np.arange(len(each.points))
-    axes.axhline(0.0, color=FAINT, linewidth=0.8)
-    count = len(each.directions)
+    places, count = np.arange(len(each.points)), len(each.directions)
+    values, bars = factor * each.values, factor * np.nan_to_num(each.expanded)
+    # Side by side, so that bars do not hide each other.
+    across = places[:, np.newaxis] + 0.2 * (np.arange(count) - (count - 1) / 2)
+    marks: list[Mark] = [Level(0.0, FAINT, 0.8)]
     for k, direction in enumerate(each.directions):
-        # Side by side, so that bars do not hide each other.
-        across = places + 0.2 * (k - (count - 1) / 2)
-        values, bars = factor * each.values[:, k], factor * np.nan_to_num(each.expanded[:, k])
-        axes.errorbar(
-            across, values, bars, fmt="o", markersize=3.5, linewidth=1.0, color=COLOURS[k], label=direction
-        )
-    axes.set_title(each.title)
-    axes.set_ylabel(f"deviation ± U, {unit}")
-    if len(places) <= NAMED:
-        long = max(map(len, each.points)) * len(places) > 80
-        axes.set_xticks(places, each.points, rotation=90 if long else 0)
-    else:
-        axes.set_xlabel("points, in the order of the feature")
-    if count > 1:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=count, frameon=False)
+        at = np.column_stack([across[:, k], values[:, k]])
+        ends = np.stack([at, at], axis=1)
+        ends[:, :, 1] += bars[:, k, np.newaxis] * [-1.0, 1.0]
+        marks += [Segments(ends, COLOURS[k], 1.0), Markers(at, "o", 3.5, COLOURS[k], label=direction)]
+    named = len(places) <= NAMED
+    return Panel(
+        np.column_stack([spread(across), spread(0.0, values - bars, values + bars)]),
+        marks,
+        each.title,
+        "" if named else "points, in the order of the feature",
+        f"deviation ± U, {unit}",
+        notes=[said],
+        legend="above" if count > 1 else "",
+        across_names=each.points if named else (),
+        turned=max(map(len, each.points)) * len(places) > 80,
+    )

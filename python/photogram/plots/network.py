@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.plots.panels import NOWHERE, Where, labels, note, panels, scale_bars
+from photogram.lazy_dataclasses import replace
+from photogram.plots.on_axes import on_axes
+from photogram.plots.panels import Where
 from photogram.plots.picture_data import Pictured, Plan, pictured
 from photogram.show.pictures import round_length
-from photogram.show.style import BLUE, FAINT, INK, ORDERED, PURPLE, SOFT, VERMILION
+from photogram.show.sketch.colours import hexadecimal, rgb
+from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
+from photogram.show.sketch.marks import (
+    NOWHERE,
+    Arrows,
+    Ellipses,
+    Mark,
+    Markers,
+    Names,
+    Polygons,
+    Segments,
+    Shades,
+)
+from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,46 +75,45 @@ def network(result: object, ax: Where = None, *, plane: str | None = None) -> Ax
     TypeError
         A result without photos and points.
     """
+    axes: Axes = on_axes(network_sketch(result, plane), ax)
+    return axes
+
+
+def network_sketch(result: object, plane: str | None = None) -> Sketch:
+    """Return the picture of a network; see :func:`network`."""
     drawn = pictured(result)
     plan = drawn.plan
     seen = _plane(plan, plane)
     limits = _limits(plan, seen, drawn.footprints if seen[2] == 2 else None)
-    width, height = _size(limits)
-    with panels(ax, 1, 1, width, height) as [axes]:
-        from matplotlib.collections import PathCollection
+    marks, said = list[Mark](), list[str]()
+    for part in (_footprints(drawn, seen), _points(plan, seen), _photos(plan, seen)):
+        marks += part[0]
+        said.append(part[1])
+    arrows, ends = _vectors(plan, seen, limits, marks, said)
+    bars = [*_ellipses(drawn, seen, limits, marks, said), *arrows]
+    beyond = _beyond(plan, seen, limits)
+    said.append(f"{beyond} points lie beyond the picture" if beyond else "")
+    panel = replace(
+        _frame(plan, seen, limits),
+        marks=[*marks, *_names(plan, seen, ends)],
+        title=drawn.title or "Network",
+        notes=said,
+        bars=bars,
+        legend="beside",
+    )
+    return Sketch(*_size(limits), [panel])
 
-        _frame(axes, plan, seen, limits)
-        said = [_footprints(axes, drawn, seen), _points(axes, plan, seen), _photos(axes, plan, seen)]
-        arrows, ends = _vectors(axes, plan, seen, limits, said)
-        bars = [*_ellipses(axes, drawn, seen, limits, said), *arrows]
-        beyond = _beyond(plan, seen, limits)
-        said.append(f"{beyond} points lie beyond the picture" if beyond else "")
-        legend = axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
-        for handle in legend.legend_handles:
-            if isinstance(handle, PathCollection):
-                handle.set_sizes([16.0])
-        scale_bars(axes, bars, drawn.title or "Network")
-        note(axes, said)
-        _names(axes, plan, seen, ends)
-    return axes
 
-
-def view_of_plan(axes: Axes, plan: Plan) -> tuple[int, int, int]:
-    """Give axes the limits and labels of the plane in which the points spread most; return its axes."""
+def view_of_plan(plan: Plan) -> tuple[Panel, tuple[int, int, int]]:
+    """Return a panel of the plane in which the points spread most, and which axes it has."""
     seen = _plane(plan, None)
-    _frame(axes, plan, seen, _limits(plan, seen))
-    return seen
+    return _frame(plan, seen, _limits(plan, seen)), seen
 
 
-def _frame(axes: Axes, plan: Plan, seen: tuple[int, int, int], limits: Floats) -> None:
-    axes.set_aspect("equal", anchor="NW")
-    axes.set_xlim(*limits[:, 0])
-    axes.set_ylim(*limits[:, 1])
+def _frame(plan: Plan, seen: tuple[int, int, int], limits: Floats) -> Panel:
     unit = f", {plan.unit}" if plan.unit else ""
-    axes.set_xlabel(f"{plan.axes[seen[0]]}{unit}")
-    axes.set_ylabel(f"{plan.axes[seen[1]]}{unit}")
-    axes.ticklabel_format(useOffset=False, style="plain")
-    axes.locator_params(nbins=6)
+    across, up = (f"{plan.axes[axis]}{unit}" for axis in seen[:2])
+    return Panel(limits, across=across, up=up, equal=True)
 
 
 def _plane(plan: Plan, plane: str | None) -> tuple[int, int, int]:
@@ -168,74 +182,44 @@ def thinned(what: str, rows: Indices, most: int) -> tuple[Indices, str]:
     return rows[chosen], f"{most:,} of {len(rows):,} {what} are drawn, taken at random"
 
 
-def _footprints(axes: Axes, drawn: Pictured, seen: tuple[int, int, int]) -> str:
-    from matplotlib.collections import PolyCollection
-
+def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
     outlines = drawn.footprints
     if seen[2] != 2 or not len(outlines):
-        return ""
+        return [], ""
     good = np.flatnonzero(np.isfinite(outlines).all(axis=(1, 2)))
     if not len(good):
-        return ""
+        return [], ""
     chosen, said = thinned("footprints", good, FOOTPRINTS)
     shown = outlines[chosen][:, :, list(seen[:2])]
-    axes.add_collection(
-        PolyCollection(
-            list(shown),
-            facecolors=(0.34, 0.71, 0.91, float(np.clip(0.4 / len(shown), 0.003, 0.06))),
-            edgecolors=(0.45, 0.55, 0.62, float(np.clip(25.0 / len(shown), 0.5, 0.7))),
-            linewidths=0.6,
-            zorder=1.0,
-            label="footprint of a photo",
-            rasterized=len(shown) > 100,
-        ),
-        autolim=False,
-    )
-    return said
+    inside = float(np.clip(0.4 / len(shown), 0.003, 0.06))
+    edge = float(np.clip(25.0 / len(shown), 0.5, 0.7))
+    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, "footprint of a photo")], said
 
 
-def _photos(axes: Axes, plan: Plan, seen: tuple[int, int, int]) -> str:
+def _photos(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
     chosen, said = thinned("photos", np.arange(len(plan.photos)), PHOTOS)
     shown = plan.photos[chosen][:, list(seen[:2])]
     size = float(np.clip(60.0 / np.sqrt(len(shown)), 2.0, 7.0))
-    axes.plot(
-        *shown.T,
-        "+",
-        color=INK if len(shown) <= 300 else FAINT,
-        markersize=size,
-        markeredgewidth=0.7,
-        label=f"photo ({len(plan.photos):,})",
-        zorder=3.0,
-        rasterized=len(shown) > 500,
-    )
-    return said
+    colour, label = INK if len(shown) <= 300 else FAINT, f"photo ({len(plan.photos):,})"
+    return [Markers(shown, "+", size, colour, edge=0.7, label=label, layer=3.0)], said
 
 
-def _points(axes: Axes, plan: Plan, seen: tuple[int, int, int]) -> str:
-    from matplotlib import colormaps
-
+def _points(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
     rows = np.flatnonzero((plan.kinds == "pass") & np.isfinite(plan.points).all(axis=1))
     if not len(rows):
-        return ""
+        return [], ""
     every = np.searchsorted(RAYS, plan.rays, side="right") - 1
     classes = every[rows]
     there = np.unique(classes).tolist()
     chosen, said = thinned("points", rows, POINTS)
-    size = float(np.clip(9000.0 / len(chosen), 2.0, 14.0))
-    colours = colormaps[ORDERED](np.linspace(0.82 if len(there) > 1 else 0.0, 0.0, len(there)))
+    size = float(np.sqrt(np.clip(9000.0 / len(chosen), 2.0, 14.0)))
+    colours = rgb(Shades(0.0, 1.0, ""), np.linspace(0.82 if len(there) > 1 else 0.0, 0.0, len(there)))
+    marks = list[Mark]()
     for colour, number in zip(colours, there, strict=True):
-        own = chosen[every[chosen] == number]
-        axes.scatter(
-            plan.points[own, seen[0]],
-            plan.points[own, seen[1]],
-            s=size,
-            color=colour,
-            linewidths=0,
-            label=f"{_class(number, plan.rays[rows])} ({int((classes == number).sum()):,})",
-            zorder=2.0,
-            rasterized=len(chosen) > 1500,
-        )
-    return said
+        own = plan.points[chosen[every[chosen] == number]][:, list(seen[:2])]
+        label = f"{_class(number, plan.rays[rows])} ({int((classes == number).sum()):,})"
+        marks.append(Markers(own, "o", size, hexadecimal(colour), label=label))
+    return marks, said
 
 
 def _class(number: int, rays: Indices) -> str:
@@ -247,11 +231,9 @@ def _class(number: int, rays: Indices) -> str:
 
 
 def _ellipses(
-    axes: Axes, drawn: Pictured, seen: tuple[int, int, int], limits: Floats, said: list[str]
-) -> list[tuple[float, str, str]]:
-    """Draw error ellipses of points, the median one of each cell where they are many."""
-    from matplotlib.collections import EllipseCollection
-
+    drawn: Pictured, seen: tuple[int, int, int], limits: Floats, marks: list[Mark], said: list[str]
+) -> list[ScaleBar]:
+    """Add error ellipses of points, the median one of each cell where they are many; return their scale."""
     plan, pair = drawn.plan, list(seen[:2])
     inside = ((plan.points[:, pair] >= limits[0]) & (plan.points[:, pair] <= limits[1])).all(axis=1)
     rows = np.flatnonzero(inside)
@@ -279,21 +261,8 @@ def _ellipses(
     if len(shown) < len(chosen):
         said.append(f"{len(chosen) - len(shown)} ellipses are too large to be drawn at this scale")
     angles = np.degrees(np.arctan2(turns[shown, 1, 1], turns[shown, 0, 1]))
-    axes.add_collection(
-        EllipseCollection(
-            2 * scale * axes_of[shown, 1],
-            2 * scale * axes_of[shown, 0],
-            angles,
-            units="xy",
-            offsets=plan.points[rows[shown]][:, pair],
-            transOffset=axes.transData,
-            facecolors="none",
-            edgecolors=BLUE,
-            linewidths=0.8,
-            zorder=4.0,
-        ),
-        autolim=False,
-    )
+    semi_axes = scale * axes_of[shown][:, ::-1]
+    marks.append(Ellipses(plan.points[rows[shown]][:, pair], semi_axes, angles, BLUE, 0.8, layer=4.0))
     worst = int(np.argmax(axes_of[:, 1]))
     unit = f" {plan.unit}" if plan.unit else ""
     said.append(
@@ -315,9 +284,9 @@ def _of_cells(places: Floats, sizes: Floats, side: float) -> Indices:
 
 
 def _vectors(
-    axes: Axes, plan: Plan, seen: tuple[int, int, int], limits: Floats, said: list[str]
-) -> tuple[list[tuple[float, str, str]], Floats]:
-    """Draw control and check points with the differences of their coordinates.
+    plan: Plan, seen: tuple[int, int, int], limits: Floats, marks: list[Mark], said: list[str]
+) -> tuple[list[ScaleBar], Floats]:
+    """Add control and check points with the differences of their coordinates.
 
     Returns
     -------
@@ -333,16 +302,8 @@ def _vectors(
         chosen, remark = thinned(f"{kind} points", rows, VECTORS)
         said.append(remark)
         size = float(np.clip(60.0 / np.sqrt(len(chosen)), 3.0, 7.0))
-        axes.plot(
-            *plan.points[chosen][:, pair].T,
-            marker,
-            markersize=size,
-            markerfacecolor="white",
-            markeredgecolor=INK,
-            markeredgewidth=0.9,
-            label=f"{kind} point ({len(rows):,})",
-            zorder=5.0,
-        )
+        label, places = f"{kind} point ({len(rows):,})", plan.points[chosen][:, pair]
+        marks.append(Markers(places, marker, size, face="white", edge=0.9, label=label, layer=5.0))
         drawn.append(chosen)
     if not drawn:
         return [], NOWHERE
@@ -354,15 +315,19 @@ def _vectors(
     across, out = plan.differences[rows][:, pair], plan.differences[rows, seen[2]]
     extent = float((limits[1] - limits[0]).max())
     scale = round_length(0.08 * extent / size)
-    _arrows(axes, plan.points[rows][:, pair], np.nan_to_num(across), scale, VERMILION)
-    flat = np.column_stack([np.zeros(len(rows)), np.nan_to_num(out)])
-    _sticks(axes, plan.points[rows][:, pair], flat, scale, np.isfinite(out))
+    places, moved = plan.points[rows][:, pair], scale * np.nan_to_num(across)
+    if (long := np.hypot(*moved.T) > 0).any():
+        label = "difference in plan"
+        marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label, layer=6.0))
+    if (high := np.isfinite(out) & (out != 0)).any():
+        tops = places[high] + np.column_stack([np.zeros(high.sum()), scale * out[high]])
+        label = "difference in height, + upwards"
+        marks.append(Segments(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label, layer=5.5))
     unit = f" {plan.unit}" if plan.unit else ""
     bar = round_length(0.12 * extent / scale)
     what = f"differences of control and check points, adjusted less given (× {scale:,g})"
-    ends = plan.points[rows][:, pair] + scale * np.nan_to_num(across)
-    middles = 0.5 * (ends + plan.points[rows][:, pair])
-    return [(scale * bar, VERMILION, f"{bar:g}{unit}: {what}")], np.concatenate([ends, middles])
+    between = np.concatenate([places + moved, places + 0.5 * moved])
+    return [(scale * bar, VERMILION, f"{bar:g}{unit}: {what}")], between
 
 
 def _usual(differences: Floats) -> float:
@@ -371,64 +336,17 @@ def _usual(differences: Floats) -> float:
     return float(np.quantile(sizes[sizes > 0], 0.9)) if (sizes > 0).any() else 0.0
 
 
-def _arrows(axes: Axes, places: Floats, vectors: Floats, scale: float, colour: str) -> None:
-    long = np.hypot(*vectors.T) > 0
-    if long.any():
-        axes.quiver(
-            *places[long].T,
-            *(scale * vectors[long]).T,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            color=colour,
-            width=0.0035,
-            headwidth=3.5,
-            headlength=4.5,
-            headaxislength=4.0,
-            zorder=6.0,
-            label="difference in plan",
-        )
-
-
-def _sticks(axes: Axes, places: Floats, vectors: Floats, scale: float, known: Bools) -> None:
-    """Draw differences across the plane as bars: upwards where they are positive."""
-    from matplotlib.collections import LineCollection
-
-    chosen = known & (vectors[:, 1] != 0)
-    if chosen.any():
-        ends = places[chosen] + scale * vectors[chosen]
-        lines: Any = np.stack([places[chosen], ends], axis=1)
-        axes.add_collection(
-            LineCollection(
-                list(lines),
-                colors=PURPLE,
-                linewidths=2.2,
-                zorder=5.5,
-                label="difference in height, + upwards",
-            ),
-            autolim=False,
-        )
-
-
 def _beyond(plan: Plan, seen: tuple[int, int, int], limits: Floats) -> int:
     known = plan.points[np.isfinite(plan.points).all(axis=1)][:, list(seen[:2])]
     return int((~((known >= limits[0]) & (known <= limits[1])).all(axis=1)).sum())
 
 
-def _names(axes: Axes, plan: Plan, seen: tuple[int, int, int], ends: Floats) -> None:
+def _names(plan: Plan, seen: tuple[int, int, int], ends: Floats) -> list[Mark]:
     """Name control and check points, and photos, where these are few."""
-    pair = list(seen[:2])
     held = np.flatnonzero((plan.kinds != "pass") & np.isfinite(plan.points).all(axis=1))
     held = held if len(held) <= NAMED else held[:0]
     photos = np.arange(len(plan.photos) if len(plan.photos) <= NAMED else 0)
-    if len(held) + len(photos):
-        labels(
-            axes,
-            np.concatenate([plan.points[held], plan.photos[photos]])[:, pair],
-            [
-                *(plan.point_ids[row] for row in held.tolist()),
-                *(plan.photo_ids[row] for row in photos.tolist()),
-            ],
-            [INK] * len(held) + [SOFT] * len(photos),
-            avoid=ends,
-        )
+    places = np.concatenate([plan.points[held], plan.photos[photos]])[:, list(seen[:2])]
+    texts = [plan.point_ids[row] for row in held.tolist()] + [plan.photo_ids[row] for row in photos.tolist()]
+    colours = [INK] * len(held) + [SOFT] * len(photos)
+    return [Names(places, texts, colours, ends)] if texts else []

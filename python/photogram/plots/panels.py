@@ -14,12 +14,13 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.writing import write_whole
 from photogram.show.pictures import drawn, new_figure
+from photogram.show.sketch.marks import NOWHERE
+from photogram.show.sketch.names import Box, free_side
 from photogram.show.style import FAINT, INK, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
-    from matplotlib.transforms import Bbox
 
     Where: TypeAlias = Axes | Sequence[Axes] | NDArray[Any] | Figure | SubFigure | None
 
@@ -29,7 +30,6 @@ if not TYPE_CHECKING:
 
 
 Drawn = TypeVar("Drawn")
-NOWHERE = np.empty((0, 2))
 
 
 @contextmanager
@@ -226,9 +226,10 @@ def labels(
     # Where legends and scales of equal axes go is known only when the layout was made twice.
     for _ in range(2):
         _lay_out(figure)
-    room = axes.get_window_extent()
+    room: Box = axes.get_window_extent().extents
     point = figure.dpi / 72.0
-    taken: list[Bbox] = [each.get_window_extent() for each in axes.texts if isinstance(each, Annotation)]
+    own_boxes = (each.get_window_extent() for each in axes.texts if isinstance(each, Annotation))
+    taken: list[Box] = [each.extents for each in own_boxes]
     at = axes.transData.transform(places)
     obstacles = np.concatenate([at, axes.transData.transform(avoid)])
     left_out = 0
@@ -241,13 +242,12 @@ def labels(
         written.set_in_layout(False)
         written.set_bbox({"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 0.4})
         own = written.get_window_extent()
-        side = _free_side(own.width, own.height, (x, y), gap * point, taken, obstacles, room)
-        if side is None:
+        box = free_side((own.width, own.height), (x, y), gap * point, taken, obstacles, room)
+        if box is None:
             written.remove()
             left_out += 1
             continue
-        corner, box = side
-        written.set_position(((corner[0] - x) / point, (corner[1] - y) / point))
+        written.set_position(((box[0] - x) / point, (box[1] - y) / point))
         taken.append(box)
     return left_out
 
@@ -261,28 +261,3 @@ def _lay_out(figure: Figure) -> None:
     engine.execute(figure)
     for axes in figure.axes:
         axes.apply_aspect()
-
-
-def _free_side(
-    width: float,
-    height: float,
-    place: tuple[float, float],
-    gap: float,
-    taken: Sequence[Bbox],
-    places: Floats,
-    room: Bbox,
-) -> tuple[tuple[float, float], Bbox] | None:
-    """Return where the lower left corner of a name may be, and its box in dots."""
-    from matplotlib.transforms import Bbox
-
-    x, y = place
-    across = (x + gap, x - width / 2, x - gap - width)
-    up = (y + gap, y - height / 2, y - gap - height)
-    for i, j in ((0, 0), (2, 2), (2, 0), (0, 2), (0, 1), (2, 1), (1, 0), (1, 2)):
-        left, low = across[i], up[j]
-        box = Bbox.from_bounds(left, low, width, height)
-        inside = room.x0 <= left and left + width <= room.x1 and room.y0 <= low and low + height <= room.y1
-        hit = ((places > [left, low]) & (places < [left + width, low + height])).all(axis=1).any()
-        if inside and not hit and not any(box.overlaps(other) for other in taken):
-            return (left, low), box
-    return None

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
+from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
-from photogram.plots.panels import Where, handed_out, note, panels, scale_bars
+from photogram.plots.on_axes import on_axes
+from photogram.plots.panels import Where
 from photogram.plots.picture_data import Images, pictured
 from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
+from photogram.show.sketch.marks import Arrows, Mark, Markers
 from photogram.show.style import FAINT, INK, MARKED
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SINGLE = 900
 """Image points of a camera whose residuals are drawn one by one at most; of more, the means of cells."""
@@ -59,6 +60,11 @@ def residuals(result: object, ax: Where = None) -> Any:
     TypeError
         A result without photos and points.
     """
+    return on_axes(residuals_sketch(result), ax)
+
+
+def residuals_sketch(result: object) -> Sketch:
+    """Return the picture of image residuals; see :func:`residuals`."""
     images = pictured(result).images
     cameras, left_out = largest_cameras(images)
     columns = min(3, len(cameras))
@@ -71,12 +77,8 @@ def residuals(result: object, ax: Where = None) -> Any:
     # Title, scale and labels; where means are drawn, also what they are.
     beside = 1.95 if many else 1.25
     high = rows * (float(np.clip(up / across, 0.3, 1.5)) * (width / columns - 0.75) + beside)
-    with panels(ax, rows, columns, width, high) as found:
-        for axes, camera in zip(found, cameras, strict=False):
-            _field(axes, images, camera, left_out if camera == cameras[-1] else "")
-        for unused in found[len(cameras) :]:
-            unused.set_visible(False)
-    return handed_out(found[: len(cameras)])
+    found = [_field(images, camera, left_out if camera == cameras[-1] else "") for camera in cameras]
+    return Sketch(width, high, found, columns)
 
 
 def largest_cameras(images: Images, most: int = CAMERAS) -> tuple[list[int], str]:
@@ -88,70 +90,60 @@ def largest_cameras(images: Images, most: int = CAMERAS) -> tuple[list[int], str
     return chosen or [0], said
 
 
-def frame(axes: Axes, images: Images, edges: Floats, *, scanned: bool = False) -> None:
-    """Give axes the frame of a camera: equal scales, room around it, y as the camera counts it.
+def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
+    """Return a panel of the frame of a camera: equal scales, room around it, y as the camera counts it.
 
     Of a scanner they are samples and lines, upwards: so residuals point as they do in its focal plane.
     """
-    low, high = edges
-    margin = ROOM * float((high - low).max())
-    axes.set_aspect("equal", anchor="NW")
-    axes.set_xlim(low[0] - margin, high[0] + margin)
-    up = (low[1] - margin, high[1] + margin)
-    axes.set_ylim(*(up[::-1] if images.down and not scanned else up))
-    axes.set_xlabel("sample" if scanned else f"x, {images.unit}")
-    axes.set_ylabel("line" if scanned else f"y, {images.unit}")
+    margin = ROOM * float((edges[1] - edges[0]).max())
+    limits = edges + margin * np.array([[-1.0], [1.0]])
+    if images.down and not scanned:
+        limits[:, 1] = limits[::-1, 1]
+    across, up = ("sample", "line") if scanned else (f"x, {images.unit}", f"y, {images.unit}")
+    return Panel(limits, across=across, up=up, equal=True)
 
 
-def _field(axes: Axes, images: Images, camera: int, left_out: str) -> None:
-    """Draw the residuals of a camera, and say what was left out."""
+def _field(images: Images, camera: int, left_out: str) -> Panel | None:
+    """Return the residuals of a camera, and what was left out."""
     own = images.cameras == camera
     xy, vectors = images.xy[own], images.residuals[own]
     factor, unit = images.shown_as
     if not len(xy):
-        return
+        return None
     longer = int(np.clip(np.sqrt(len(xy) / IN_CELL), 6, CELLS))
     grid = cells(xy, longer)
     scanned = images.of_scanner(camera)
-    frame(axes, images, grid.edges, scanned=scanned)
     remark: list[str] = []
     if len(xy) <= SINGLE:
-        places, shown, colours = xy, vectors, np.full(len(xy), INK)
+        places, shown, colours = xy, vectors, [INK] * len(xy)
     else:
         places, shown, colours, remark = _means(grid, vectors)
+    marks: list[Mark] = [Markers(places, ".", 2.0, FAINT, layer=1.0)]
     cut = 0
     size = float(np.quantile(np.hypot(*shown.T), 0.9)) if len(shown) else 0.0
     extent = float((grid.edges[1] - grid.edges[0]).max())
-    bars = []
+    bars: list[ScaleBar] = []
     if size > 0:
         scale = 0.7 * extent / longer / size if len(xy) > SINGLE else 0.045 * extent / size
         longest = LONGEST * 0.1 * extent / scale
         lengths = np.hypot(*shown.T)
         cut = int((lengths > longest).sum())
         shown = shown * np.minimum(1.0, longest / np.maximum(lengths, 1e-300))[:, np.newaxis]
-        axes.quiver(
-            *places.T,
-            *(scale * shown).T,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            color=colours,
-            width=0.0028,
-            headwidth=3.5,
-            headlength=4.5,
-            zorder=2.0,
-        )
+        marks.append(Arrows(places, scale * shown, colours, 0.0028))
         bar = round_length(0.15 * extent / scale * factor)
         bars = [(scale * bar / factor, INK, f"{bar:g} {unit}")]
-    axes.plot(*places.T, ".", color=FAINT, markersize=2.0, zorder=1.0)
     rms = np.sqrt((vectors**2).mean(axis=0)) * factor
-    name = images.names[camera]
-    scale_bars(axes, bars, f"{name}: {len(xy):,} images, rms {rms[0]:.3g}, {rms[1]:.3g} {unit}")
     in_plane = "vectors: x to the right and y up, in the focal plane" if scanned else ""
-    note(axes, [*remark, in_plane, f"vectors that are longer and cut short: {cut}" if cut else "", left_out])
+    return replace(
+        frame(images, grid.edges, scanned=scanned),
+        marks=marks,
+        title=f"{images.names[camera]}: {len(xy):,} images, rms {rms[0]:.3g}, {rms[1]:.3g} {unit}",
+        notes=[*remark, in_plane, f"vectors that are longer and cut short: {cut}" if cut else "", left_out],
+        bars=bars,
+    )
 
 
-def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, Any, list[str]]:
+def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, list[str], list[str]]:
     """Return places, mean vectors and colours of the cells of a frame, and what they are."""
     from photogram.statistics.distributions import critical_chi_square
 
@@ -161,7 +153,7 @@ def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, Any, list[str]
     with np.errstate(invalid="ignore", divide="ignore"):
         square = (means[filled] ** 2 * grid.counts[filled, np.newaxis] / variance).sum(axis=1)
     beyond = square > critical_chi_square(LEVEL / len(filled), 2)
-    colours = np.where(beyond, MARKED, INK)
+    colours = np.where(beyond, MARKED, INK).tolist()
     per_cell = _between(grid.counts[filled])
     said = [f"means of cells with {per_cell} images,", f"those with less than {FEWEST} are left out"]
     if beyond.any():

@@ -11,15 +11,16 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.plots.panels import Where, handed_out, labels, note, panels
+from photogram.plots.on_axes import on_axes
+from photogram.plots.panels import Where
 from photogram.plots.picture_data import pictured
+from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.marks import Band, Level, Line, Mark, Markers, Names, bars
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.statistics.patterns import SPEAKING
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from photogram.statistics.outliers import Observations
 
 QUANTILES = 1500
@@ -59,16 +60,19 @@ def tests(result: object, ax: Where = None) -> Any:  # noqa: PT028  (pytest does
     TypeError
         A result without photos and points.
     """
+    return on_axes(tests_sketch(result), ax)
+
+
+def tests_sketch(result: object) -> Sketch:
+    """Return the picture of test values; see :func:`tests`."""
     drawn = pictured(result)
     groups = [_speaking(each) for each in drawn.tested]
     values = np.concatenate([each.values.ravel() for each in groups])
     values = values[np.isfinite(values)]
     if len(values) < 2:
         raise InputError("there are no test values: adjust with covariance=True, and with redundancy")
-    with panels(ax, 1, 2, 10.0, 4.6) as found:
-        _histogram(found[0], values, drawn.unit_weight)
-        _quantiles(found[1], values, groups, drawn.unit_weight)
-    return handed_out(found)
+    weight = drawn.unit_weight
+    return Sketch(10.0, 4.6, [_histogram(values, weight), _quantiles(values, groups, weight)], 2)
 
 
 def _speaking(group: Observations) -> Observations:
@@ -78,73 +82,72 @@ def _speaking(group: Observations) -> Observations:
     return replace(group, values=np.where(silent.reshape(sizes.shape[1:]), np.nan, group.values))
 
 
-def _histogram(axes: Axes, values: Floats, unit_weight: float) -> None:
+def _histogram(values: Floats, unit_weight: float) -> Panel:
     reach = float(np.clip(1.02 * np.abs(values).max(), 3.5 * min(unit_weight, 1.0), WIDEST))
-    bins = int(np.clip(2 * round(np.sqrt(len(values))), 12, 60))
-    edges = np.linspace(-reach, reach, bins + 1)
+    number = int(np.clip(2 * round(np.sqrt(len(values))), 12, 60))
+    edges = np.linspace(-reach, reach, number + 1)
     counts, _ = np.histogram(values, edges)
     density = counts / (len(values) * np.diff(edges))
-    axes.stairs(density, edges, fill=True, color=SKY, alpha=0.6, label=f"{len(values):,} test values")
     x = np.linspace(-reach, reach, 241)
-    axes.plot(x, _bell(x, 1.0), color=INK, label="normal, standard deviations as given")
+    marks: list[Mark] = [bars(edges, density, SKY, 0.6, f"{len(values):,} test values")]
+    normal = np.column_stack([x, _bell(x, 1.0)])
+    marks.append(Line(normal, label="normal, standard deviations as given"))
     if abs(unit_weight - 1.0) > 0.02:
         label = f"normal, standard deviations × {unit_weight:.3g}"
-        axes.plot(x, _bell(x, unit_weight), color=MARKED, linestyle="--", label=label)
-    axes.set_ylim(0.0, 1.35 * max(float(density.max()), 0.4))
-    axes.legend(loc="upper right")
-    axes.set_xlabel("test value w")
-    axes.set_ylabel("density")
-    axes.set_title(f"Histogram: mean {values.mean():.2f}, standard deviation {values.std():.2f}")
+        marks.append(Line(np.column_stack([x, _bell(x, unit_weight)]), MARKED, dash="--", label=label))
     beyond = int((np.abs(values) > reach).sum())
-    note(axes, [f"{beyond:,} test values lie beyond ±{reach:.1f}" if beyond else ""])
+    return Panel(
+        np.column_stack([spread(edges), (0.0, 1.35 * max(float(density.max()), 0.4))]),
+        marks,
+        f"Histogram: mean {values.mean():.2f}, standard deviation {values.std():.2f}",
+        "test value w",
+        "density",
+        notes=[f"{beyond:,} test values lie beyond ±{reach:.1f}" if beyond else ""],
+        legend="upper right",
+    )
 
 
 def _bell(x: Floats, sd: float) -> Floats:
     return np.asarray(np.exp(-0.5 * (x / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
-def _quantiles(axes: Axes, values: Floats, groups: list[Observations], unit_weight: float) -> None:
+def _quantiles(values: Floats, groups: list[Observations], unit_weight: float) -> Panel:
     n = len(values)
     rows = _rows(n)
     probability = (rows + 0.5) / n
     expected = normal_quantiles(probability)
-    ordered = np.sort(values)[rows]
+    every = np.sort(values)
+    ordered = every[rows]
     # Of the order statistics of independent values, about; those of residuals are nearly so.
     spread = 1.96 * np.sqrt(probability * (1.0 - probability) / n) / _bell(expected, 1.0)
-    band: dict[str, Any] = {"alpha": 0.35, "linewidth": 0, "color": FAINT}
-    axes.fill_between(expected, expected - spread, expected + spread, label="95 % of normal values", **band)
-    axes.plot(
-        expected[[0, -1]], expected[[0, -1]], color=INK, linewidth=0.9, label="standard deviations as given"
-    )
+    ends, places = expected[[0, -1]], np.column_stack([expected, ordered])
+    marks: list[Mark] = [
+        Band(expected, expected - spread, expected + spread, FAINT, 0.35, "95 % of normal values"),
+        Line(np.column_stack([ends, ends]), width=0.9, label="standard deviations as given"),
+    ]
     if abs(unit_weight - 1.0) > 0.02:
-        ends = expected[[0, -1]]
         label = f"standard deviations × {unit_weight:.3g}"
-        axes.plot(ends, unit_weight * ends, color=MARKED, linewidth=0.9, linestyle="--", label=label)
+        marks.append(Line(np.column_stack([ends, unit_weight * ends]), MARKED, 0.9, "--", label=label))
     limit = critical_normal(bonferroni(LEVEL, n))
     beyond = np.abs(ordered) > limit
-    axes.plot(
-        expected[~beyond], ordered[~beyond], ".", color=BLUE, markersize=4.0, rasterized=len(rows) > 500
-    )
+    marks.append(Markers(places[~beyond], ".", 4.0, BLUE))
     if beyond.any():
-        axes.plot(
-            expected[beyond], ordered[beyond], "D", color=MARKED, markersize=4.0, label=_count(values, limit)
-        )
-    axes.axhline(limit, color=FAINT, linewidth=0.7, linestyle=":")
-    axes.axhline(-limit, color=FAINT, linewidth=0.7, linestyle=":")
+        marks.append(Markers(places[beyond], "D", 4.0, MARKED, label=_count(values, limit)))
+    marks += [Level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
+    if worst := _worst(groups, limit):
+        sizes = [value for value, _ in worst]
+        at = normal_quantiles((np.minimum(np.searchsorted(every, sizes), n - 1) + 0.5) / n)
+        names = [name for _, name in worst]
+        marks.append(Names(np.column_stack([at, sizes]), names, [INK] * len(worst)))
     reach = 1.3 * max(float(np.abs(ordered).max()), limit)
-    axes.set_ylim(-reach, reach)
-    axes.set_xlim(1.08 * expected[0], 1.08 * expected[-1])
-    axes.set_xlabel("normal quantile")
-    axes.set_ylabel("test value w")
-    axes.set_title(f"Quantiles: limit of {n:,} tests ±{limit:.2f} (dotted)")
-    axes.legend(loc="lower right", frameon=True, framealpha=1.0, edgecolor="white")
-    worst = _worst(groups, limit)
-    if worst:
-        places = np.searchsorted(np.sort(values), [value for value, _ in worst])
-        at = np.column_stack(
-            [normal_quantiles((np.minimum(places, n - 1) + 0.5) / n), [value for value, _ in worst]]
-        )
-        labels(axes, at, [name for _, name in worst], [INK] * len(worst))
+    return Panel(
+        np.column_stack([1.08 * ends, [-reach, reach]]),
+        marks,
+        f"Quantiles: limit of {n:,} tests ±{limit:.2f} (dotted)",
+        "normal quantile",
+        "test value w",
+        legend="lower right",
+    )
 
 
 def _count(values: Floats, limit: float) -> str:

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.plots.distortion import draw_curves, rows_of
-from photogram.plots.panels import Where, handed_out, panels, placed
+from photogram.plots.distortion import side_by_side
+from photogram.plots.on_axes import on_axes
+from photogram.plots.panels import Where, panels, placed
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.picture_data import curves_of
 from photogram.results.result import Result
 from photogram.show.pictures import arrows, round_length
+from photogram.show.sketch.declared import Sketch
 from photogram.show.style import BLUE, INK
 
 if TYPE_CHECKING:
@@ -111,6 +113,5 @@ def _lens_field(camera: AdjustedCamera, field: LensField, ax: Where) -> Axes:
 
 def _distortion(camera: AdjustedCamera, curve: DistortionCurve, ax: Where) -> NDArray[Any]:
     curves = curves_of(camera, curve)
-    with panels(ax, rows_of(curves), 1, 6.4, 7.5, sharex=True) as found:
-        draw_curves(found, curves)
-    return np.atleast_1d(handed_out(found))
+    sketch = Sketch(6.4, 7.5, side_by_side([curves]), shared=True)
+    return np.atleast_1d(on_axes(sketch, ax))

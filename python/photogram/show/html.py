@@ -28,7 +28,7 @@ LONG = 16
 def page_html(page: Page) -> bytes:
     """Return a page as an HTML file (UTF-8) that needs no network and no other file.
 
-    It takes jinja2 and matplotlib (`pip install 'photogram[report]'`).
+    It takes jinja2, and matplotlib for drawings that are no sketches (`pip install 'photogram[report]'`).
     """
     environment = _environment()
     sections = [drawn for section in page.sections if (drawn := _drawn(section)).parts]
@@ -136,7 +136,22 @@ DPI = 170
 
 
 def inlined(drawing: Drawing) -> Picture | None:
-    """Draw a picture; None where it has nothing to show. It needs matplotlib, of `photogram[report]`."""
+    """Draw a picture; None where it has nothing to show.
+
+    One that is no sketch needs matplotlib, of `photogram[report]`.
+    """
+    if drawing.sketch is None:
+        markup = _of_figure(drawing)
+    else:
+        from photogram.show.sketch.svg import svg_of
+
+        sketch = drawing.sketch()
+        markup = svg_of(sketch, drawing.name, drawing.title) if sketch is not None else ""
+    return Picture(drawing.name, drawing.title, drawing.caption, markup) if markup else None
+
+
+def _of_figure(drawing: Drawing) -> str:
+    """Return a figure of matplotlib as an element of a page; nothing where it has nothing to show."""
     from photogram.show.style import styled
 
     # Ticks are made when a figure is saved; identifiers are the same in every run.
@@ -145,7 +160,7 @@ def inlined(drawing: Drawing) -> Picture | None:
 
         figure = drawing.draw()
         if figure is None:
-            return None
+            return ""
         width, height = figure.get_size_inches()
         content = io.StringIO()
         canvas: Any = FigureCanvasSVG(figure)  # without types; savefig would draw all of it twice
@@ -159,7 +174,7 @@ def inlined(drawing: Drawing) -> Picture | None:
                 f'<img src="data:image/png;base64,{data}" alt="{_quoted(drawing.title)}"'
                 f' width="{96 * width:.0f}" height="{96 * height:.0f}">'
             )
-    return Picture(drawing.name, drawing.title, drawing.caption, markup)
+    return markup
 
 
 def _embedded(text: str, drawing: Drawing, width: float) -> str:

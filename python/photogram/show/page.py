@@ -17,6 +17,8 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from photogram.show.sketch.declared import Sketch
+
 T = TypeVar("T")
 
 Tone = Literal["", "good", "look", "bad"]
@@ -157,12 +159,15 @@ class Drawing:
         A word for switching, and what is to be seen.
     draw
         Makes the matplotlib figure; None where there is nothing to draw.
+    sketch
+        Declares the picture, which pages then draw without matplotlib; None: only `draw` knows it.
     """
 
     name: str
     title: str
     caption: str
     draw: Callable[[], Figure | None]
+    sketch: Callable[[], Sketch | None] | None = None
     kind: str = field(default="drawing", init=False)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.plots.accessor import figures, sketch_of
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
 from photogram.results.observation_rows import tested_singly
@@ -354,8 +355,9 @@ def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
     """Return the pictures that a result may have, by name; what there is nothing of draws nothing."""
 
     def draw(name: str) -> Figure | None:
-        from photogram.plots import figures  # takes long to import
-
         return figures(result, [name]).get(name)
 
-    return {name: Drawing(f"picture-{name}", *words, partial(draw, name)) for name, words in CAPTIONS.items()}
+    return {
+        name: Drawing(f"picture-{name}", *words, partial(draw, name), partial(sketch_of, result, name))
+        for name, words in CAPTIONS.items()
+    }

@@ -1,0 +1,275 @@
+"""Pictures on axes of matplotlib: one function a mark, and the panel around them."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.plots.panels import Where, handed_out, labels, note, panels, scale_bars
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.marks import (
+    Arrows,
+    Band,
+    Ellipses,
+    Level,
+    Line,
+    Mark,
+    Markers,
+    Mesh,
+    Names,
+    Polygons,
+    Segments,
+    Shades,
+    Texts,
+)
+from photogram.show.style import ORDERED, signed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DOTS = 500
+"""Marks beyond which vectors become dots: files are smaller, and nothing is lost that could be seen."""
+LEGENDS: dict[str, dict[str, Any]] = {
+    "beside": {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0},
+    "above": {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)},
+    "lower right": {"loc": "lower right", "frameon": True, "framealpha": 1.0, "edgecolor": "white"},
+}
+
+
+def on_axes(sketch: Sketch, ax: Where) -> Any:
+    """Draw a picture where it is asked for, and return its axes: one by itself, several as an array.
+
+    Parameters
+    ----------
+    sketch
+        The picture.
+    ax
+        As of :func:`photogram.plots.panels.panels`.
+
+    Raises
+    ------
+    InputError
+        Another number of axes.
+    ModuleNotFoundError
+        matplotlib is absent.
+    """
+    given: dict[str, Any] = {"sharex": "col"} if sketch.shared else {}
+    with panels(ax, sketch.rows, sketch.columns, sketch.width, sketch.height, **given) as found:
+        own = [(axes, panel) for axes, panel in zip(found, sketch.panels, strict=False) if panel]
+        for axes, panel in own:
+            _panel(axes, panel)
+        for unused in {*found} - {axes for axes, _ in own}:
+            unused.set_visible(False)
+        if sketch.shades is not None:
+            _colour_bar([axes for axes, _ in own][0 if sketch.beside_all else -1 :], sketch.shades)
+        for axes, panel in own:
+            for mark in panel.marks:
+                if isinstance(mark, Names):
+                    labels(axes, mark.places, mark.texts, mark.colours, mark.avoid)
+    return handed_out(found[: len(sketch.panels)])
+
+
+def _panel(axes: Axes, panel: Panel) -> None:
+    if panel.equal:
+        axes.set_aspect("equal", anchor="NW")
+    axes.set_xlim(*panel.limits[:, 0].tolist())
+    axes.set_ylim(*panel.limits[:, 1].tolist())
+    axes.set_xlabel(panel.across)
+    axes.set_ylabel(panel.up)
+    if panel.equal:
+        axes.ticklabel_format(useOffset=False, style="plain")
+        axes.locator_params(nbins=6)
+    if panel.across:
+        axes.tick_params(labelbottom=True)
+    if panel.across_names:
+        places = range(len(panel.across_names))
+        axes.set_xticks(places, panel.across_names, rotation=90 if panel.turned else 0)
+    if panel.up_names:
+        axes.set_yticks(range(len(panel.up_names)), panel.up_names)
+    if panel.bare:
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+    for mark in panel.marks:
+        draw(mark, axes)
+    if panel.legend:
+        _legend(axes, panel)
+    scale_bars(axes, panel.bars, panel.title)
+    note(axes, panel.notes)
+
+
+def _legend(axes: Axes, panel: Panel) -> None:
+    from matplotlib.collections import PathCollection
+
+    columns = sum(bool(mark.label) for mark in panel.marks) if panel.legend == "above" else 1
+    legend = axes.legend(**LEGENDS.get(panel.legend, {"loc": panel.legend}), ncols=columns)
+    for handle in legend.legend_handles:
+        if isinstance(handle, PathCollection):
+            handle.set_sizes([16.0])
+
+
+def _colour_bar(axes: list[Axes], shades: Shades) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    figure = axes[0].get_figure()
+    assert figure is not None
+    colours = ScalarMappable(Normalize(shades.low, shades.high), _map(shades))
+    figure.colorbar(colours, ax=axes, label=shades.label, aspect=30, shrink=0.85)
+
+
+def _map(shades: Shades) -> Any:
+    return signed() if shades.map == "signed" else ORDERED
+
+
+@singledispatch
+def draw(mark: Mark, axes: Axes) -> None:
+    """Draw a mark into axes whose limits are final."""
+    raise TypeError(f"there is no way to draw {type(mark).__name__}")
+
+
+@draw.register(Markers)
+def _markers(mark: Markers, axes: Axes) -> None:
+    given: dict[str, Any] = {
+        "label": mark.label or None,
+        "zorder": mark.layer,
+        "alpha": mark.opacity,
+        "rasterized": len(mark.places) > DOTS,
+    }
+    if mark.values is not None and mark.shades is not None:
+        order, shades = np.argsort(-mark.values, kind="stable"), mark.shades
+        given |= {"c": mark.values[order], "cmap": _map(shades), "vmin": shades.low, "vmax": shades.high}
+        x, y = mark.places[order].T
+        axes.scatter(x, y, mark.size**2, linewidths=0, **given)
+    elif mark.shape == "o" and not mark.face:
+        x, y = mark.places.T
+        axes.scatter(x, y, mark.size**2, color=mark.colour, linewidths=0, **given)
+    else:
+        given |= {"markersize": mark.size, "markeredgewidth": mark.edge, "markeredgecolor": mark.colour}
+        given["markerfacecolor"] = mark.face or mark.colour
+        axes.plot(*mark.places.T, mark.shape, **given)
+
+
+@draw.register(Line)
+def _line(mark: Line, axes: Axes) -> None:
+    axes.plot(
+        *mark.places.T,
+        color=mark.colour,
+        linewidth=mark.width,
+        linestyle=mark.dash or "-",
+        alpha=mark.opacity,
+        label=mark.label or None,
+        zorder=mark.layer,
+    )
+
+
+@draw.register(Level)
+def _level(mark: Level, axes: Axes) -> None:
+    axes.axhline(
+        mark.height, color=mark.colour, linewidth=mark.width, linestyle=mark.dash or "-", zorder=mark.layer
+    )
+
+
+@draw.register(Segments)
+def _segments(mark: Segments, axes: Axes) -> None:
+    from matplotlib.collections import LineCollection
+
+    lines: Any = list(mark.ends)
+    given: dict[str, Any] = {"label": mark.label or None, "zorder": mark.layer}
+    drawn = LineCollection(lines, colors=mark.colour, linewidths=mark.width, **given)
+    axes.add_collection(drawn, autolim=False)
+
+
+@draw.register(Arrows)
+def _arrows(mark: Arrows, axes: Axes) -> None:
+    axes.quiver(
+        *mark.places.T,
+        *mark.vectors.T,
+        angles="xy",
+        scale_units="xy",
+        scale=1.0,
+        color=mark.colours,
+        width=mark.width,
+        headwidth=3.5,
+        headlength=4.5,
+        label=mark.label or None,
+        zorder=mark.layer,
+    )
+
+
+@draw.register(Polygons)
+def _polygons(mark: Polygons, axes: Axes) -> None:
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgba
+
+    drawn = PolyCollection(
+        list(mark.outlines),
+        facecolors=to_rgba(mark.face, mark.face_opacity),
+        edgecolors=to_rgba(mark.edge, mark.edge_opacity),
+        linewidths=mark.width,
+        label=mark.label or None,
+        zorder=mark.layer,
+        rasterized=len(mark.outlines) > DOTS / 5,
+    )
+    axes.add_collection(drawn, autolim=False)
+
+
+@draw.register(Ellipses)
+def _ellipses(mark: Ellipses, axes: Axes) -> None:
+    from matplotlib.collections import EllipseCollection
+
+    drawn = EllipseCollection(
+        2 * mark.semi_axes[:, 0],
+        2 * mark.semi_axes[:, 1],
+        mark.angles,
+        units="xy",
+        offsets=mark.places,
+        transOffset=axes.transData,
+        facecolors="none",
+        edgecolors=mark.colour,
+        linewidths=mark.width,
+        zorder=mark.layer,
+    )
+    axes.add_collection(drawn, autolim=False)
+
+
+@draw.register(Mesh)
+def _mesh(mark: Mesh, axes: Axes) -> None:
+    (left, low), (right, high) = mark.corners
+    rows, columns = mark.values.shape
+    axes.pcolormesh(
+        np.linspace(left, right, columns + 1),
+        np.linspace(low, high, rows + 1),
+        np.ma.masked_invalid(mark.values),
+        cmap=_map(mark.shades),
+        vmin=mark.shades.low,
+        vmax=mark.shades.high,
+        zorder=mark.layer,
+        rasterized=True,
+    )
+
+
+@draw.register(Band)
+def _band(mark: Band, axes: Axes) -> None:
+    axes.fill_between(
+        mark.across,
+        mark.low,
+        mark.high,
+        color=mark.colour,
+        alpha=mark.opacity,
+        linewidth=0,
+        label=mark.label or None,
+        zorder=mark.layer,
+    )
+
+
+@draw.register(Texts)
+def _texts(mark: Texts, axes: Axes) -> None:
+    for (x, y), text, colour in zip(mark.places.tolist(), mark.texts, mark.colours, strict=True):
+        axes.text(x, y, text, ha="center", va="center", fontsize=mark.size, color=colour)
+
+
+@draw.register(Names)
+def _later(mark: Names, axes: Axes) -> None:
+    """Names are drawn when the layout of all panels is known."""

@@ -1,0 +1,94 @@
+"""A picture before it is drawn: panels side by side and below each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import dataclass
+from photogram.show.sketch.marks import Mark, Shades
+
+ScaleBar: TypeAlias = tuple[float, str, str]
+"""Length in the unit of the axis across, colour, and what it stands for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One pair of axes with what is on it.
+
+    Attributes
+    ----------
+    limits
+        (2, 2) values at the lower left and at the upper right corner.
+    equal
+        Whether a unit is equally long along both axes.
+    notes
+        What a reader must know, below.
+    bars
+        Scales of what is enlarged, above, under the title.
+    legend
+        Where: `beside`, `above`, `upper right`, `lower right`, `best` (the emptiest corner), or nowhere.
+    across_names, up_names
+        Of 0, 1, 2 ... along the axes, in place of numbers.
+    turned
+        Whether names across are written upwards.
+    bare
+        Whether there are no lines of axes.
+    """
+
+    limits: Floats
+    marks: Sequence[Mark] = ()
+    title: str = ""
+    across: str = ""
+    up: str = ""
+    equal: bool = False
+    notes: Sequence[str] = ()
+    bars: Sequence[ScaleBar] = ()
+    legend: str = ""
+    across_names: Sequence[str] = ()
+    up_names: Sequence[str] = ()
+    turned: bool = False
+    bare: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """A picture: its panels row by row, None where one is empty.
+
+    Attributes
+    ----------
+    width, height
+        Inches, of which it takes no more than its panels need.
+    columns
+        Of panels.
+    shades, beside_all
+        What the bar of colours shows, and whether it stands beside all panels or belongs to the last.
+    shared
+        Whether the panels of a column have their numbers across below the lowest only.
+    """
+
+    width: float
+    height: float
+    panels: Sequence[Panel | None]
+    columns: int = 1
+    shades: Shades | None = None
+    beside_all: bool = False
+    shared: bool = False
+
+    @property
+    def rows(self) -> int:
+        """How many rows of panels there are."""
+        return -(-len(self.panels) // self.columns)
+
+
+def spread(*values: Floats | float) -> tuple[float, float]:
+    """Return limits with some room around values; values that are not finite do not count."""
+    every = np.concatenate([np.ravel(each) for each in values])
+    every = every[np.isfinite(every)]
+    low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 0.0)
+    # As wide as matplotlib has it: a twentieth on either side.
+    room = 0.05 * (high - low) or 0.05 * (abs(low) or 1.0)
+    return low - room, high + room

@@ -1,0 +1,229 @@
+"""Where the panels of a picture go: margins come from the widths of words, and boxes have what is left.
+
+All in points, from the upper left corner, downwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.letters import widest, width, wrapped
+from photogram.show.sketch.marks import Band, Level, Line, Mark, Markers
+from photogram.show.sketch.names import Box
+from photogram.show.sketch.ticks import Ticks, ticks
+
+TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 10.0, 9.0, 8.0, 8.0, 7.5, 7.0
+"""Sizes of letters, as in the settings of matplotlib."""
+TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 13.0, 9.6, 11.5, 12.0
+SWATCH = 16.0
+"""Width of the sample of a mark in a legend."""
+GAP = 8.0
+"""Between things that have nothing to do with each other."""
+OF_COLOURS = 62.0
+"""Width of the bar of colours with all that is written beside it."""
+SMALLEST = 40.0
+"""Sides of a box at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A panel and where it goes.
+
+    Attributes
+    ----------
+    box
+        Left, upper, right and lower side of what is between the axes.
+    across, up
+        What is written along them; `numbered`: whether across, too.
+    title, notes
+        Their lines.
+    """
+
+    panel: Panel
+    box: Box
+    across: Ticks
+    up: Ticks
+    numbered: bool
+    title: list[str]
+    notes: list[str]
+
+    def at(self, places: Floats) -> Floats:
+        """Return (..., 2) places in the units of the axes as points of the picture."""
+        left, top, right, low = self.box
+        first, last = self.panel.limits
+        part = (places - first) / (last - first)
+        found: Floats = [left, low] + part * [right - left, top - low]
+        return found
+
+
+def legend_size(marks: list[Mark]) -> tuple[float, float]:
+    """Return width and height of a legend of marks below each other."""
+    return SWATCH + 6.0 + widest([mark.label for mark in marks], LEGEND), LEGEND_LINE * len(marks)
+
+
+def labelled(panel: Panel) -> list[Mark]:
+    """Return the marks that stand in the legend."""
+    return [mark for mark in panel.marks if mark.label]
+
+
+def named_axis(name: str, power: str) -> str:
+    """Return the name of an axis with the power of ten of its numbers."""
+    return f"{name} (× {power})".strip() if power else name
+
+
+def laid_out(sketch: Sketch) -> list[Placed]:
+    """Return the panels of a picture with their places."""
+    there = [(k, each) for k, each in enumerate(sketch.panels) if each is not None]
+    cells = [(*divmod(k, sketch.columns), _opened(panel)) for k, panel in there]
+    lefts, rights, wide = _columns(sketch, cells)
+    lowest = {column: row for row, column, _ in cells}
+    tops, belows, said = [0.0] * sketch.rows, [0.0] * sketch.rows, list[tuple[bool, list[str], list[str]]]()
+    for row, column, panel in cells:
+        room = wide + rights[column] - GAP
+        numbered = not sketch.shared or lowest[column] == row
+        title = wrapped(panel.title, TITLE, room)
+        notes = [line for each in panel.notes for line in wrapped(each, NOTE, room)]
+        said.append((numbered, title, notes))
+        tops[row] = max(tops[row], above(panel, title))
+        belows[row] = max(belows[row], below(panel, numbered) + NOTE_LINE * len(notes) + GAP)
+    high = max((72.0 * sketch.height - sum(tops) - sum(belows)) / sketch.rows, SMALLEST)
+    sizes = [_size(panel, wide, high) for *_, panel in cells]
+    # Panels that are lower than there is room leave none of it between them.
+    heights = [0.0] * sketch.rows
+    for (row, *_), size in zip(cells, sizes, strict=True):
+        heights[row] = max(heights[row], size[1])
+    found = []
+    for (row, column, panel), size, (numbered, title, notes) in zip(cells, sizes, said, strict=True):
+        left = sum(lefts[: column + 1]) + sum(rights[:column]) + column * wide
+        top = sum(tops[: row + 1]) + sum(belows[:row]) + sum(heights[:row])
+        box = (left, top, left + size[0], top + size[1])
+        across, up = _ticks(panel, *size)
+        found.append(Placed(panel, box, across, up, numbered, title, notes))
+    return found
+
+
+def _opened(panel: Panel) -> Panel:
+    """Return a panel whose limits are apart: of one value they are a little beside it."""
+    first, last = panel.limits
+    room = np.where(first == last, 1e-6 * np.maximum(np.abs(first), 1.0), 0.0)
+    return replace(panel, limits=np.stack([first - room, last + room])) if room.any() else panel
+
+
+def _columns(
+    sketch: Sketch, cells: Sequence[tuple[int, int, Panel]]
+) -> tuple[list[float], list[float], float]:
+    """Return the margins of each column, and what is between them of each."""
+    lefts, rights = [0.0] * sketch.columns, [GAP] * sketch.columns
+    for _, column, panel in cells:
+        left, right = _sides(panel, 72.0 * sketch.width / sketch.columns, 72.0 * sketch.height / sketch.rows)
+        lefts[column], rights[column] = max(lefts[column], left), max(rights[column], right)
+    beside = sum(lefts) + sum(rights) + (OF_COLOURS if sketch.shades else 0.0)
+    return lefts, rights, max((72.0 * sketch.width - beside) / sketch.columns, SMALLEST)
+
+
+def above(panel: Panel, title: list[str]) -> float:
+    """Return how high what stands over a box is: title, legend, bars."""
+    legend = LEGEND_LINE if panel.legend == "above" else 0.0
+    return 6.0 + TITLE_LINE * len(title) + legend + BAR_LINE * len(panel.bars)
+
+
+def below(panel: Panel, numbered: bool) -> float:
+    """Return how high what stands below a box is, down to its notes: numbers and the name of the axis."""
+    numbers = 0.0
+    if numbered:
+        turned = widest(panel.across_names, NUMBER) if panel.turned else 0.0
+        numbers = 5.0 + max(turned, NUMBER + 2.0)
+    return numbers + (LABEL + 5.0 if panel.across else 0.0) + 3.0
+
+
+def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float]:
+    """Return how much room a panel needs at its left and right side, of a cell so wide and high."""
+    across, up = _ticks(panel, 0.75 * wide, high)
+    left = widest(up.texts, NUMBER) + 7.0 + (LABEL + 6.0 if named_axis(panel.up, up.power) else 0.0)
+    if panel.legend == "beside":
+        return left, GAP + legend_size(labelled(panel))[0] + GAP
+    return left, GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
+
+
+def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
+    found = []
+    for axis, (names, length) in enumerate(((panel.across_names, wide), (panel.up_names, high))):
+        if names:
+            found.append(Ticks(np.arange(len(names), dtype=float), list(names)))
+        else:
+            found.append(ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0))
+    return found[0], found[1]
+
+
+def _size(panel: Panel, wide: float, high: float) -> tuple[float, float]:
+    """Return width and height of a box that may be so wide and high."""
+    if not panel.equal:
+        return wide, high
+    across, up = np.abs(panel.limits[1] - panel.limits[0]).tolist()
+    scale = min(wide / across, high / up)
+    return scale * across, scale * up
+
+
+def legend_box(placed: Placed) -> Box:
+    """Return left, upper, right and lower side of the legend of a panel."""
+    left, top, right, low = placed.box
+    wide, high = legend_size(labelled(placed.panel))
+    inner = GAP / 2
+    corners = {
+        "upper right": (right - wide - inner, top + inner),
+        "upper left": (left + inner, top + inner),
+        "lower left": (left + inner, low - high - inner),
+        "lower right": (right - wide - inner, low - high - inner),
+        "beside": (right + GAP, top),
+    }
+    where = placed.panel.legend
+    if where == "best":
+        curves = [placed.at(each) for each in _curves(placed.panel)]
+        del corners["beside"]
+        where = min(corners, key=lambda name: _inside(curves, (*corners[name], wide, high)))
+    x, y = corners[where]
+    return x, y, x + wide, y + high
+
+
+def _curves(panel: Panel) -> list[Floats]:
+    """Return (n, 2) places on what a legend should not hide."""
+    found: list[Floats] = []
+    for mark in panel.marks:
+        if isinstance(mark, Band):
+            found += [np.column_stack([mark.across, each]) for each in (mark.low, mark.high)]
+        elif isinstance(mark, (Line, Markers)):
+            found.append(mark.places)
+        elif isinstance(mark, Level):
+            left, right = panel.limits[:, 0].tolist()
+            found.append(np.column_stack([np.linspace(left, right, 60), np.full(60, mark.height)]))
+    return found
+
+
+def _inside(curves: list[Floats], box: Box) -> int:
+    x, y, wide, high = box
+    return sum(int(((each > [x, y]) & (each < [x + wide, y + high])).all(axis=1).sum()) for each in curves)
+
+
+def right_end(placed: Placed) -> float:
+    """Return how far to the right anything of a panel reaches."""
+    left, _, right, _ = placed.box
+    panel = placed.panel
+    ends = [right + 0.5 * widest(placed.across.texts[-1:], NUMBER), left + widest(placed.title, TITLE)]
+    ends.append(left + widest(placed.notes, NOTE))
+    ends.append(0.5 * (left + right + width(named_axis(panel.across, placed.across.power), LABEL)))
+    if panel.legend == "beside":
+        ends.append(legend_box(placed)[2])
+    scale = (right - left) / abs(panel.limits[1, 0] - panel.limits[0, 0])
+    ends += [left + scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars]
+    return max(ends)
+
+
+def low_end(placed: Placed) -> float:
+    """Return how far down anything of a panel reaches."""
+    end = placed.box[3] + below(placed.panel, placed.numbered) + NOTE_LINE * len(placed.notes)
+    return max(end, legend_box(placed)[3]) if placed.panel.legend == "beside" else end

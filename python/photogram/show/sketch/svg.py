@@ -1,0 +1,205 @@
+"""A picture straight as SVG, without matplotlib: the page of a block is there in a moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from photogram.show.sketch.colours import hexadecimal, stops
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.layout import (
+    BAR_LINE,
+    GAP,
+    LABEL,
+    LEGEND,
+    LEGEND_LINE,
+    NOTE,
+    NOTE_LINE,
+    NUMBER,
+    OF_COLOURS,
+    SWATCH,
+    TITLE,
+    TITLE_LINE,
+    Placed,
+    above,
+    below,
+    labelled,
+    laid_out,
+    legend_box,
+    low_end,
+    named_axis,
+    right_end,
+)
+from photogram.show.sketch.letters import width
+from photogram.show.sketch.marks import Mark, Shades
+from photogram.show.sketch.names import Box
+from photogram.show.sketch.svg_marks import Attributes, element, names, number, path, sample, svg, text
+from photogram.show.sketch.ticks import Ticks, ticks
+from photogram.show.style import FAINT, INK, SETTINGS
+
+TICK = 3.5
+"""Length of the small lines at numbers."""
+LETTERS = ", ".join([*SETTINGS["font.sans-serif"], "sans-serif"])
+
+
+def svg_of(sketch: Sketch, name: str, title: str) -> str:
+    """Return a picture as an SVG element; nothing where no panel has anything.
+
+    Parameters
+    ----------
+    sketch
+        The picture.
+    name
+        Begins the identifiers of its parts: unique on a page.
+    title
+        Says to those who do not see it what it is.
+    """
+    panels = laid_out(sketch)
+    if not panels:
+        return ""
+    parts = [_panel(placed, f"{name}-{k}") for k, placed in enumerate(panels)]
+    wide, high = max(map(right_end, panels)), max(map(low_end, panels))
+    if sketch.shades is not None:
+        beside = panels if sketch.beside_all else panels[-1:]
+        top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
+        left = max(each.box[2] for each in beside) + GAP
+        parts.append(_colour_bar(sketch.shades, f"{name}-shades", (left, top, left + 9.0, low)))
+        wide = max(wide, left + OF_COLOURS)
+    look: Attributes = {"font_family": LETTERS, "font_size": NUMBER, "fill": "none"}
+    size = f'viewBox="0 0 {wide + 2:.0f} {high + 2:.0f}" width="{96 / 72 * (wide + 2):.0f}"'
+    head = element("svg", {"role": "img", "aria_label": title}).removesuffix("/>")
+    return f'{head} xmlns="http://www.w3.org/2000/svg" {size}>{element("g", look, "".join(parts))}</svg>'
+
+
+def _panel(placed: Placed, name: str) -> str:
+    left, top, right, low = placed.box
+    window: Attributes = {"x": left, "y": top, "width": right - left, "height": low - top}
+    clip = element("clipPath", {"id": f"{name}-clip"}, element("rect", window))
+    marks = "".join(svg(mark, placed) for mark in sorted(placed.panel.marks, key=lambda each: each.layer))
+    legend, taken = _legend(placed)
+    inside = element("g", {"clip_path": f"url(#{name}-clip)"}, marks) if marks else ""
+    words = [_axes(placed), _above(placed), legend, names(placed, taken), _notes(placed)]
+    return clip + inside + element("g", {"fill": INK}, "".join(words))
+
+
+def _axes(placed: Placed) -> str:
+    """Return the lines of the axes with their numbers and names."""
+    panel, (left, top, right, low) = placed.panel, placed.box
+    over = placed.at(
+        np.column_stack([placed.across.values, np.full(len(placed.across.values), panel.limits[0, 1])])
+    )
+    beside = placed.at(
+        np.column_stack([np.full(len(placed.up.values), panel.limits[0, 0]), placed.up.values])
+    )
+    found = []
+    if not panel.bare:
+        lines = f"M{number(left)} {number(top)}V{number(low)}H{number(right)}"
+        lines += "".join(f"M{x:.2f} {low:.2f}v{TICK}" for x in over[:, 0].tolist())
+        lines += "".join(f"M{left:.2f} {y:.2f}h-{TICK}" for y in beside[:, 1].tolist())
+        found.append(path(lines, fill="none", stroke=FAINT, stroke_width=0.8))
+    if placed.numbered:
+        found.append(_across(placed.across, over[:, 0].tolist(), low, turned=panel.turned))
+    heights = (beside[:, 1] + 0.36 * NUMBER).tolist()
+    numbers = (text(left - 6.0, y, each) for y, each in zip(heights, placed.up.texts, strict=True))
+    found.append(element("g", {"text_anchor": "end"}, "".join(numbers)))
+    middle: Attributes = {"text_anchor": "middle", "font_size": LABEL}
+    if panel.across:
+        down = low + below(panel, placed.numbered) - 5.0
+        found.append(
+            text(0.5 * (left + right), down, named_axis(panel.across, placed.across.power), **middle)
+        )
+    if up := named_axis(panel.up, placed.up.power):
+        x = left - 12.0 - max(width(each, NUMBER) for each in placed.up.texts)
+        y = 0.5 * (top + low)
+        found.append(text(x, y, up, **middle, transform=f"rotate(-90 {number(x)} {number(y)})"))
+    return "".join(found)
+
+
+def _across(given: Ticks, places: Sequence[float], low: float, *, turned: bool) -> str:
+    """Return numbers or names below an axis."""
+    if not turned:
+        written = (text(x, low + NUMBER + 4.0, each) for x, each in zip(places, given.texts, strict=True))
+        return element("g", {"text_anchor": "middle"}, "".join(written))
+    written = (
+        text(x, low + 5.0, each, transform=f"rotate(-90 {number(x)} {number(low + 5.0)})", dy=0.36 * NUMBER)
+        for x, each in zip(places, given.texts, strict=True)
+    )
+    return element("g", {"text_anchor": "end"}, "".join(written))
+
+
+def _above(placed: Placed) -> str:
+    """Return the title and the scales under it."""
+    panel, (left, top, right, _) = placed.panel, placed.box
+    y = top - above(panel, placed.title)
+    found = []
+    for line in placed.title:
+        y += TITLE_LINE
+        found.append(text(left, y - 3.0, line, font_size=TITLE))
+    scale = (right - left) / abs(panel.limits[1, 0] - panel.limits[0, 0])
+    for row, (length, colour, said) in enumerate(panel.bars):
+        y, end = top - 8.0 - BAR_LINE * (len(panel.bars) - 1 - row), left + scale * length
+        found.append(path(f"M{number(left)} {number(y)}H{number(end)}", stroke=colour, stroke_width=2.5))
+        found.append(text(end + 5.0, y + 0.36 * LEGEND, said, font_size=LEGEND))
+    return "".join(found)
+
+
+def _notes(placed: Placed) -> str:
+    y = placed.box[3] + below(placed.panel, placed.numbered)
+    lines = (text(placed.box[0], y + NOTE_LINE * (k + 0.8), each) for k, each in enumerate(placed.notes))
+    return element("g", {"font_size": NOTE}, "".join(lines)) if placed.notes else ""
+
+
+def _legend(placed: Placed) -> tuple[str, list[Box]]:
+    """Return the legend, and what of the panel it takes."""
+    marks = labelled(placed.panel)
+    if not placed.panel.legend or not marks:
+        return "", []
+    if placed.panel.legend == "above":
+        found, x, y = [], placed.box[2], placed.box[1] - 6.0 - 0.5 * LEGEND_LINE
+        for mark in reversed(marks):
+            x -= SWATCH + 6.0 + width(mark.label, LEGEND) + GAP
+            found.append(_entry(mark, x, y))
+        return "".join(found), []
+    box = legend_box(placed)
+    entries = (_entry(mark, box[0], box[1] + LEGEND_LINE * (k + 0.5)) for k, mark in enumerate(marks))
+    ground: Attributes = {"x": box[0], "y": box[1], "width": box[2] - box[0], "height": box[3] - box[1]}
+    behind = (
+        element("rect", {**ground, "fill": "white", "opacity": 0.85})
+        if placed.panel.legend != "beside"
+        else ""
+    )
+    return behind + "".join(entries), [box]
+
+
+def _entry(mark: Mark, x: float, y: float) -> str:
+    """Return a sample of a mark and its name, their middle at a height."""
+    panel = Panel(np.array([[0.0, 0.0], [SWATCH, 8.0]]))
+    none = Ticks(np.empty(0), [])
+    own = Placed(panel, (x, y - 4.0, x + SWATCH, y + 4.0), none, none, False, [], [])
+    said = text(x + SWATCH + 6.0, y + 0.36 * LEGEND, mark.label, font_size=LEGEND)
+    return element("g", {"fill": "none"}, svg(sample(mark), own)) + said
+
+
+def _colour_bar(shades: Shades, name: str, box: Box) -> str:
+    """Return a bar of colours with numbers beside it."""
+    left, top, right, low = box
+    places, colours = stops(shades.map)
+    steps = (
+        element("stop", {"offset": place, "stop_color": hexadecimal(colour.astype(np.int64))})
+        for place, colour in zip(places.tolist(), colours, strict=True)
+    )
+    upwards: Attributes = {"id": name, "x1": 0.0, "x2": 0.0, "y1": 1.0, "y2": 0.0}
+    found = [element("linearGradient", upwards, "".join(steps))]
+    ground: Attributes = {"x": left, "y": top, "width": right - left, "height": low - top}
+    found.append(element("rect", {**ground, "fill": f"url(#{name})"}))
+    given = ticks(np.array([shades.low, shades.high]), low - top, NUMBER, across=False)
+    heights = low - (given.values - shades.low) / (shades.high - shades.low) * (low - top)
+    for y, said in zip(heights.tolist(), given.texts, strict=True):
+        found.append(path(f"M{number(right)} {number(y)}h{TICK}", stroke=FAINT, stroke_width=0.8))
+        found.append(text(right + 6.0, y + 0.36 * NUMBER, said, fill=INK))
+    x, y = left + OF_COLOURS - 8.0, 0.5 * (top + low)
+    turned = f"rotate(-90 {number(x)} {number(y)})"
+    look: Attributes = {"fill": INK, "font_size": LABEL, "text_anchor": "middle", "transform": turned}
+    found.append(text(x, y, shades.label, **look))
+    return "".join(found)
