@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 
 use super::damped::ROUNDING;
 use super::equations::ObservationEquations;
-use super::options::{Iteration, Phase, Stop};
+use super::options::{Iteration, NEGLIGIBLE, Phase, Stop};
 use super::result::{AdjustError, unless_stopped};
 use super::run::{Run, State, between};
 use super::secants::Secants;
@@ -105,9 +105,12 @@ impl Chord {
         shares.map_or_else(|| self.step.clone(), |shares| secants.corrected(&self.step, &shares))
     }
 
-    /// Whether it begins higher than a sum of squares, rounding apart; also where it is not a number.
+    /// Whether it begins higher than a sum of squares, rounding apart, which is more than the square of a chord that is negligible; also
+    /// where something is not a number.
     fn is_higher_than(&self, sum_of_squares: f64) -> bool {
-        !(self.change.is_finite() && self.sum_of_squares <= sum_of_squares * (1.0 + ROUNDING))
+        let highest = sum_of_squares * (1.0 + ROUNDING);
+        !(self.sum_of_squares <= highest || self.change <= NEGLIGIBLE && self.sum_of_squares.is_finite())
+            || !self.change.is_finite()
     }
 }
 
