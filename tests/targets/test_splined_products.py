@@ -12,7 +12,7 @@ from photogram.targets import Board, Calibration, Corners
 from photogram.targets.maps import image_grid
 from photogram.targets.motion_fit import differences_at, fitted_motion
 from photogram.targets.uncertainty import projection_uncertainty
-from photogram.targets.vision import composed
+from photogram.targets.vision import composed, imaged, touched
 
 ACROSS = 10.0
 """mrcal holds knots so much tighter across the radius than along it."""
@@ -108,3 +108,27 @@ def test_differences(name, distances, tolerance):
             compared = np.hypot(*expected.T) < 50
             assert compared.sum() >= 19
             assert np.abs(found - expected)[compared].max() < within
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_partials_without_zeros_are_those_with_them(order):
+    """Of unknown knots alone, and of parameters that are unknown beside them."""
+    sd = np.full((8, 11, 2), 0.1)
+    sd[2:5, 3:6] = 0.0
+    camera = Camera(
+        "splined_stereographic",
+        {"fx": 700.0, "fy": 705.0, "cx": 640.0, "cy": 480.0}
+        | {"order": order, "nx": 11, "ny": 8, "fov_x_deg": 120.0},
+        sd={"fx": 1.0, "cy": 1.0},
+        knots=np.random.default_rng(5).normal(0.0, 0.02, (8, 11, 2)),
+        knot_sd=sd,
+    )
+    points = np.random.default_rng(6).normal([0.0, 0.0, 1.5], 0.4, (50, 3))
+    expected, found = imaged(camera, points), touched(camera, points)
+    np.testing.assert_array_equal(found.xy, expected.xy)
+    np.testing.assert_array_equal(found.by_point, expected.by_point)
+    assert found.columns.shape == (50, 2 + 2 * (order + 1) ** 2)
+    spread = np.zeros_like(expected.by_parameters)
+    for k, columns in enumerate(found.columns.T):
+        spread[np.arange(50), :, columns] += found.by_columns[:, :, k]
+    np.testing.assert_array_equal(spread, expected.by_parameters)

@@ -108,8 +108,9 @@ class Worth:
 
 Part = Literal["cameras", "sensors", "board", "views"]
 """What has cofactors."""
-Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats]]
-"""Names of unknowns, what they are in the result, and their partials by steps of the block."""
+Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats | int]]
+"""Names of unknowns, what they are in the result, and their partials by steps of the block; numbers of those
+that are such steps."""
 STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")
 """Steps of a pose in vision axes: R <- Exp(w) R, t <- t + dt."""
 
@@ -273,10 +274,11 @@ class Calibrated(Brief, Shown):
         found = self.result.covariance(wanted) / self.result.covariance_scale
         start = 0
         for each in steps:
-            own = slice(start, start + len(each))
-            found[own] = each @ found[own]
-            found[:, own] = found[:, own] @ each.T
-            start += len(each)
+            own = slice(start, start + _count(each))
+            if not isinstance(each, int):
+                found[own] = each @ found[own]
+                found[:, own] = found[:, own] @ each.T
+            start = own.stop
         return names, found
 
     def combined(self, partials: Floats, parts: Sequence[Part]) -> Floats:
@@ -297,15 +299,16 @@ class Calibrated(Brief, Shown):
         _, wanted, steps = self._selected(parts)
         own, start = partials.copy(), 0
         for each in steps:
-            columns = slice(start, start + len(each))
-            own[:, columns] = own[:, columns] @ each
-            start += len(each)
+            columns = slice(start, start + _count(each))
+            if not isinstance(each, int):
+                own[:, columns] = own[:, columns] @ each
+            start = columns.stop
         return self.result.covariances().combined(own, wanted) / self.result.covariance_scale
 
     def _selected(self, parts: Sequence[Part]) -> Chosen:
         names: list[str] = []
         wanted: list[tuple[str, list[str]]] = []
-        steps: list[Floats] = []
+        steps: list[Floats | int] = []
         for part in parts:
             one_of("part of a calibration", part, get_args(Part))
             own_names, selections, partials = getattr(self, f"_{part}")()
@@ -322,7 +325,7 @@ class Calibrated(Brief, Shown):
             own = each.names + (given.knot_names if knots else ())
             names += [f"{each.name} {name}" for name in own]
             selections += [("camera", [each.name]), ("unknown", knots)]
-        return names, selections, [np.eye(len(names))]
+        return names, selections, [len(names)]
 
     def _sensors(self) -> Chosen:
         rows = self.sensors_adjusted()
@@ -332,12 +335,17 @@ class Calibrated(Brief, Shown):
 
     def _board(self) -> Chosen:
         if self.bend is not None:
-            return ["bend_x", "bend_y"], [("unknown", [self.bend.name])], [np.eye(2)]
+            return ["bend_x", "bend_y"], [("unknown", [self.bend.name])], [2]
         seen = np.flatnonzero(self.result.used_points).tolist()
         own = [self.calibration.board.names[row] for row in seen]
-        return [f"{name}.{axis}" for name in own for axis in "xyz"], [("point", own)], [np.eye(3)] * len(own)
+        return [f"{name}.{axis}" for name in own for axis in "xyz"], [("point", own)], [3 * len(own)]
 
     def _views(self) -> Chosen:
         photos = [self.result.block.photo_ids[row] for row in self.photos.tolist()]
         names = [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
         return names, [("step", photos)], [view_steps(pose) for pose in self.poses]
+
+
+def _count(partials: Floats | int) -> int:
+    """Return how many unknowns partials are of."""
+    return partials if isinstance(partials, int) else len(partials)

@@ -9,13 +9,23 @@ housing is said by the datum, a matrix T by which a change db of the unknowns go
 from __future__ import annotations
 
 from typing import Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.network.cameras import Camera
 from photogram.targets.housing import Housing
-from photogram.targets.vision import cross_matrices, imaged, motion_partials, rays, unknown_of
+from photogram.targets.vision import (
+    Touched,
+    cross_matrices,
+    has_unknown_knots,
+    imaged,
+    motion_partials,
+    rays,
+    touched,
+    unknown_of,
+)
 
 DatumName = Literal["corners", "mean-frames", "image", "axes"]
 """What holds still: the corners that the camera saw, the mean of the boards, rays of the whole image, or the
@@ -36,10 +46,7 @@ def datum_rows(
     found = np.zeros((6, housing.common + 6))
     own = housing.parameters(camera)
     if datum == "corners":
-        places, sd = housing.places(camera)
-        found[:, own] = fixed_points(
-            housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
-        )
+        found[:, own] = _fixed_corners(housing, camera)
     elif datum == "image" and fixed is not None:
         found[:, own] = fixed_points(housing.cameras[camera], *fixed)
     elif datum == "mean-frames":
@@ -53,6 +60,21 @@ def datum_rows(
     return found
 
 
+_MADE: WeakKeyDictionary[Housing, dict[int, Floats]] = WeakKeyDictionary()
+"""Of housings that are still there: what the corners of each camera hold."""
+
+
+def _fixed_corners(housing: Housing, camera: int) -> Floats:
+    """Return (6, p) T by which the corners that a camera saw stand still: the same for any map."""
+    made = _MADE.setdefault(housing, {})
+    if camera not in made:
+        places, sd = housing.places(camera)
+        made[camera] = fixed_points(
+            housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
+        )
+    return made[camera]
+
+
 def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool = True) -> Floats:
     """Return (6, p) T by which the images of points move least when the camera's parameters change.
 
@@ -62,12 +84,23 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
     normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
     for start in range(0, len(points), POINTS_TOGETHER):
         part = slice(start, start + POINTS_TOGETHER)
-        images = imaged(camera, points[part])
+        images = (touched if has_unknown_knots(camera) else imaged)(camera, points[part])
         by_motion = images.by_point @ motion_partials(points[part], finite)
-        weighted = (weights[part] @ by_motion).reshape(-1, 6)
-        normal += weighted.T @ by_motion.reshape(-1, 6)
-        right += weighted.T @ images.by_parameters.reshape(len(weighted), -1)
+        weighted = weights[part] @ by_motion
+        normal += weighted.reshape(-1, 6).T @ by_motion.reshape(-1, 6)
+        if isinstance(images, Touched):
+            add_touched(right, weighted, images)
+        else:
+            right += weighted.reshape(-1, 6).T @ images.by_parameters.reshape(2 * len(weighted), -1)
     return _moved_back(normal, right, finite)
+
+
+def add_touched(sums: Floats, rows: Floats, images: Touched) -> None:
+    """Add rows' K, of (n, 2, m) rows, to (m, p) sums."""
+    products = rows.transpose(0, 2, 1) @ images.by_columns
+    columns = images.columns.ravel()
+    for row, own in enumerate(sums):
+        own += np.bincount(columns, products[:, row].ravel(), minlength=len(own))
 
 
 def housing_rows(housing: Housing) -> Floats:
@@ -111,20 +144,35 @@ def projection_cofactors(
     The distance is from the centre of this camera, infinite of directions; `rows` are (6, c + 6) the datum
     (:func:`datum_rows`).
     """
-    cofactors = with_motion(housing, camera, rows)
+    cofactors, own = with_motion(housing, camera, rows), housing.cameras[camera]
     found = np.empty((len(pixels), 2, 2))
     for start in range(0, len(pixels), TOGETHER):
-        part = slice(start, start + TOGETHER)
-        found[part] = of_functions(image_partials(housing.cameras[camera], pixels[part], distance), cofactors)
+        part = pixels[start : start + TOGETHER]
+        if has_unknown_knots(own):
+            values = _of_touched(own, part, distance, cofactors)
+        else:
+            values = of_functions(image_partials(own, part, distance), cofactors)
+        found[start : start + TOGETHER] = values
     return found
+
+
+def _of_touched(camera: Camera, pixels: Floats, distance: float, cofactors: Floats) -> Floats:
+    """Return (n, 2, 2) cofactors of images by a lens of knots: J Q J' over what each of them steps with."""
+    finite = bool(np.isfinite(distance))
+    points = rays(camera, pixels) * (distance if finite else 1.0)
+    images = touched(camera, points)
+    by_motion = images.by_point @ motion_partials(points, finite)
+    motion = np.broadcast_to(np.arange(len(cofactors) - 6, len(cofactors)), (len(points), 6))
+    columns = np.hstack([images.columns, motion])
+    partials = np.concatenate([images.by_columns, by_motion], axis=2)
+    own = cofactors[columns[:, :, np.newaxis], columns[:, np.newaxis]]
+    return np.asarray(partials @ own @ partials.transpose(0, 2, 1))
 
 
 def with_motion(housing: Housing, camera: int, rows: Floats) -> Floats:
     """Return the (p + 6, p + 6) cofactors of a camera's parameters and of the motion of its axes."""
-    own = housing.cofactors[housing.parameters(camera)]
-    both = np.vstack([np.eye(len(housing.cofactors))[housing.parameters(camera)], rows])
-    moved = rows @ housing.cofactors
-    return np.asarray(np.vstack([own, moved]) @ both.T)
+    own, moved = housing.parameters(camera), rows @ housing.cofactors
+    return np.block([[housing.cofactors[own, own], moved[:, own].T], [moved[:, own], moved @ rows.T]])
 
 
 def common_partials(housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats) -> Floats:

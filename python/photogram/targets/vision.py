@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
@@ -122,6 +122,51 @@ def imaged(camera: Camera, points: Floats) -> Imaged:
     """Return the images of (n, 3) points, or directions, in the axes of a camera, with their partials."""
     xy, by_u, by_parameters = camera.partials(points * TURNED)
     return Imaged(xy, by_u * TURNED, by_parameters[:, :, unknown_of(camera)])
+
+
+@dataclass(frozen=True, eq=False)
+class Touched:
+    """Images of n points by a lens of knots, with their partials by the k unknowns that each steps with.
+
+    Attributes
+    ----------
+    xy, by_point
+        As of :class:`Imaged`.
+    columns
+        (n, k) which of the p parameters and knots that are unknown.
+    by_columns
+        (n, 2, k) by these.
+    """
+
+    xy: Floats
+    by_point: Floats
+    columns: Indices
+    by_columns: Floats
+
+
+def touched(camera: Camera, points: Floats) -> Touched:
+    """Return what :func:`imaged` does of a lens of knots, without the zeros: an image has 16 or 9 knots."""
+    assert camera.knots is not None
+    unknown, count = unknown_of(camera), len(camera.names)
+    u = points * TURNED
+    xy, by_u, own = _photocore.camera_partials(camera.model, camera.values, u, camera.knots)
+    knots, weights = _photocore.camera_patches(camera.model, camera.values, u)
+    core = np.flatnonzero(unknown[:count])
+    both = count + (2 * knots[:, :, np.newaxis] + np.arange(2)).reshape(len(points), -1)
+    places = np.where(unknown, np.cumsum(unknown) - 1, 0)
+    columns = np.hstack([np.broadcast_to(np.arange(len(core)), (len(points), len(core))), places[both]])
+    found = np.zeros((len(points), 2, columns.shape[1]))
+    found[:, :, : len(core)] = own[:, :, core]
+    # d image / d knot = diag(fx, fy) times its weight.
+    for axis, scale in enumerate(camera.values[:2].tolist()):
+        free = unknown[both[:, axis::2]]
+        found[:, axis, len(core) + axis :: 2] = np.where(free, scale * weights, 0.0)
+    return Touched(xy, by_u * TURNED, columns, found)
+
+
+def has_unknown_knots(camera: Camera) -> bool:
+    """Whether there are knots among what is unknown of a camera."""
+    return bool(unknown_of(camera)[len(camera.names) :].any())
 
 
 def unknown_of(camera: Camera) -> Bools:

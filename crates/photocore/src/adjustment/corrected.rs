@@ -27,26 +27,26 @@ const PARTS: usize = 3;
 
 impl<'a> Run<'a, '_> {
     /// The step in the place of a full one where steps fall slowly, or where that leads higher, and what it is by then as an iteration; None
-    /// where the step stays, and of damped ones.
+    /// where the step stays, and of damped ones. Where chords follow it, they are corrected instead.
     pub(super) fn corrected(
         &mut self,
         state: &State<'a>,
         step: &[f64],
         iteration: &Iteration,
+        followed: bool,
     ) -> Option<(Vec<f64>, Iteration)> {
         let last = self.secants.last.take();
         if iteration.damping > 0.0 || self.options.loss.is_some() || !self.problem.model.steps_swing() {
             self.secants.pairs.clear();
             return None;
         }
-        if let (Some((given, before)), Some(former)) = (last, self.iterations.last())
-            && (self.secants.correct() || iteration.largest_change >= SLOW * former.largest_change)
+        if let Some((given, before)) = last
+            && !followed
+            && (self.secants.correct() || self.is_slow(iteration))
         {
             let taken = self.problem.model.step_between(&before, state.reached());
             let difference = step.iter().zip(&given).map(|(now, before)| now - before).collect();
-            let pairs = &mut self.secants.pairs;
-            pairs.drain(..(pairs.len() + 1).saturating_sub(MOST));
-            pairs.push((taken, difference));
+            self.secants.keep(taken, difference, MOST);
         } else {
             self.secants.pairs.clear();
         }
@@ -60,6 +60,11 @@ impl<'a> Run<'a, '_> {
             None if plain.is_nan() || plain > best => self.shortened(state, step, iteration, plain),
             found => found,
         }
+    }
+
+    /// Whether a step is hardly shorter than the one before.
+    pub(super) fn is_slow(&self, step: &Iteration) -> bool {
+        self.iterations.last().is_some_and(|former| step.largest_change >= SLOW * former.largest_change)
     }
 
     /// The sum of squares that a step leads to.
@@ -77,10 +82,7 @@ impl<'a> Run<'a, '_> {
         let all = self.secants.all(step);
         let products = state.equations.products(self.threads, &state.linearized.prior, &all);
         let shares = self.secants.shares(&products)?;
-        let mut own = vec![0.0; step.len()];
-        for (each, share) in all.iter().zip(&shares) {
-            own.iter_mut().zip(*each).for_each(|(sum, value)| *sum += share * value);
-        }
+        let own = self.secants.corrected(step, &shares);
         let largest_change = (&products * &shares).dot(&shares).max(0.0).sqrt();
         Some((own, Iteration { largest_change, ..*iteration }))
     }

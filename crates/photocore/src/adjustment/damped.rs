@@ -7,7 +7,7 @@ use super::result::AdjustError;
 use super::run::{End, NEAR, Run, State};
 
 /// A step is accepted when the sum of squares does not rise by more than its own rounding error.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 /// The sum of squares stands still where three damped steps lower it by less than this multiple of the variance of unit weight: a
 /// hundredth of a standard deviation of the combination of unknowns that they follow.
 const STILL: f64 = 1e-4;
@@ -128,7 +128,8 @@ impl<'a> Run<'a, '_> {
     /// Whether full steps have led to where groups touch other blocks than the layout has: more than a few groups, or any once steps are short.
     fn is_outgrown(&self, state: &State<'a>) -> bool {
         let Some(last) = self.iterations.last() else { return false };
-        let most = if last.largest_change <= SETTLED { 0 } else { self.problem.layout().groups() / FEW };
+        let last = self.chord.unwrap_or(last.largest_change);
+        let most = if last <= SETTLED { 0 } else { self.problem.layout().groups() / FEW };
         state.linearized.damping() == 0.0
             && self.problem.model.steps_swing()
             && self.threads.install(|| self.problem.model.outgrown(state.values())) > most
@@ -167,13 +168,17 @@ impl<'a> Run<'a, '_> {
         step: &[f64],
         control: &mut Control,
     ) -> Next<'a> {
-        let corrected = self.corrected(&state, step, &iteration);
+        let followed = self.is_followed(&state, &iteration);
+        let corrected = self.corrected(&state, step, &iteration, followed);
         let (given, (step, iteration)) = match &corrected {
             Some((own, iteration)) => (step, (&own[..], *iteration)),
             None => (step, (step, iteration)),
         };
         let Iteration { damping, largest_change: change, .. } = iteration;
-        let trial = self.stepped(&state, step, &iteration)?;
+        let trial = match followed {
+            true => self.chords(&state, step, control)?,
+            false => self.stepped(&state, step, &iteration)?,
+        };
         let moved = if damping == 0.0 { state.moved(step) } else { vec![] };
         let unknowns = state.recycle();
         let far = change > FAR * (unknowns.len() as f64).sqrt();
@@ -224,6 +229,19 @@ impl<'a> Run<'a, '_> {
             self.secants.remember(given.to_vec(), unknowns);
         }
         Ok(ControlFlow::Continue(next))
+    }
+
+    /// The values that a step and chords after it lead to.
+    fn chords(
+        &mut self,
+        state: &State<'a>,
+        step: &[f64],
+        control: &Control,
+    ) -> Result<Vec<f64>, AdjustError> {
+        let values = self.problem.advanced(state.values(), step);
+        let found = self.followed(state, values.clone(), (control.best, control.stop))?;
+        self.chord = found.as_ref().map(|&(_, length)| length);
+        Ok(found.map_or(values, |(values, _)| values))
     }
 
     /// Goes on from the same values with more damping; or ends there, where the sum of squares has stood still although full steps,
@@ -337,7 +355,9 @@ impl<'a> Run<'a, '_> {
 
     /// Whether all further steps together would not exceed a limit; secants say nothing of a rate.
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
-        !self.secants.correct() && self.history().leaves_less_than(limit, change)
+        !self.secants.correct()
+            && !(self.problem.model.steps_swing() && self.chord.is_some())
+            && self.history().leaves_less_than(limit, change)
     }
 
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.

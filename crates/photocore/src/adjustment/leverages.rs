@@ -12,10 +12,15 @@ use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
 use crate::normals::{
-    Cofactors, Equations, FactorOptions, InvertOptions, LocalCofactors, Prior, SelectedInverse, TieRows,
+    Cofactors, Equations, FactorOptions, InvertOptions, Layout, LocalCofactors, Prior, SelectedInverse,
+    TieRows,
 };
+use crate::sorting::sort_by;
 use crate::{Threads, parallel};
 use nalgebra::DMatrix;
+
+/// Rounding of a bound of correlations, relatively.
+const BARELY: f64 = 1e-9;
 
 /// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.
 #[derive(Debug)]
@@ -103,6 +108,8 @@ impl Leverages {
 
     /// The same with what groups of local blocks that are held have to do with each other, which no pattern of normal equations has.
     ///
+    /// * `limit`: of groups whose residuals cannot be correlated by as much with any others' this is NaN.
+    ///
     /// # Errors
     /// An interruption, no memory.
     pub fn of_locals_together(
@@ -110,11 +117,11 @@ impl Leverages {
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         locals: &[usize],
-        terms: impl Fn(usize) -> Vec<f64> + Sync,
+        (terms, limit): (impl Fn(usize) -> Vec<f64> + Sync, f64),
         threads: &Threads,
     ) -> Result<Vec<LocalCofactors>, AdjustError> {
         let mut found = self.of_locals(problem, observation_sd, locals, terms, threads);
-        self.put_together(problem, observation_sd, locals, &mut found, threads)?;
+        self.put_together(problem, observation_sd, (locals, limit), &mut found, threads)?;
         Ok(found)
     }
 
@@ -123,7 +130,7 @@ impl Leverages {
         &self,
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
-        locals: &[usize],
+        (locals, limit): (&[usize], f64),
         found: &mut [LocalCofactors],
         threads: &Threads,
     ) -> Result<(), AdjustError> {
@@ -135,14 +142,20 @@ impl Leverages {
         let (values, held, mut on) = (self.values.clone(), self.held.clone(), |_| ControlFlow::Continue(()));
         let formed = Linearized::form(problem, None, values, held, threads, &mut on)?;
         for (&local, own) in locals.iter().zip(found).filter(|&(&local, _)| apart(local)) {
-            let functions = problem.system.local_functions(&asked, local);
+            let chosen = correlated_rows(own, problem.layout(), local, limit);
+            let mut functions = problem.system.local_functions(&asked, local);
+            let mut number = 0..;
+            functions.retain(|_| number.next().is_some_and(|row| chosen.binary_search(&row).is_ok()));
             let cofactors = match formed.cofactors(problem, &functions, None, None, threads, &mut on) {
                 Err(CofactorError::Adjust(error)) => return Err(error),
                 found => found.unwrap_or_default(),
             };
-            let (count, rows) = (functions.len(), own.rows());
-            for (to, from) in own.equations.chunks_exact_mut(rows).zip(cofactors.chunks_exact(count.max(1))) {
-                to[..count].copy_from_slice(from);
+            let (count, rows) = (chosen.len().max(1), own.rows());
+            for (&row, from) in chosen.iter().zip(cofactors.chunks_exact(count)) {
+                chosen
+                    .iter()
+                    .zip(from)
+                    .for_each(|(&column, &value)| own.equations[row * rows + column] = value);
             }
         }
         Ok(())
@@ -183,7 +196,7 @@ impl Leverages {
             problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &own_terms)
         };
         let mut found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
-        self.put_together(problem, observation_sd, locals, &mut found, threads)?;
+        self.put_together(problem, observation_sd, (locals, 0.0), &mut found, threads)?;
         let shown = |own: &LocalCofactors| {
             let rows = own.rows();
             let alone = DMatrix::from_row_slice(rows, rows, &own.by_local);
@@ -262,4 +275,22 @@ impl Leverages {
             problem.prior_equations(&problem.terms(&self.values), &self.held),
         )
     }
+}
+
+/// The rows of the groups of a local block that is held, H their leverages each by itself, whose residuals may be correlated by a limit
+/// with those of another of its groups: rho^2 <= h h' / ((1 - h) (1 - h')), h the largest eigenvalue of H, which is no more than the norm.
+fn correlated_rows(own: &LocalCofactors, layout: &Layout, local: usize, limit: f64) -> Vec<usize> {
+    let (rows, all, groups) = (layout.rows(), own.rows(), layout.groups_of(local).len());
+    let odds = |group: usize| {
+        let block = (0..rows * rows).map(|k| (group * rows + k / rows) * all + group * rows + k % rows);
+        let norm = block.map(|at| own.equations[at].powi(2)).sum::<f64>().sqrt();
+        if norm < 1.0 { norm / (1.0 - norm) } else { f64::INFINITY }
+    };
+    let odds: Vec<f64> = (0..groups).map(odds).collect();
+    let mut order: Vec<usize> = (0..groups).collect();
+    sort_by(&mut order, &|a, b| odds[*b].total_cmp(&odds[*a]));
+    let partner =
+        |group: usize| order.iter().find(|&&other| other != group).map_or(0.0, |&other| odds[other]);
+    let may = |&group: &usize| limit <= 0.0 || odds[group] * partner(group) >= limit * limit * (1.0 - BARELY);
+    (0..groups).filter(may).flat_map(|group| group * rows..(group + 1) * rows).collect()
 }

@@ -59,6 +59,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod chords;
 mod corrected;
 mod damped;
 mod datum;

@@ -37,6 +37,21 @@ impl Secants {
         !self.pairs.is_empty()
     }
 
+    /// Keeps a step that has been taken, and by how much the step was another after it; the oldest but so many are forgotten.
+    pub fn keep(&mut self, taken: Vec<f64>, difference: Vec<f64>, most: usize) {
+        self.pairs.drain(..(self.pairs.len() + 1).saturating_sub(most));
+        self.pairs.push((taken, difference));
+    }
+
+    /// The step that has learnt from those before, by its shares in [`Secants::all`].
+    pub fn corrected(&self, step: &[f64], shares: &DVector<f64>) -> Vec<f64> {
+        let mut own = vec![0.0; step.len()];
+        for (each, share) in self.all(step).into_iter().zip(shares) {
+            own.iter_mut().zip(each).for_each(|(sum, value)| *sum += share * value);
+        }
+        own
+    }
+
     /// A step, the differences, and the steps that have been taken.
     pub fn all<'s>(&'s self, step: &'s [f64]) -> Vec<&'s [f64]> {
         let differences = self.pairs.iter().map(|(_, difference)| &difference[..]);

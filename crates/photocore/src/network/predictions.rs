@@ -154,12 +154,22 @@ impl Trial {
     /// # Errors
     /// Nothing was adjusted before.
     pub fn on_points(&self, points: &[usize], threads: &Threads) -> Result<Vec<OnPoint>, NetworkError> {
+        self.on_points_above(points, 0.0, threads)
+    }
+
+    /// The same where correlations by more than a limit are asked for: what cannot be correlated as much with anything may be NaN with others.
+    pub(super) fn on_points_above(
+        &self,
+        points: &[usize],
+        limit: f64,
+        threads: &Threads,
+    ) -> Result<Vec<OnPoint>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let (observation_sd, sd) = (&problem.observation_sd[..], &problem.sd[..]);
         let terms = self.terms(sd, &found.values);
         let further = |place: usize| self.further(place, &terms);
         let places: Vec<usize> = points.iter().filter_map(|&point| self.local(point)).collect();
-        let cofactors = found.of_locals_together(problem, observation_sd, &places, further, threads);
+        let cofactors = found.of_locals_together(problem, observation_sd, &places, (further, limit), threads);
         let cofactors = cofactors.map_err(|error| NetworkError::new(error, &self.assembled))?;
         let mut found_at = places.iter().zip(cofactors);
         let of = |&point: &usize| {

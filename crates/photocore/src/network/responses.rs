@@ -317,7 +317,7 @@ impl Trial {
         limit: f64,
         threads: &Threads,
     ) -> Result<Vec<(usize, usize, f64)>, NetworkError> {
-        let on_points = self.on_points(points, threads)?;
+        let on_points = self.on_points_above(points, limit, threads)?;
         let pairs = |points: Range<usize>| -> Vec<(usize, usize, f64)> {
             on_points[points].iter().flat_map(|own| self.pairs_on(own, limit)).collect()
         };
@@ -340,7 +340,11 @@ impl Trial {
         let alone: Vec<Vec<f64>> = (0..own.suspects.len()).map(|k| block(k, k)).collect();
         for (at, &j) in taking_part.iter().enumerate() {
             for &i in &taking_part[..at] {
-                let rho = canonical_correlation(&alone[i], &alone[j], &block(i, j));
+                let between = block(i, j);
+                if between.iter().any(|value| value.is_nan()) {
+                    continue;
+                }
+                let rho = canonical_correlation(&alone[i], &alone[j], &between);
                 if rho > limit {
                     found.push((own.suspects[i], own.suspects[j], rho));
                 }

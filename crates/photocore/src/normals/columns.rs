@@ -32,6 +32,12 @@ impl<const C: usize> ReducedRights<C> {
         self.others.chunks_exact(all.max(1)).flat_map(|column| &column[all - outer..]).copied().collect()
     }
 
+    /// y, all of it.
+    pub fn reduced(&self) -> Vec<f64> {
+        let own = self.own.iter().flat_map(|own| own.as_flattened());
+        own.chain(&self.others).copied().collect()
+    }
+
     /// Puts solutions for the outer unknowns in the place of what is left for them.
     fn put(&mut self, solutions: &[f64]) {
         let (all, outer) = self.counts;
