@@ -1,0 +1,105 @@
+"""Tables of trajectories that take over large corrections of their attitudes.
+
+Corrections r(t) are added to each other, turns are not: bases describe small ones well. Where those of images
+and records are larger than half a radian, the table takes over the turn in their middle, A0 Exp(r), exactly
+at all times; r then begins at zero (docs/moving.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.messages import Message, listed
+from photogram.network.block import Block
+from photogram.network.motion import timed_images
+from photogram.network.observations import Prior, Smoothness
+from photogram.network.trajectories import Coefficient, Trajectory
+from photogram.results.result import Result
+from photogram.results.trajectories import AdjustedTrajectory
+
+LARGE = 0.5
+"""Radians."""
+
+
+def large_turns(result: Result) -> dict[str, Floats]:
+    """Return the turns that tables are to take over, by the names of their trajectories.
+
+    (3,) rotation vectors about the axes of the photo, in radians.
+    """
+    block, large = result.block, _large(result)
+    return {
+        own.name: turn
+        for own, turn in large
+        if np.linalg.norm(turn) > LARGE / 2 and _is_open(block, own.given)
+    }
+
+
+def taken_over(turns: dict[str, Floats]) -> Message:
+    """Say what tables have taken over, from the first to the last time."""
+    parts = [f"{name} ({np.linalg.norm(turn):.2f} rad)" for name, turn in turns.items()]
+    return Message(
+        f"attitudes were far from what is given of them: the tables of {listed(parts)} have taken over what"
+        " was missing; corrections count from there, and the block of the result has these tables"
+    )
+
+
+def stays(result: Result) -> list[Message]:
+    """Say which corrections are large, and stay: they are weighted, or vary by so much."""
+    large = [own.name for own, _ in _large(result) if own.given.angles == "vector"]
+    if not large:
+        return []
+    return [
+        Message(
+            f"rotations of {listed(large)} are more than {LARGE} rad from their tables, which cannot take"
+            " this over: it is weighted, or differs from time to time; a nearer table would hold"
+        )
+    ]
+
+
+def _large(result: Result) -> list[tuple[AdjustedTrajectory, Floats]]:
+    """Return trajectories with a large correction of the attitude somewhere, and that in the middle."""
+    found = []
+    adjusted = result.trajectories
+    for name, times in _seen(result.block).items():
+        own = adjusted[name]
+        if not len(own.rotation):
+            continue
+        turns = own.corrections(np.clip(times, *own.given.reach))[1]
+        if np.linalg.norm(turns, axis=1).max() > LARGE:
+            found.append((own, turns[len(turns) // 2]))
+    return found
+
+
+def _seen(block: Block) -> dict[str, Floats]:
+    """Return the times of images and records on trajectories, ascending, by the names of these."""
+    times: dict[str, list[Floats]] = {}
+    for own, trajectory, _, images in timed_images(block):
+        times.setdefault(trajectory.name, []).append(own.times(block.image_xy[images]))
+    for each in block.observations:
+        if each.moment is not None:
+            times.setdefault(each.moment.trajectory.name, []).append(np.array([each.moment.time]))
+    joined = {name: np.sort(np.concatenate(own)) for name, own in times.items()}
+    return {name: own for name, own in joined.items() if len(own)}
+
+
+def _is_open(block: Block, trajectory: Trajectory) -> bool:
+    """Whether nothing but differences is known of the coefficients of rotations, whatever turn they share.
+
+    Rates of a photo's own motion are about its axes wherever these are.
+    """
+    own = trajectory.coefficients[1]
+    if any(each.trajectory is None and each.photo == trajectory.name for each in block.timed):
+        own = own[:1]
+    ids = {id(each) for each in own}
+
+    def tells(each: object) -> bool:
+        if isinstance(each, Prior):
+            return id(each.unknown) in ids
+        if isinstance(each, Smoothness):
+            on: tuple[Coefficient, ...] = tuple(each.coefficients)
+            return id(on[0]) in ids and abs(np.sum(each.factors)) > 1e-9 * np.abs(each.factors).sum()
+        return False
+
+    free = all(np.isinf(each.deviations).all() for each in own)
+    return trajectory.angles == "vector" and free and not any(map(tells, block.observations))
