@@ -58,9 +58,13 @@ def stays(result: Result) -> list[Message]:
 
 
 def _large(result: Result) -> list[tuple[AdjustedTrajectory, Floats]]:
-    """Return trajectories with a large correction of the attitude somewhere, and that in the middle."""
-    found = []
-    adjusted = result.trajectories
+    """Return trajectories with a large correction of the attitude somewhere, and that in the middle.
+
+    None without convergence: steps have gone astray then.
+    """
+    if not result.converged:
+        return []
+    found, adjusted = [], result.trajectories
     for name, times in _seen(result.block).items():
         own = adjusted[name]
         if not len(own.rotation):

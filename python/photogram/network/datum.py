@@ -75,7 +75,7 @@ class MinimumConstraints:
     ----------
     photo
         The photo whose position and attitude are held; None for the one with most images. Of one on a
-        trajectory these are the coefficients about its time: of polynomials the first, of splines the nearest.
+        trajectory these are the coefficients about its time: of polynomials the first, of splines the next.
     coordinate
         Photo and name of its coordinate (`X`, `Y`, `Z`, or `longitude`, `latitude`, `height`), held for the
         scale; None for the one in which a photo is farthest from the first.
@@ -114,7 +114,7 @@ def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
     flown = {each.photo for each in block.timed}
     if on := [block.photo_ids[row] for row in (*photos, *attitudes) if block.photo_ids[row] in flown]:
         raise InputError(
-            f"the photo {on[0]} is on a trajectory: its pose has no unknowns of its own that could carry a datum"
+            f"the photo {on[0]} is on a trajectory: its pose has no unknowns that could carry a datum"
         )
     return "inner", points, photos, datum.scale, attitudes, datum.radius
 

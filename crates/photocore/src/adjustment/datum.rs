@@ -202,11 +202,14 @@ pub(super) fn moved(
         }
         all_open |= adjusted.held.len() == retained.1;
         // Coefficients of trajectories follow turns exactly at first only: what was held for is open to the end.
-        let least = if datum.left.is_empty() { adjusted.held.len() } else { 0 };
+        let were_open = if datum.left.is_empty() { adjusted.held.len() } else { 0 };
         let combinations = match all_open {
             true => None,
             false => Some(
-                problem.open(&unknowns, &motions, least, threads).ok_or(DatumError::NotFree)?.combinations,
+                problem
+                    .open(&unknowns, &motions, were_open, threads)
+                    .ok_or(DatumError::NotFree)?
+                    .combinations,
             ),
         };
         let apart = problem.model.step_between(&unknowns, reference);
