@@ -14,12 +14,14 @@ from photogram.messages import Message, listed
 from photogram.network.block import Block
 from photogram.network.motion import timed_images
 from photogram.network.observations import Prior, Smoothness
-from photogram.network.trajectories import Coefficient, Trajectory
+from photogram.network.trajectories import Coefficient, Polynomial, RotationCoefficient, Trajectory
 from photogram.results.result import Result
 from photogram.results.trajectories import AdjustedTrajectory
 
 LARGE = 0.5
 """Radians."""
+TIMES = 1000
+"""At which a trajectory is looked at, at the most."""
 
 
 def large_turns(result: Result) -> dict[str, Floats]:
@@ -62,21 +64,46 @@ def _large(result: Result) -> list[tuple[AdjustedTrajectory, Floats]]:
 
     None without convergence: steps have gone astray then.
     """
-    if not result.converged:
+    values = {each.name: each.position for each in result.unknowns if each.kind == RotationCoefficient.KIND}
+    of_photos = _of_photos(result.block)
+    large = [
+        each.name
+        for each in result.block.all_trajectories
+        if _may_be_large(each, values, alone=each.name in of_photos)
+    ]
+    if not large or not result.converged:
         return []
-    found, adjusted = [], result.trajectories
-    for name, times in _seen(result.block).items():
-        own = adjusted[name]
-        if not len(own.rotation):
-            continue
-        turns = own.corrections(np.clip(times, *own.given.reach))[1]
+    found, adjusted, seen = [], result.trajectories, _seen(result.block)
+    for own in (adjusted[name] for name in large if name in seen):
+        turns = own.corrections(np.clip(seen[own.name], *own.given.reach))[1]
         if np.linalg.norm(turns, axis=1).max() > LARGE:
             found.append((own, turns[len(turns) // 2]))
     return found
 
 
+def _may_be_large(trajectory: Trajectory, values: dict[str, Floats], *, alone: bool) -> bool:
+    """Whether coefficients, by their names, leave room for a large correction.
+
+    `alone`: of a photo's own motion, whose images are all at nearly its time: the first.
+    """
+    basis, own = trajectory.rotation, trajectory.coefficients[1]
+    sizes = np.array([np.linalg.norm(values[each.name]) for each in (own[:1] if alone else own)])
+    if isinstance(basis, Polynomial):
+        first, last = trajectory.table.span
+        reference, scale = basis.reference or 0.0, basis.scale or 1.0
+        beyond = max(1.0, abs(first - reference) / scale, abs(last - reference) / scale)
+        return bool((sizes * beyond ** np.arange(len(sizes))).sum() > LARGE)
+    # B-splines are positive and sum up to one.
+    return bool((sizes > LARGE).any())
+
+
+def _of_photos(block: Block) -> set[str]:
+    """Return the names of trajectories that are the motions of photos of their own."""
+    return {each.photo for each in block.timed if each.trajectory is None}
+
+
 def _seen(block: Block) -> dict[str, Floats]:
-    """Return the times of images and records on trajectories, ascending, by the names of these."""
+    """Return some times of images and records on trajectories, ascending, by the names of these."""
     times: dict[str, list[Floats]] = {}
     for own, trajectory, _, images in timed_images(block):
         times.setdefault(trajectory.name, []).append(own.times(block.image_xy[images]))
@@ -84,7 +111,10 @@ def _seen(block: Block) -> dict[str, Floats]:
         if each.moment is not None:
             times.setdefault(each.moment.trajectory.name, []).append(np.array([each.moment.time]))
     joined = {name: np.sort(np.concatenate(own)) for name, own in times.items()}
-    return {name: own for name, own in joined.items() if len(own)}
+    some = {
+        name: np.linspace(0, len(own) - 1, min(len(own), TIMES)).astype(int) for name, own in joined.items()
+    }
+    return {name: own[some[name]] for name, own in joined.items() if len(own)}
 
 
 def _is_open(block: Block, trajectory: Trajectory) -> bool:
@@ -93,7 +123,7 @@ def _is_open(block: Block, trajectory: Trajectory) -> bool:
     Rates of a photo's own motion are about its axes wherever these are.
     """
     own = trajectory.coefficients[1]
-    if any(each.trajectory is None and each.photo == trajectory.name for each in block.timed):
+    if trajectory.name in _of_photos(block):
         own = own[:1]
     ids = {id(each) for each in own}
 
