@@ -201,19 +201,26 @@ def test_a_photo_is_its_trajectory_at_its_time(scan):
 
 
 @pytest.mark.parametrize("block", [rolling, scanned])
-def test_a_datum_of_trajectories_is_that_of_the_observations(block):
+def test_a_datum_of_trajectories_that_have_one(block):
     block = block()
     result = adjust(block)
     first = block.photo_ids[0]
     for ask in (
-        lambda: result.in_datum(InnerConstraints()),
         lambda: result.relative_to(photo=first),
         lambda: result.relative_to(points=block.point_ids[:5]),
-        lambda: adjust(block, datum=InnerConstraints()),
-        lambda: adjust(block, datum=MinimumConstraints(first)),
     ):
-        with pytest.raises(InputError, match=f"the photo {first} is on a trajectory, and the datum"):
+        with pytest.raises(InputError, match=f"relative_to: the photo {first} is on a trajectory"):
             ask()
+    for datum in (InnerConstraints(photos=[first]), InnerConstraints(attitudes=None)):
+        with pytest.raises(InputError, match=f"photo {first} is on a trajectory: its pose has no unknowns"):
+            adjust(block, datum=datum)
+    for ask in (
+        lambda: result.in_datum(InnerConstraints()),
+        lambda: adjust(block, datum=InnerConstraints()),
+    ):
+        with pytest.raises(AdjustmentError, match="the block is not free: its datum is given by"):
+            ask()
+    assert adjust(block, datum=MinimumConstraints(first)).datum.kind == "observations"
     with pytest.raises(InputError, match=f"fixed photos: the photo {first} is on a trajectory"):
         block.with_fixed_photos()
 
@@ -406,6 +413,7 @@ def test_what_is_open_is_told_by_trajectory_and_time():
         adjust(block.replace(timed=free))
     assert "readout time and motion of the photos" in str(told.value)
     assert "position coefficient" not in str(told.value)
+    # Scale and readout time: known velocities times T.
     with pytest.raises(RankError, match="records of GNSS, or standard deviations of coefficients") as told:
         adjust(block.replace(point_sd=np.inf))
     strips = scanned(records=False)

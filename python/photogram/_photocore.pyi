@@ -1691,6 +1691,10 @@ class BlockSolution(_NetworkSolution):
         """
 
     @property
+    def datum_unknowns(self) -> list[tuple[int, int]]:
+        """Coefficients of trajectories held to give a datum: common unknowns and their components."""
+
+    @property
     def relative_error(self) -> float:
         """Relative error, by rounding, of the variances in the datum that it was taken to, about."""
 

@@ -22,6 +22,7 @@ from photogram.adjustment.remarks import (
     undetermined,
 )
 from photogram.adjustment.robust import Loss, loss_row, remark
+from photogram.adjustment.taking_over import large_turns, stays, taken_over
 from photogram.adjustment.undetermined import one_place, outside, undetermined_combinations
 from photogram.arguments.arrays import number, one_of, shown, whole_number
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
@@ -38,7 +39,6 @@ from photogram.network.datum import (
     datum_row,
     minimum_row,
 )
-from photogram.network.motion import refuse_datum
 from photogram.network.unknowns import Unknown
 from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
@@ -69,6 +69,8 @@ OF_KNOTS = 400
 """Iterations at the most with the knots of a splined lens: few views leave many of them to their priors."""
 NOTABLE_RISE = 1e-3
 """Percent; less is rounding."""
+TURNS = 5
+"""So often at the most do tables of trajectories take over large corrections."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ def adjust(
         The adjustment would take more memory than there is.
     InputError
         An option that cannot be, a datum of points and photos that do not carry it, a photo that is not above
-        the water of the block; a datum of photos on trajectories.
+        the water of the block; a datum that photos on trajectories would carry.
     KeyboardInterrupt
         Ctrl-C.
     """
@@ -201,11 +203,20 @@ def adjust(
     )
     processors = core_threads(threads)
     check_cameras(block)
-    if datum is not None:
-        refuse_datum(block, "datum")
     block = started(block)
     options, inner = with_datum(block, options, datum)
-    return _adjusted(block, options, processors, progress, inner, keep=keep)
+    result = _adjusted(block, options, processors, progress, inner, keep=keep)
+    if not block.all_trajectories:
+        return result
+    said: list[Message] = []
+    for _ in range(TURNS):
+        if not (turns := large_turns(result)):
+            break
+        said.append(taken_over(turns))
+        block = started(result.restarted(turns))
+        result = _adjusted(block, options, processors, progress, inner, keep=keep)
+    said += stays(result)
+    return replace(result, messages=[*said, *result.messages]) if said else result
 
 
 def with_datum(

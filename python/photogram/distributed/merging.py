@@ -144,6 +144,7 @@ def _rest(
         "weak": [],
         "weak_cameras": [],
         "weak_unknowns": [],
+        "datum_unknowns": [],
         "relative_error": max(each["relative_error"] for each in details),
         "minimal_control": False,
         "adjusted_unknowns": _unknowns(block, details),

@@ -35,7 +35,7 @@ class InnerConstraints:
     points
         Names of points; None for all that take part.
     photos
-        Names of photos, whose positions count; None for all.
+        Names of photos, whose positions count; None for all. None that are on trajectories.
     scale
         Whether scale is taken from them, too, where nothing else gives one. Otherwise it stays as it is held.
     attitudes
@@ -74,7 +74,8 @@ class MinimumConstraints:
     Parameters
     ----------
     photo
-        The photo whose position and attitude are held; None for the one with most images.
+        The photo whose position and attitude are held; None for the one with most images. Of one on a
+        trajectory these are the coefficients about its time: of polynomials the first, of splines the next.
     coordinate
         Photo and name of its coordinate (`X`, `Y`, `Z`, or `longitude`, `latitude`, `height`), held for the
         scale; None for the one in which a photo is farthest from the first.
@@ -110,6 +111,11 @@ def datum_row(block: Block, datum: InnerConstraints) -> DatumRow:
     """Return inner constraints as the core knows them; InputError of what is not in the block."""
     points, photos = _indices(block, "point", datum.points), _indices(block, "photo", datum.photos)
     attitudes = _indices(block, "photo", datum.attitudes)
+    flown = {each.photo for each in block.timed}
+    if on := [block.photo_ids[row] for row in (*photos, *attitudes) if block.photo_ids[row] in flown]:
+        raise InputError(
+            f"the photo {on[0]} is on a trajectory: its pose has no unknowns that could carry a datum"
+        )
     return "inner", points, photos, datum.scale, attitudes, datum.radius
 
 
@@ -127,6 +133,11 @@ def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int
     axes = [name.removesuffix("_deg") for name in position_columns(block)]
     if axis not in axes:
         raise InputError(f"{axis!r} is no coordinate: they are {', '.join(axes)}")
+    for each, trajectory in zip(block.timed, block.trajectories, strict=True):
+        if each.photo == other and (trajectory.position_axes != "table" or trajectory.body is not None):
+            raise InputError(
+                f"{axis} of {other} is not held: the trajectory {trajectory.name} has other axes"
+            )
     return photo, (_indices(block, "photo", [other])[0], axes.index(axis))
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.network.block import Block, flown_by, refuse_trajectories
+from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import camera_images
 from photogram.network.moving_photos import Timed
 from photogram.network.observations import Smoothness
@@ -23,11 +23,6 @@ from photogram.network.unadjusted import Given
 
 if TYPE_CHECKING:
     pass
-
-
-def refuse_datum(block: Block, what: str) -> None:
-    """Refuse to choose a datum for trajectories: what moves one as a whole is not worked out."""
-    refuse_trajectories(block, what, "and the datum of trajectories is that of the observations")
 
 
 def timed_photos(block: Block) -> Bools:

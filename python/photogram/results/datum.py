@@ -15,6 +15,7 @@ from photogram.network.block import Block
 from photogram.network.datum import DatumRow, InnerConstraints
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
 from photogram.network.tables import ATTITUDE_COLUMNS
+from photogram.network.trajectories import RotationCoefficient
 from photogram.results.covariance import Failure
 from photogram.results.selection import photo_components
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["ResultDatum", "datum_messages", "datum_of", "inner_datum", "refused", "relative_datum"]
 
 ANGLES = tuple(name.removesuffix("_deg") for name in ATTITUDE_COLUMNS)
+TURNS = (*ANGLES, "rotation ")
+"""What names of unknowns begin with that are no coordinates."""
 NOTABLE_LOSS = 1e-9
 """A larger part of a variance that is rounding is told."""
 
@@ -38,8 +41,8 @@ class ResultDatum:
         `observations` (control, weights and observations give it), `minimal control` (control and weights are
         just what a datum takes, and check nothing), `minimum constraints`, `inner constraints` or `relative`.
     held
-        Photos with the names of their unknowns that are held; of other kinds than minimum constraints those
-        from which the network was taken to its datum.
+        Photos, or coefficients of trajectories, with the names of their unknowns that are held; of other
+        kinds than minimum constraints those from which the network was taken to its datum.
     points, photos
         What carries inner constraints, or what cofactors are relative to.
     attitudes
@@ -81,10 +84,7 @@ class ResultDatum:
     @property
     def has_chosen_scale(self) -> bool:
         """Whether nothing but the datum gives lengths."""
-        # Minimum constraints hold the scale by one coordinate of a photo that holds nothing else.
-        photos = [photo for photo, _ in self.held]
-        alone = any(photos.count(photo) == 1 and unknown not in ANGLES for photo, unknown in self.held)
-        return self.scale or (self.kind == "minimum constraints" and alone)
+        return self.scale or (self.kind == "minimum constraints" and holds_scale(self.held))
 
     def document(self) -> dict[str, Any]:
         """Return what the JSON document says of it."""
@@ -94,6 +94,12 @@ class ResultDatum:
             **{name: list(getattr(self, name)) for name in ("points", "photos", "attitudes")},
             "scale": self.scale,
         }
+
+
+def holds_scale(held: Sequence[tuple[str, str]]) -> bool:
+    """Whether the scale is held: by one coordinate of a photo or coefficient that holds nothing else."""
+    names = [name for name, _ in held]
+    return any(names.count(name) == 1 and not unknown.startswith(TURNS) for name, unknown in held)
 
 
 def held_lines(held: Sequence[tuple[str, str]]) -> str:
@@ -124,26 +130,37 @@ def datum_of(
     """
     names = photo_components(block)
     own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
+    own += _held_coefficients(block, solution)
     if row is None:
         given = "minimal control" if solution.minimal_control else "observations"
         return ResultDatum("minimum constraints" if own else given, own)
     name, points, photos, scale, attitudes, _ = row
     used = solution.point_rays > 0
-    # Where the scale is open, the core has held it by one coordinate of a photo that holds nothing else.
-    unknowns: dict[int, list[int]] = {}
-    for photo, unknown in solution.datum if held is None else held:
-        unknowns.setdefault(photo, []).append(unknown)
-    is_open = any(len(each) == 1 and each[0] < 3 for each in unknowns.values())
+    of_whole = own if held is None else [(str(photo), names[unknown]) for photo, unknown in held]
     return ResultDatum(
         kind="inner constraints" if name == "inner" else name,
         held=own,
         points=tuple(block.point_ids[point] for point in points if used[point]),
         photos=tuple(block.photo_ids[photo] for photo in photos),
-        scale=scale and is_open,
+        scale=scale and holds_scale(of_whole),
         lost=solution.relative_error,
         attitudes=tuple(block.photo_ids[photo] for photo in attitudes),
         row=row,
     )
+
+
+def _held_coefficients(block: Block, solution: BlockSolution) -> tuple[tuple[str, str], ...]:
+    """Return the coefficients of trajectories that are held, each with the name of one of its unknowns."""
+    if not solution.datum_unknowns:
+        return ()
+    unknowns = block.unknowns
+
+    def named(row: int, number: int) -> tuple[str, str]:
+        own = unknowns[row]
+        turn = "rotation " if isinstance(own, RotationCoefficient) else ""
+        return own.name, turn + own.components[number]
+
+    return tuple(named(row, number) for row, number in sorted(solution.datum_unknowns))
 
 
 def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> list[Message]:

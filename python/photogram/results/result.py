@@ -14,10 +14,10 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
-from photogram.network.block import Block
+from photogram.network.block import Block, refuse_trajectories
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow, InnerConstraints, datum_row
-from photogram.network.motion import refuse_datum, timed_photos
+from photogram.network.motion import timed_photos
 from photogram.results.cameras import AdjustedCamera, adjusted_cameras
 from photogram.results.check_points import CheckPoints, check_points, point_kinds
 from photogram.results.covariance import Failure
@@ -227,7 +227,7 @@ class Result(OnFilm, AdjustedNetwork):
         core = block_network(self.block, self.options).trial(self.state, threads=0, kept=True)
         return network_trial(self.block, core)
 
-    def restarted(self) -> Block:
+    def restarted(self, turns: Mapping[str, Floats] | None = None) -> Block:
         """Return the block as it was given, but with what is free where the adjustment has ended.
 
         That are poses of photos, parameters of cameras, and coefficients of trajectories.
@@ -235,11 +235,17 @@ class Result(OnFilm, AdjustedNetwork):
         What was observed or held is as it was given.
         `photogram.adjust(result.restarted())` goes on from there: with other options, or with other weights,
         after :meth:`photogram.Block.replace`.
+
+        Parameters
+        ----------
+        turns
+            By names of trajectories (3,) rotation vectors about the axes of the photo, which their tables
+            take over: corrections of their rotations then begin at zero.
         """
         block = self.block
         free = {name: np.isinf(getattr(block, f"photo_{name}_sd")) for name in ("position", "attitude")}
         if block.all_trajectories:
-            block = restarted_motion(block, self.trajectories.values())
+            block = restarted_motion(block, self.trajectories.values(), turns)
         return block.replace(
             cameras=[each.restarted() for each in self.cameras] or block.cameras,
             photo_positions=np.where(free["position"], self.photo_positions, block.photo_positions),
@@ -254,13 +260,13 @@ class Result(OnFilm, AdjustedNetwork):
         Raises
         ------
         InputError
-            Points or photos that are not there, or that do not carry the datum; photos on trajectories.
+            Points or photos that are not there, or that do not carry the datum; photos on trajectories
+            among them.
         AdjustmentError
             The block is not free: the message says what gives its datum.
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        refuse_datum(self.block, "in_datum")
         return self._in(datum_row(self.block, inner_datum(datum)))
 
     def relative_to(self, *, photo: str | None = None, points: Sequence[str] | None = None) -> Self:
@@ -276,7 +282,7 @@ class Result(OnFilm, AdjustedNetwork):
         OutOfMemoryError, KeyboardInterrupt
             As :meth:`covariances`.
         """
-        refuse_datum(self.block, "relative_to")
+        refuse_trajectories(self.block, "relative_to", "whose pose is not held as a whole")
         return self._in(relative_datum(self.block, photo, points))
 
     def _in(self, row: DatumRow) -> Self:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -13,6 +13,7 @@ from photogram.arguments.arrays import freeze_fields, shaped, standard_deviation
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
 from photogram.network.moving_photos import Timed
@@ -101,17 +102,25 @@ class AdjustedTrajectory:
         """Its name."""
         return self.given.name
 
-    def restarted(self, observed: Collection[int] = ()) -> Trajectory:
+    def restarted(self, observed: Collection[int] = (), turn: Floats | None = None) -> Trajectory:
         """Return the trajectory as it was given, but with adjusted values of free coefficients.
 
         Parameters
         ----------
         observed
             Identities of coefficients whose given values are observations all the same.
+        turn
+            (3,) rotation vector about the axes of the photo that the table takes over; corrections of
+            rotations are then zero.
         """
-        changes = {}
+        changes: dict[str, Any] = {}
+        rotation = self.rotation
+        if turn is not None:
+            table, rotation = self.given.table, np.zeros_like(self.rotation)
+            turned = table.attitudes @ Attitudes.of("rotation_vector", turn[np.newaxis]).matrices[0]
+            changes["table"] = replace(table, attitudes=turned)
         for name, values, own in zip(
-            ("position", "rotation"), (self.position, self.rotation), self.given.coefficients, strict=True
+            ("position", "rotation"), (self.position, rotation), self.given.coefficients, strict=True
         ):
             free = np.array([np.isinf(each.deviations) & (id(each) not in observed) for each in own])
             if free.any():
@@ -253,7 +262,9 @@ def adjusted_trajectories(
     return {each.name: adjusted(each) for each in block.all_trajectories}
 
 
-def restarted_motion(block: Block, adjusted: Iterable[AdjustedTrajectory]) -> Block:
+def restarted_motion(
+    block: Block, adjusted: Iterable[AdjustedTrajectory], turns: Mapping[str, Floats] | None = None
+) -> Block:
     """Return a block whose free coefficients of trajectories are the adjusted ones; others stay as given.
 
     Parameters
@@ -262,11 +273,14 @@ def restarted_motion(block: Block, adjusted: Iterable[AdjustedTrajectory]) -> Bl
         The block that was adjusted.
     adjusted
         All its trajectories.
+    turns
+        By their names what tables take over (:meth:`AdjustedTrajectory.restarted`).
     """
+    turns = turns or {}
     found = {id(each.given): each for each in adjusted}
     # A prior observes the value that its unknown was given.
     observed = {id(each.unknown) for each in block.observations if isinstance(each, Prior)}
-    moved = {key: each.restarted(observed) for key, each in found.items()}
+    moved = {key: each.restarted(observed, turns.get(each.name)) for key, each in found.items()}
     coefficients: dict[int, Coefficient] = {}
     for key, each in found.items():
         for before, after in zip(each.given.coefficients, moved[key].coefficients, strict=True):

@@ -201,11 +201,16 @@ pub(super) fn moved(
             return Err(DatumError::NotCarried);
         }
         all_open |= adjusted.held.len() == retained.1;
+        // Coefficients of trajectories follow turns exactly at first only: what was held for is open to the end.
+        let were_open = if datum.left.is_empty() { adjusted.held.len() } else { 0 };
         let combinations = match all_open {
             true => None,
-            false => {
-                Some(problem.open(&unknowns, &motions, threads).ok_or(DatumError::NotFree)?.combinations)
-            }
+            false => Some(
+                problem
+                    .open(&unknowns, &motions, were_open, threads)
+                    .ok_or(DatumError::NotFree)?
+                    .combinations,
+            ),
         };
         let apart = problem.model.step_between(&unknowns, reference);
         let carried = threads.install(|| Carried::new(&motions, combinations, datum, &apart));

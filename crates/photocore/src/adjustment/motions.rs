@@ -174,16 +174,22 @@ fn add_square(sum: &mut [f64], weight: f64, b: &[[f64; LANES]]) {
 }
 
 impl AnyProblem<'_> {
-    /// Which of some motions observations and weights leave open at given values; None where it is none.
-    pub(super) fn open(&self, values: &[f64], motions: &Motions, threads: &Threads) -> Option<Open> {
-        self.open_without(values, motions, &[], threads)
+    /// Which of some motions observations and weights leave open at given values, so many at the least; None where it is none.
+    pub(super) fn open(
+        &self,
+        values: &[f64],
+        motions: &Motions,
+        least: usize,
+        threads: &Threads,
+    ) -> Option<Open> {
+        self.open_without(values, motions, (&[], least), threads)
     }
 
     /// How many motions would be open at given values if what is known of some unknowns themselves (ascending) were not: with as many
     /// of these, and a network that is determined, they give a datum and nothing more.
     pub fn open_if_free(&self, values: &[f64], released: &[usize], threads: &Threads) -> usize {
         let motions = threads.install(|| self.model.all_motions(values));
-        let open = motions.and_then(|motions| self.open_without(values, &motions, released, threads));
+        let open = motions.and_then(|motions| self.open_without(values, &motions, (released, 0), threads));
         open.map_or(0, |open| open.combinations.ncols())
     }
 
@@ -191,7 +197,7 @@ impl AnyProblem<'_> {
         &self,
         values: &[f64],
         motions: &Motions,
-        released: &[usize],
+        (released, least): (&[usize], usize),
         threads: &Threads,
     ) -> Option<Open> {
         let sums = self.sums(values, motions, released, threads);
@@ -206,7 +212,7 @@ impl AnyProblem<'_> {
             if k == m && scale[k] == 0.0 { 1.0 } else { sums.together[k * stride + m] * scale[k] * scale[m] }
         });
         let eigen = threads.install(|| scaled.self_adjoint_eigen(Side::Lower)).ok()?;
-        let open: Vec<usize> = (0..count).filter(|&k| eigen.S()[k] < NULL).collect();
+        let open: Vec<usize> = (0..count).filter(|&k| k < least || eigen.S()[k] < NULL).collect();
         let combinations =
             Mat::from_fn(count, open.len(), |k, column| scale[k] * eigen.U()[(k, open[column])]);
         let length = |&unknown: &usize| {
@@ -221,7 +227,7 @@ impl AnyProblem<'_> {
     /// The unknowns to hold at given values; none where there is a datum.
     pub(crate) fn to_hold(&self, values: &[f64], threads: &Threads) -> Vec<usize> {
         let motions = threads.install(|| self.model.motions(values));
-        let open = motions.and_then(|motions| self.open(values, &motions, threads));
+        let open = motions.and_then(|motions| self.open(values, &motions, 0, threads));
         open.map_or(vec![], |open| open.hold)
     }
 

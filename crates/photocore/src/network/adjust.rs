@@ -227,8 +227,13 @@ fn iterated(
     own.max_iterations = own.max_iterations.saturating_sub(done);
     let plain = own.covariance && own.loss.is_none();
     match datum {
-        // Cofactors are those of the datum that is asked for; weights that a loss leaves are known at the end only.
-        Some(inner) if plain && matches!(own.method, Method::Damped(_)) => {
+        // Cofactors are those of the datum that is asked for; weights that a loss leaves are known at the end only, and trajectories follow
+        // moves so nearly that steps after one would not be short.
+        Some(inner)
+            if plain
+                && matches!(own.method, Method::Damped(_))
+                && problem.model.mounts.trajectories().is_empty() =>
+        {
             let (datum, reference) = assembled.datum(inner);
             return adjustment::adjust_in_datum(problem, &own, &datum, &reference, threads, watch);
         }

@@ -130,14 +130,18 @@ impl Network {
         let mut photos = (0..self.photos.len()).filter(|&index| counts(index));
         let fixed = |index: usize| self.photos[index].sd[..positions].iter().all(|&sd| sd == 0.0);
         let (placed, anchor) = match (photos.next(), photos.next()) {
-            // What moves a trajectory as a whole is not worked out: its datum is that of the observations.
-            _ if mounts.fly() => (true, None),
+            _ if mounts.trajectories().iter().any(|own| self.is_given(&own.position)) => (true, None),
             _ if selected.points.iter().any(|&point| self.points[point].held() != [false; 3]) => (true, None),
             (None, _) => (false, None),
             (first, None) if first.is_some_and(fixed) => (false, first),
             _ => (true, None),
         };
         GivenDatum { placed, anchor, minimum: None }
+    }
+
+    /// Whether coefficients are all known or weighted.
+    fn is_given(&self, coefficients: &[usize]) -> bool {
+        coefficients.iter().all(|&common| self.commons[common].sd.iter().all(|sd| sd.is_finite()))
     }
 
     /// The unknown that the first parameter of a camera is; None where no photo has it.

@@ -140,8 +140,7 @@ impl Network {
         let known = self.placed_mounts([0.0; 3]);
         let spans: Vec<(f64, f64)> = self.trajectories.iter().map(|own| own.course.span()).collect();
         let reach = |photo: usize, point: Option<usize>, at: f64| {
-            let flight = known.of(known.carrier(photo)).first().and_then(|mount| mount.flight(at, &known));
-            let Some((trajectory, time)) = flight else { return Ok(()) };
+            let Some((trajectory, time)) = known.flight(photo, at) else { return Ok(()) };
             let (first, last) = spans[trajectory];
             if first <= time && time <= last {
                 return Ok(());

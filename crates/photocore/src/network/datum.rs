@@ -15,8 +15,8 @@ use super::{Network, NetworkError};
 use crate::Threads;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
-    AttitudeNumbers, Matrix3, ObjectSpace, Point, PoseNumbers, Vector3, angle_axis::rotation_angle_axis,
-    angle_axis_rotation, local_vertical,
+    AttitudeNumbers, Matrix3, ObjectSpace, Point, Pose, PoseNumbers, Vector3,
+    angle_axis::rotation_angle_axis, angle_axis_rotation, local_vertical,
 };
 use crate::sorting::sort_by;
 
@@ -70,8 +70,7 @@ impl Bundle {
         }
         let mut on_trajectories = vec![];
         for own in self.mounts.trajectories() {
-            let coefficients = own.position.iter().chain(&own.rotation).copied().filter(moves);
-            let nodes: Vec<usize> = coefficients.map(of_common).collect();
+            let nodes: Vec<usize> = own.coefficients().filter(moves).map(of_common).collect();
             on_trajectories.push(nodes.first().copied());
             joined.join(nodes);
         }
@@ -153,29 +152,46 @@ impl Bundle {
                 self.move_commons(&placed, &motion, |common, state| common.change(state, &motion), vector);
             });
         }
-        let preferred = self.preferred(parts, photos, &origins);
+        for (part, following) in self.following(parts, &placed.commons) {
+            for (k, vector) in vectors[MOTIONS * part..][..MOTIONS].iter_mut().enumerate() {
+                let turn = if (3..6).contains(&k) { Vector3::ith(k - 3, 1.0) } else { Vector3::zeros() };
+                let changes = following.changes(&|_, pose| {
+                    [displacement(k, &(pose.position - origins[part])), pose.attitude.tr_mul(&turn)]
+                });
+                self.put_changes(&following, &changes, vector);
+            }
+        }
+        let preferred = self.preferred(parts, photos, &origins, &vectors);
         Some(Motions { vectors, preferred })
     }
 
     /// What is held first, part by part: the pose of its central photo, then coordinates of others along which these are far from it.
-    fn preferred(&self, parts: &Parts, photos: &[Station], origins: &[Vector3]) -> Vec<usize> {
+    fn preferred(
+        &self,
+        parts: &Parts,
+        photos: &[Station],
+        origins: &[Vector3],
+        vectors: &[Vec<f64>],
+    ) -> Vec<usize> {
         let mut preferred = vec![];
-        for (Part { photos: own, central }, origin) in parts.all.iter().zip(origins) {
-            preferred.extend(self.of_block(*central).take(6));
+        for (part, (Part { photos: own, central }, origin)) in parts.all.iter().zip(origins).enumerate() {
+            preferred.extend(self.holding(*central));
             let asked = self.datum.minimum.filter(|minimum| self.carrier(minimum.photo) == *central);
             let coordinate = asked.and_then(|minimum| minimum.coordinate);
-            preferred
-                .extend(coordinate.map(|(photo, number)| self.of_block(self.carrier(photo)).start + number));
+            preferred.extend(coordinate.and_then(|(photo, number)| self.holding(photo).get(number).copied()));
             let others = || own.iter().filter(|&photo| photo != central);
             let away = |&photo: &usize| (photos[photo].orientation.centre() - origin).norm();
             // A photo that its images hardly hold may have left the network, and is the last to hold it.
             let limit = median(others().map(away).collect()).map_or(f64::INFINITY, |middle| LEFT * middle);
-            let shifts = others().flat_map(|photo| {
+            let shifts = others().filter(|&&photo| !self.is_carried(photo)).flat_map(|photo| {
                 let (left, block) = (away(photo) > limit, self.of_block(*photo).start);
                 let shift = photos[*photo].orientation.shifts_along(origin);
                 shift.map(|(number, change)| (left, change.abs(), block + number))
             });
-            let mut shifts: Vec<(bool, f64, usize)> = shifts.collect();
+            let scale = &vectors[MOTIONS * part + SCALE];
+            let coefficients = self.position_coefficients(parts, part).into_iter();
+            let coefficients = coefficients.map(|unknown| (false, scale[unknown].abs(), unknown));
+            let mut shifts: Vec<(bool, f64, usize)> = shifts.chain(coefficients).collect();
             sort_by(&mut shifts, &|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
             preferred.extend(shifts.into_iter().map(|(_, _, unknown)| unknown));
         }
@@ -236,6 +252,8 @@ impl Bundle {
         self.move_commons_of(parts, part, unknowns, |unknowns| {
             self.move_commons(placed, &motion, |common, state| common.moved(state, &motion), unknowns);
         });
+        let pose = |pose: &Pose| Pose { position: moved(pose.position), attitude: turn * pose.attitude };
+        self.move_trajectories((parts, part), &placed.commons, &pose, unknowns);
         let places =
             self.coordinates(unknowns).map(|&at| self.space.coordinates(moved(self.space.cartesian(at))));
         let places: Vec<[f64; 3]> = places.collect();

@@ -84,6 +84,7 @@ mod station_values;
 mod stations;
 mod surroundings;
 mod suspects;
+mod trajectory_motions;
 mod trial;
 mod visibility;
 mod weak_points;

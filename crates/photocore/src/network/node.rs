@@ -79,7 +79,10 @@ impl Network {
         let assembled = threads.install(|| self.assemble(options, selected, None))?;
         let problem = &assembled.problem;
         let held = problem.any().to_hold(&problem.initial, threads);
-        Ok(held.iter().filter_map(|&unknown| of_photo(problem, unknown)).collect())
+        let in_photos = held.iter().map(|&unknown| of_photo(problem, unknown)).collect::<Option<Vec<_>>>();
+        in_photos.ok_or(NetworkError::Node(
+            "in parts trajectories take no datum: it would be held by their coefficients",
+        ))
     }
 
     /// Takes the network as a node of a larger one.

@@ -91,6 +91,8 @@ pub struct DatumInForce {
     /// What was held to give a datum where nothing else does: photo and unknown. In the datum of inner constraints, what they were
     /// taken from.
     pub held: Vec<(usize, usize)>,
+    /// The same of coefficients of trajectories: common unknown and its number.
+    pub held_commons: Vec<(usize, usize)>,
     /// Relative error, by rounding, of the variances in a datum that they were taken to, about; zero otherwise.
     pub relative_error: f64,
     /// Whether control and weights of poses are exactly what a datum takes: they check nothing, and another datum may be chosen.
@@ -226,6 +228,11 @@ impl Solution {
             },
             datum: DatumInForce {
                 held: adjustment.datum.iter().filter_map(of_photo).collect(),
+                held_commons: adjustment
+                    .datum
+                    .iter()
+                    .filter_map(|&unknown| of_common(problem, unknown))
+                    .collect(),
                 ..DatumInForce::default()
             },
             dropped: dropped.clone(),

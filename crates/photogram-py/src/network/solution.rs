@@ -156,6 +156,7 @@ impl NetworkSolution {
 /// An adjusted block.
 #[pyclass(frozen, get_all, extends = NetworkSolution, module = "photogram._photocore")]
 pub struct BlockSolution {
+    datum_unknowns: Vec<(usize, usize)>,
     relative_error: f64,
     minimal_control: bool,
     photo_corrections: Py<PyArray3<f64>>,
@@ -189,6 +190,7 @@ impl BlockSolution {
         // A camera, a point that stays or a mount is no photo.
         let order = found.adjustment.effort.order.iter().filter(|&&block| block < found.photos.len());
         let own = Self {
+            datum_unknowns: found.datum.held_commons.clone(),
             relative_error: found.datum.relative_error,
             minimal_control: found.datum.minimal_control,
             photo_corrections: photo_corrections(py, &found.photo_corrections, &found.photos)?.unbind(),

@@ -30,6 +30,8 @@ enum Moves {
     Against,
     /// It is the scale of lengths, which shrinks when these grow.
     Shrinks,
+    /// It follows with the other coefficients of its trajectory, as far as the functions of these do.
+    Follows,
 }
 
 /// What the number of an unknown stands for.
@@ -117,9 +119,9 @@ kinds! {
         ("rotation x", 3, Angle), ("rotation y", 4, Angle), ("rotation z", 5, Angle)
     ];
     /// c_k, a coefficient of the positions of a trajectory, in their axes.
-    PositionCoefficient = "position coefficient", Stays, [("x", 0, Length), ("y", 1, Length), ("z", 2, Length)];
+    PositionCoefficient = "position coefficient", Follows, [("x", 0, Length), ("y", 1, Length), ("z", 2, Length)];
     /// r_k, a coefficient of its rotation vectors, about the axes of the photo.
-    RotationCoefficient = "rotation coefficient", Stays, [("x", 0, Angle), ("y", 1, Angle), ("z", 2, Angle)];
+    RotationCoefficient = "rotation coefficient", Follows, [("x", 0, Angle), ("y", 1, Angle), ("z", 2, Angle)];
     /// b, what a gyroscope says of a body at rest.
     GyroBias = "gyro bias", Stays, [("x", 0, Rate), ("y", 1, Rate), ("z", 2, Rate)];
     /// The readout time of all rows of a rolling shutter, or the factor of the line rates of a scanner, which is about 1.
@@ -330,6 +332,11 @@ impl CommonState {
     pub fn unknowns(&self) -> impl Iterator<Item = f64> {
         let six = [self.offset.data.0[0], self.rotation.data.0[0]].concat();
         self.kind.components().map(move |component| six[component])
+    }
+
+    /// The position that is given: unknown offsets count from it.
+    pub fn given(&self) -> Vector3 {
+        self.base
     }
 
     /// The unknown offsets.

@@ -26,11 +26,12 @@ impl PlacedCommon {
         self.kind.moves() == Moves::Against
     }
 
-    /// How its unknowns change with a small motion, the scale being 1 and a change of it; of those that move against it nothing.
+    /// How its unknowns change with a small motion, the scale being 1 and a change of it; of those that move against it, and of coefficients of
+    /// trajectories, nothing.
     pub fn change(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
         let growth = motion.scale - 1.0;
         let (offset, turn) = match self.kind.moves() {
-            Moves::Stays | Moves::Against => (Vector3::zeros(), Vector3::zeros()),
+            Moves::Stays | Moves::Against | Moves::Follows => (Vector3::zeros(), Vector3::zeros()),
             Moves::Scales => (growth * state.vector(), Vector3::zeros()),
             Moves::Shrinks => (Vector3::new(-growth * state.vector().x, 0.0, 0.0), Vector3::zeros()),
             Moves::Along => {
@@ -60,10 +61,10 @@ impl PlacedCommon {
         }
     }
 
-    /// Its unknowns after a motion that need not be small; of those that move against it the same.
+    /// Its unknowns after a motion that need not be small; of the same ones as they are.
     pub fn moved(&self, state: &CommonState, motion: &Motion<'_>) -> Vec<f64> {
         match self.kind.moves() {
-            Moves::Stays | Moves::Against => self.unknowns(&state.offset, &state.attitude),
+            Moves::Stays | Moves::Against | Moves::Follows => self.unknowns(&state.offset, &state.attitude),
             Moves::Scales => {
                 self.unknowns(&(motion.scale * state.vector() - self.given.position), &state.attitude)
             }

@@ -32,6 +32,11 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
+    /// The common unknowns that are its coefficients, positions first.
+    pub fn coefficients(&self) -> impl Iterator<Item = usize> + Clone {
+        self.position.iter().chain(&self.rotation).copied()
+    }
+
     /// The common unknowns that are the coefficients of functions that are never zero.
     pub fn everywhere(&self) -> impl Iterator<Item = usize> {
         let own = [(&self.course.position, &self.position), (&self.course.rotation, &self.rotation)];
@@ -159,11 +164,6 @@ impl Mounts {
         self.by_photo.is_empty()
     }
 
-    /// Whether there are trajectories.
-    pub(super) fn fly(&self) -> bool {
-        !self.trajectories.is_empty()
-    }
-
     /// A trajectory.
     pub fn trajectory(&self, trajectory: usize) -> &Trajectory {
         &self.trajectories[trajectory]
@@ -218,6 +218,11 @@ impl Mounts {
         [photo, self.carrier(photo)]
             .iter()
             .find_map(|&photo| self.of(photo).iter().find_map(|own| own.trajectory()))
+    }
+
+    /// That, and the time there of an image of the photo with a number, common unknowns as they are given.
+    pub(super) fn flight(&self, photo: usize, at: f64) -> Option<(usize, f64)> {
+        self.of(self.carrier(photo)).first().and_then(|mount| mount.flight(at, self))
     }
 
     /// The common unknowns that all poses of a photo are made of.

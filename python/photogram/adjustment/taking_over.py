@@ -1,0 +1,139 @@
+"""Tables of trajectories that take over large corrections of their attitudes.
+
+Corrections r(t) are added to each other, turns are not: bases describe small ones well. Where those of images
+and records are larger than half a radian, the table takes over the turn in their middle, A0 Exp(r), exactly
+at all times; r then begins at zero (docs/moving.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.messages import Message, listed
+from photogram.network.block import Block
+from photogram.network.motion import timed_images
+from photogram.network.observations import Prior, Smoothness
+from photogram.network.trajectories import Coefficient, Polynomial, RotationCoefficient, Trajectory
+from photogram.results.result import Result
+from photogram.results.trajectories import AdjustedTrajectory
+
+LARGE = 0.5
+"""Radians."""
+TIMES = 1000
+"""At which a trajectory is looked at, at the most."""
+
+
+def large_turns(result: Result) -> dict[str, Floats]:
+    """Return the turns that tables are to take over, by the names of their trajectories.
+
+    (3,) rotation vectors about the axes of the photo, in radians.
+    """
+    block, large = result.block, _large(result)
+    return {
+        own.name: turn
+        for own, turn in large
+        if np.linalg.norm(turn) > LARGE / 2 and _is_open(block, own.given)
+    }
+
+
+def taken_over(turns: dict[str, Floats]) -> Message:
+    """Say what tables have taken over, from the first to the last time."""
+    parts = [f"{name} ({np.linalg.norm(turn):.2f} rad)" for name, turn in turns.items()]
+    return Message(
+        f"attitudes were far from what is given of them: the tables of {listed(parts)} have taken over what"
+        " was missing; corrections count from there, and the block of the result has these tables"
+    )
+
+
+def stays(result: Result) -> list[Message]:
+    """Say which corrections are large, and stay: they are weighted, or vary by so much."""
+    large = [own.name for own, _ in _large(result) if own.given.angles == "vector"]
+    if not large:
+        return []
+    return [
+        Message(
+            f"rotations of {listed(large)} are more than {LARGE} rad from their tables, which cannot take"
+            " this over: it is weighted, or differs from time to time; a nearer table would hold"
+        )
+    ]
+
+
+def _large(result: Result) -> list[tuple[AdjustedTrajectory, Floats]]:
+    """Return trajectories with a large correction of the attitude somewhere, and that in the middle.
+
+    None without convergence: steps have gone astray then.
+    """
+    values = {each.name: each.position for each in result.unknowns if each.kind == RotationCoefficient.KIND}
+    of_photos = _of_photos(result.block)
+    large = [
+        each.name
+        for each in result.block.all_trajectories
+        if _may_be_large(each, values, alone=each.name in of_photos)
+    ]
+    if not large or not result.converged:
+        return []
+    found, adjusted, seen = [], result.trajectories, _seen(result.block)
+    for own in (adjusted[name] for name in large if name in seen):
+        turns = own.corrections(np.clip(seen[own.name], *own.given.reach))[1]
+        if np.linalg.norm(turns, axis=1).max() > LARGE:
+            found.append((own, turns[len(turns) // 2]))
+    return found
+
+
+def _may_be_large(trajectory: Trajectory, values: dict[str, Floats], *, alone: bool) -> bool:
+    """Whether coefficients, by their names, leave room for a large correction.
+
+    `alone`: of a photo's own motion, whose images are all at nearly its time: the first.
+    """
+    basis, own = trajectory.rotation, trajectory.coefficients[1]
+    sizes = np.array([np.linalg.norm(values[each.name]) for each in (own[:1] if alone else own)])
+    if isinstance(basis, Polynomial):
+        first, last = trajectory.table.span
+        reference, scale = basis.reference or 0.0, basis.scale or 1.0
+        beyond = max(1.0, abs(first - reference) / scale, abs(last - reference) / scale)
+        return bool((sizes * beyond ** np.arange(len(sizes))).sum() > LARGE)
+    # B-splines are positive and sum up to one.
+    return bool((sizes > LARGE).any())
+
+
+def _of_photos(block: Block) -> set[str]:
+    """Return the names of trajectories that are the motions of photos of their own."""
+    return {each.photo for each in block.timed if each.trajectory is None}
+
+
+def _seen(block: Block) -> dict[str, Floats]:
+    """Return some times of images and records on trajectories, ascending, by the names of these."""
+    times: dict[str, list[Floats]] = {}
+    for own, trajectory, _, images in timed_images(block):
+        times.setdefault(trajectory.name, []).append(own.times(block.image_xy[images]))
+    for each in block.observations:
+        if each.moment is not None:
+            times.setdefault(each.moment.trajectory.name, []).append(np.array([each.moment.time]))
+    joined = {name: np.sort(np.concatenate(own)) for name, own in times.items()}
+    some = {
+        name: np.linspace(0, len(own) - 1, min(len(own), TIMES)).astype(int) for name, own in joined.items()
+    }
+    return {name: own[some[name]] for name, own in joined.items() if len(own)}
+
+
+def _is_open(block: Block, trajectory: Trajectory) -> bool:
+    """Whether nothing but differences is known of the coefficients of rotations, whatever turn they share.
+
+    Rates of a photo's own motion are about its axes wherever these are.
+    """
+    own = trajectory.coefficients[1]
+    if trajectory.name in _of_photos(block):
+        own = own[:1]
+    ids = {id(each) for each in own}
+
+    def tells(each: object) -> bool:
+        if isinstance(each, Prior):
+            return id(each.unknown) in ids
+        if isinstance(each, Smoothness):
+            on: tuple[Coefficient, ...] = tuple(each.coefficients)
+            return id(on[0]) in ids and abs(np.sum(each.factors)) > 1e-9 * np.abs(each.factors).sum()
+        return False
+
+    free = all(np.isinf(each.deviations).all() for each in own)
+    return trajectory.angles == "vector" and free and not any(map(tells, block.observations))
