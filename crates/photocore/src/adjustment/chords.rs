@@ -46,8 +46,8 @@ impl<'a> Run<'a, '_> {
             && (self.chord.is_some() || self.secants.correct() || self.is_slow(step))
     }
 
-    /// The values that chords lead to, the first of them from those given, and the length of the next; None where it would begin higher than
-    /// `best`.
+    /// The lowest values that chords lead to, the first of them from those given, and the length of the chord there; None where the first
+    /// would begin higher than `best`.
     pub(super) fn followed(
         &mut self,
         state: &State<'a>,
@@ -60,12 +60,17 @@ impl<'a> Run<'a, '_> {
         if here.is_higher_than(best) {
             return Ok(None);
         }
+        let (mut end, mut lowest) = ((here.values.clone(), here.change), here.sum_of_squares);
         let mut lengths = vec![here.change];
         while lengths.len() < MOST && falls(&lengths) && !is_enough(stop, &here) {
             let taken = here.corrected(&secants, &differences);
             let next = self.chord_at(state, self.problem.advanced(&here.values, &taken))?;
-            if next.is_higher_than(here.sum_of_squares) {
+            // What a chord learns may lead higher before it leads lower: by no more than the last was to lower.
+            if next.is_higher_than(lowest + here.change.powi(2)) {
                 break;
+            }
+            if !next.is_higher_than(lowest) {
+                (end, lowest) = ((next.values.clone(), next.change), lowest.min(next.sum_of_squares));
             }
             secants.keep(taken, minus(&next.step, &here.step), MOST);
             differences.push(minus(&next.reduced, &here.reduced));
@@ -73,7 +78,7 @@ impl<'a> Run<'a, '_> {
             here = next;
         }
         self.seconds.solve += start.elapsed().as_secs_f64();
-        Ok(Some((here.values, here.change)))
+        Ok(Some(end))
     }
 
     /// The chord from given values.

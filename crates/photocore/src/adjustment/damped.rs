@@ -355,9 +355,8 @@ impl<'a> Run<'a, '_> {
 
     /// Whether all further steps together would not exceed a limit; secants say nothing of a rate.
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
-        !self.secants.correct()
-            && !(self.problem.model.steps_swing() && self.chord.is_some())
-            && self.history().leaves_less_than(limit, change)
+        let learns = self.secants.correct() || self.problem.model.steps_swing() && self.chord.is_some();
+        !learns && self.history().leaves_less_than(limit, change)
     }
 
     /// The same unknowns, with the local ones computed afresh where that lowers the sum of squares.
