@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from photogram import InnerConstraints, InputError, Spheroid, adjust, features, formats, read_result, simulate
@@ -162,7 +163,8 @@ def test_deviations_are_drawn(result, names):
     told = with_features(result, {"ground": ("plane", names), "d": ("distance", names[:2])})
     axes = told.plot.features(Figure())
     assert axes.get_title(loc="left") == "ground: plane through 8 points"
-    drawn = np.concatenate([line.get_ydata() for line in axes.lines if len(line.get_ydata()) == 8])
+    (marks,) = [each for each in axes.collections if isinstance(each, PathCollection)]
+    drawn = marks.get_offsets()[:, 1]
     np.testing.assert_allclose(drawn, told.features["ground"].deviations[:, 0])
     with pytest.raises(InputError, match="no deviations to draw"):
         result.plot.features()
