@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +15,6 @@ from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number, whole_number
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.summary import Brief
-
-if TYPE_CHECKING:
-    pass
-
 
 BUILT_IN = (773, 1320, 778)
 """The master grids of the program, in the order of its option MASTER (0, 1, 2)."""

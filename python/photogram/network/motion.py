@@ -8,7 +8,6 @@ with one pose nothing holds for it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +19,6 @@ from photogram.network.observations import Smoothness
 from photogram.network.subset import kept_images, of_photos
 from photogram.network.trajectories import Trajectory
 from photogram.network.unadjusted import Given
-
-if TYPE_CHECKING:
-    pass
 
 
 def timed_photos(block: Block) -> Bools:
