@@ -189,7 +189,8 @@ def test_a_link_leads_to_its_row_also_in_a_layer_that_was_not_shown(made, browse
         link = page.locator("#worst a[href^='#photo-']").first
         target = link.get_attribute("href").removeprefix("#")
         link.click()
-        assert page.locator(f"[id='{target}']").is_visible()
+        # The layer is shown when the browser tells of the new address, which is after the click.
+        page.locator(f"[id='{target}']").wait_for(state="visible")
 
 
 class Tables(HTMLParser):
