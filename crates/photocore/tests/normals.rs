@@ -8,8 +8,8 @@ use std::ops::ControlFlow;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
-    Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
-    Prior, SelectedInverse, SolveOptions, System, Tie, TieRows,
+    Chord, Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError,
+    Ordering, Prior, SelectedInverse, SolveOptions, System, Tie, TieRows,
 };
 use photocore::{Stopped, Threads};
 use proptest::prelude::*;
@@ -254,7 +254,8 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
     if factor.has_cached() {
-        let (chord, decrease) = done(system.chord(&threads, &factor, (dense, &dense.prior), &mut go));
+        let Chord { step: chord, decrease, .. } =
+            done(system.chord(&threads, &factor, (dense, &dense.prior), &mut go));
         assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
         for (value, other) in chord.iter().zip(&solution) {
             assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
@@ -291,7 +292,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
 /// factor does all else.
 fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
     let there = Dense::new(dense.layout.clone(), 97);
-    let (chord, _) = done(system.chord(&threads(2), factor, (&there, &there.prior), &mut go));
+    let chord = done(system.chord(&threads(2), factor, (&there, &there.prior), &mut go)).step;
     let count = dense.layout.locals() * dense.layout.local_dim();
     let (before, after, right) = (dense.normal_matrix(), there.normal_matrix(), there.normal_right());
     let (right, others) = right.split_at_row(count);

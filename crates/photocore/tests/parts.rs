@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 
 use crate::cut::{Cut, TREES};
 use photocore::normals::{
-    Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError, Ordering,
-    Prior, ReducedRights, SolveOptions, System, Tie, TieRows,
+    Chord, Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError,
+    Ordering, Prior, ReducedRights, SolveOptions, System, Tie, TieRows,
 };
 use photocore::{Stopped, Threads};
 use proptest::prelude::*;
@@ -277,7 +277,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
     let factor = done(system.factor(threads, all, &all.prior, &FactorOptions::default(), &mut go));
     assert!(factor.has_cached());
     let of = (&elsewhere as &dyn Equations, &elsewhere.prior);
-    let (expected, decrease) = done(system.chord(threads, &factor, of, &mut go));
+    let Chord { step: expected, decrease, .. } = done(system.chord(threads, &factor, of, &mut go));
     let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let nodes = upward(all, cut, ordering, threads);
     let mut found: Vec<(Piece<'_>, ReducedRights<1>)> = vec![];

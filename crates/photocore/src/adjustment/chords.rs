@@ -14,7 +14,7 @@ use super::options::{Iteration, NEGLIGIBLE, Phase, Stop};
 use super::result::{AdjustError, unless_stopped};
 use super::run::{Run, State, between};
 use super::secants::Secants;
-use crate::normals::dot;
+use crate::normals::{Chord, dot};
 
 /// Steps that change the unknowns by less than this multiple of their standard deviations leave the normal equations as they are; from farther
 /// away chords lead higher.
@@ -25,14 +25,11 @@ const MOST: usize = 40;
 const LONG: usize = 10;
 const FALL: f64 = 0.5;
 
-/// Values with the chord from there.
-struct Chord {
+/// A link of the chain: values with the chord from there.
+struct Link {
     values: Vec<f64>,
     sum_of_squares: f64,
-    step: Vec<f64>,
-    /// y = L^-1 A^T l, and its length.
-    reduced: Vec<f64>,
-    change: f64,
+    chord: Chord,
 }
 
 impl<'a> Run<'a, '_> {
@@ -56,72 +53,83 @@ impl<'a> Run<'a, '_> {
     ) -> Result<Option<(Vec<f64>, f64)>, AdjustError> {
         let start = Instant::now();
         let (mut secants, mut differences) = (Secants::default(), Vec::<Vec<f64>>::new());
-        let mut here = self.chord_at(state, values)?;
+        let mut here = self.link(state, values)?;
         if here.is_higher_than(best) {
             return Ok(None);
         }
-        let (mut end, mut lowest) = ((here.values.clone(), here.change), here.sum_of_squares);
-        let mut lengths = vec![here.change];
+        let (mut end, mut lowest) = ((here.values.clone(), here.change()), here.sum_of_squares);
+        let mut lengths = vec![here.change()];
         while lengths.len() < MOST && falls(&lengths) && !is_enough(stop, &here) {
             let taken = here.corrected(&secants, &differences);
-            let next = self.chord_at(state, self.problem.advanced(&here.values, &taken))?;
+            let next = self.link(state, self.problem.advanced(&here.values, &taken))?;
             // What a chord learns may lead higher before it leads lower: by no more than the last was to lower.
-            if next.is_higher_than(lowest + here.change.powi(2)) {
+            if next.is_higher_than(lowest + here.chord.decrease) {
                 break;
             }
             if !next.is_higher_than(lowest) {
-                (end, lowest) = ((next.values.clone(), next.change), lowest.min(next.sum_of_squares));
+                (end, lowest) = ((next.values.clone(), next.change()), lowest.min(next.sum_of_squares));
             }
-            secants.keep(taken, minus(&next.step, &here.step), MOST);
-            differences.push(minus(&next.reduced, &here.reduced));
-            lengths.push(next.change);
+            secants.keep(taken, minus(&next.chord.step, &here.chord.step), MOST);
+            differences.push(minus(&next.chord.reduced, &here.chord.reduced));
+            lengths.push(next.change());
             here = next;
         }
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(Some(end))
     }
 
-    /// The chord from given values.
-    fn chord_at(&mut self, state: &State<'a>, values: Vec<f64>) -> Result<Chord, AdjustError> {
-        let (problem, factor) = (self.problem, &state.linearized.factor);
-        let at = self.threads.install(|| problem.model.at(&values));
-        let sum_of_squares = self.objective_at(&values, &*at);
-        let equations = ObservationEquations::evaluated(problem, at, &self.datum, None);
-        let prior = problem.prior_equations(&problem.terms(&values), &self.datum);
-        let (of, system) = ((&equations as _, &prior), &problem.system);
+    /// The chord from given values, with the sum of squares there.
+    fn link(&mut self, state: &State<'a>, values: Vec<f64>) -> Result<Link, AdjustError> {
+        let (equations, chord) = self.chord_at(state, &values)?;
+        let sum_of_squares = self.objective_at(&values, equations.at());
+        Ok(Link { values, sum_of_squares, chord })
+    }
+
+    /// The equations at given values, and the chord to them.
+    pub(super) fn chord_at(
+        &mut self,
+        state: &State<'a>,
+        values: &[f64],
+    ) -> Result<(ObservationEquations<'a>, Chord), AdjustError> {
+        let (problem, threads) = (self.problem, self.threads);
+        let equations = ObservationEquations::new(problem, None, values, &self.datum, threads);
+        let prior = problem.prior_equations(&problem.terms(values), &self.datum);
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let found = system.reduce_chord(self.threads, factor, of, &prior.right, &mut between);
-        let found = unless_stopped(found)?;
-        let (reduced, change) = (found.reduced(), found.products[0].sqrt());
-        let step = system.solve_reduced_rights(self.threads, factor, of, found, &[], &mut between);
-        Ok(Chord { values, sum_of_squares, step: unless_stopped(step)?, reduced, change })
+        let of = (&equations as _, &prior);
+        let chord = problem.system.chord(threads, &state.linearized.factor, of, &mut between);
+        Ok((equations, unless_stopped(chord)?))
     }
 }
 
-impl Chord {
+impl Link {
+    /// The length of the chord in standard deviations.
+    fn change(&self) -> f64 {
+        self.chord.decrease.sqrt()
+    }
+
     /// Corrected by what those before have shown: by how much y was another after each.
     fn corrected(&self, secants: &Secants, differences: &[Vec<f64>]) -> Vec<f64> {
         if !secants.correct() {
-            return self.step.clone();
+            return self.chord.step.clone();
         }
-        let row = |k: usize| if k == 0 { &self.reduced } else { &differences[k - 1] };
+        let row = |k: usize| if k == 0 { &self.chord.reduced } else { &differences[k - 1] };
         let count = differences.len() + 1;
         let shares = secants.shares(&DMatrix::from_fn(count, count, |i, j| dot(row(i), row(j))));
-        shares.map_or_else(|| self.step.clone(), |shares| secants.corrected(&self.step, &shares))
+        shares.map_or_else(|| self.chord.step.clone(), |shares| secants.corrected(&self.chord.step, &shares))
     }
 
     /// Whether it begins higher than a sum of squares, rounding apart, which is more than the square of a chord that is negligible; also
     /// where something is not a number.
     fn is_higher_than(&self, sum_of_squares: f64) -> bool {
         let highest = sum_of_squares * (1.0 + ROUNDING);
-        !(self.sum_of_squares <= highest || self.change <= NEGLIGIBLE && self.sum_of_squares.is_finite())
-            || !self.change.is_finite()
+        !(self.sum_of_squares <= highest || self.change() <= NEGLIGIBLE && self.sum_of_squares.is_finite())
+            || !self.change().is_finite()
     }
 }
 
 /// Whether full steps would end where a chord is as short.
-fn is_enough(stop: Stop, chord: &Chord) -> bool {
-    stop.at_change(chord.change) || stop.at_decrease(chord.change.powi(2), chord.sum_of_squares)
+fn is_enough(stop: Stop, link: &Link) -> bool {
+    stop.at_change(link.change()) || stop.at_decrease(link.chord.decrease, link.sum_of_squares)
 }
 
 /// Whether chords of these lengths go on to fall.

@@ -10,10 +10,9 @@
 
 use std::time::Instant;
 
-use super::equations::ObservationEquations;
-use super::options::{History, Iteration, NEGLIGIBLE, Phase};
-use super::result::{AdjustError, unless_stopped};
-use super::run::{Run, State, between};
+use super::options::{History, Iteration, NEGLIGIBLE};
+use super::result::AdjustError;
+use super::run::{Run, State};
 
 /// Steps that fall to no less than this part of the one before are corrected, and so are all after them.
 const SLOW: f64 = 0.5;
@@ -128,20 +127,15 @@ impl<'a> Run<'a, '_> {
         if !(factor.has_cached() && self.is_for_chord(iteration)) {
             return Ok(values);
         }
-        let (problem, start) = (self.problem, Instant::now());
-        let at = self.threads.install(|| problem.model.at(&values));
-        let equations = ObservationEquations::evaluated(problem, at, &self.datum, None);
-        let prior = problem.prior_equations(&problem.terms(&values), &self.datum);
-        let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let chord = problem.system.chord(self.threads, factor, (&equations, &prior), &mut between);
+        let start = Instant::now();
+        let (_, chord) = self.chord_at(state, &values)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
-        let (chord, decrease) = unless_stopped(chord)?;
-        let change = decrease.sqrt();
+        let change = chord.decrease.sqrt();
         if !History::is_chord(change, iteration.largest_change) {
             return Ok(values);
         }
         self.chord = Some(change);
-        Ok(problem.advanced(&values, &chord))
+        Ok(self.problem.advanced(&values, &chord.step))
     }
 
     fn is_for_chord(&self, step: &Iteration) -> bool {

@@ -25,6 +25,17 @@ pub struct ReducedRights<const C: usize = LANES> {
     pub(super) counts: (usize, usize),
 }
 
+/// A step with an older factor N = L L^T.
+#[derive(Debug)]
+pub struct Chord {
+    /// About N^-1 A^T l over all unknowns, in the order of the layout.
+    pub step: Vec<f64>,
+    /// y = L^-1 A^T l.
+    pub reduced: Vec<f64>,
+    /// y^T y: by how much it lowers the sum of squares of the equations.
+    pub decrease: f64,
+}
+
 impl<const C: usize> ReducedRights<C> {
     /// What is left for the outer unknowns, one right-hand side after the other.
     pub fn left(&self) -> Vec<f64> {
@@ -116,8 +127,7 @@ impl Elimination<'_> {
 }
 
 impl System {
-    /// About N^-1 A^T l over all unknowns, in the order of the layout, A and l of equations and priors at other values of the unknowns than those
-    /// that the factor comes from: a chord step; and by how much it lowers the sum of squares of the equations there.
+    /// The chord step to equations and priors at other values of the unknowns than those that the factor comes from.
     ///
     /// For a whole system, and a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]).
     pub fn chord(
@@ -126,11 +136,11 @@ impl System {
         factor: &Factor,
         of: (&dyn Equations, &Prior),
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, (Vec<f64>, f64)> {
-        let reduced = self.reduce_chord(threads, factor, of, &of.1.right, &mut *between)?;
-        let decrease = reduced.products[0];
-        let step = self.solve_reduced_rights(threads, factor, of, reduced, &[], between)?;
-        ControlFlow::Continue((step, decrease))
+    ) -> ControlFlow<Stopped, Chord> {
+        let rights = self.reduce_chord(threads, factor, of, &of.1.right, &mut *between)?;
+        let (reduced, decrease) = (rights.reduced(), rights.products[0]);
+        let step = self.solve_reduced_rights(threads, factor, of, rights, &[], between)?;
+        ControlFlow::Continue(Chord { step, reduced, decrease })
     }
 
     /// The right-hand side A^T l of equations and priors at other values than those that the factor comes from, with `rights` over all unknowns,

@@ -80,7 +80,7 @@ mod watch;
 mod workspace;
 
 pub use cofactors::{Cofactors, GroupCofactors};
-pub use columns::ReducedRights;
+pub use columns::{Chord, ReducedRights};
 pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
 pub use equation_block::LocalCofactors;
