@@ -9,7 +9,7 @@ import numpy as np
 from photogram.collection.result import AdjustedCollection
 from photogram.results.iteration_text import iteration_lines
 from photogram.results.network_tables import control, iterations, photos, stations
-from photogram.results.observation_rows import image_lines, observed_lines
+from photogram.results.observation_rows import image_lines, largest, observed_lines
 from photogram.results.report import first_sections, reliability_lines, suspects_section
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
@@ -80,11 +80,13 @@ def size_of(result: AdjustedCollection) -> list[tuple[str, str]]:
 
 
 def _photos(result: AdjustedCollection) -> list[str]:
-    own, count, values, sd = photos(result)
+    """List the photos; of very many those whose translations are the least certain."""
+    sizes = np.linalg.norm(result.photo_sd[:, 3:6], axis=1)
+    (own, count, values, sd), more = largest(photos(result), sizes, "standard deviations")
     rows = [[*field(own, 10, head="photo"), *field(count, 6, ".0f", "images"), *field(values, 14, ".6g")]]
     if np.isfinite(sd.values).any():
         rows.append([Field("", [f"{'sd':<16}"] * len(own.values)), *field(sd, 14, ".2g", "")])
-    return table_lines(*rows)
+    return [*table_lines(*rows), *more]
 
 
 def _points(result: AdjustedCollection) -> list[str]:
