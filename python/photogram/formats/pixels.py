@@ -69,8 +69,7 @@ def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
     InputError
         An empty cell.
     """
-    found = table.vectors(_NEEDED[2:])
-    table.check_given(found, _NEEDED[2:])
+    found = table.given(_NEEDED[2:])
     return found + 0.5 if pixel_origin == "center" else found
 
 

@@ -312,9 +312,7 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
     InputError
         Knots of a camera that has none there, or twice.
     """
-    table = tables.read("knots")
-    if table is None:
-        return list(cameras)
+    table = tables.rows("knots")
     splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
     values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
     seen = set[tuple[str, float, float]]()

@@ -240,12 +240,9 @@ class MarkReadings:
 
     def read(self, photos: Photos) -> None:
         """Read the readings of marks."""
-        table = self.tables.read("fiducial_images")
-        if table is None:
-            return
+        table = self.tables.rows("fiducial_images")
         names = ("column", "row") if "column" in table else ("x", "y")
-        xy = table.vectors(names)
-        table.check_given(xy, names)
+        xy = table.given(names)
         own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
         sd = self.tables.deviations(table, "fiducial_images", own)
         table.check_given(sd, own, "is empty: give sd, or [sd] fiducial_images")

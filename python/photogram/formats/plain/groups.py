@@ -79,9 +79,7 @@ def antennas(tables: Tables) -> dict[str, Antenna]:
     InputError
         A group that is there twice, other values of what has one name.
     """
-    table = tables.read("gnss_groups")
-    if table is None:
-        return {}
+    table = tables.rows("gnss_groups")
     values = {"lever": tables.vectors(table, [f"lever_{axis}" for axis in AXES], 0.0)}
     values |= {kind: table.vectors([f"{kind}_{axis}" for axis in AXES], 0.0) for kind in ("shift", "drift")}
     sd = {
@@ -120,9 +118,7 @@ def inertials(tables: Tables) -> dict[str, Inertial]:
     InputError
         A group that is there twice, other values of what has one name.
     """
-    table = tables.read("attitude_groups")
-    if table is None:
-        return {}
+    table = tables.rows("attitude_groups")
     # Both the photo and what carries it have axes as the settings say.
     matrices = tables.turns(table)
     sd = table.vectors(_ROTATIONS, math.inf, infinite=True, read=tables.angle)

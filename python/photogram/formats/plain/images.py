@@ -38,8 +38,7 @@ def read_images(tables: Tables, photos: Photos) -> Images:
     places = {name: row for row, name in enumerate(photos.names)}
     rows = indices_of(table, "photo", places | dict.fromkeys(photos.unused, len(places)), "photo")
     names = table.names("point")
-    xy = table.vectors((xs, ys))
-    table.check_given(xy, (xs, ys))
+    xy = table.given((xs, ys))
     _check_twice(table, rows, names.rows, len(names.names))
     keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
     sd = _image_sd(tables, table)

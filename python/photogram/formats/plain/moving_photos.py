@@ -150,14 +150,10 @@ def _on_rig(
 
 def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
     """Return the times of lines by the names of photos."""
-    table = tables.read("line_times")
-    if table is None:
-        return {}
+    table = tables.rows("line_times")
     places = {name: row for row, name in enumerate([*photos.names, *sorted(photos.unused)])}
     of_photos = indices_of(table, "photo", places, "photo")
-    columns = ("line", "time", "seconds_per_line")
-    values = table.vectors(columns)
-    table.check_given(values, columns)
+    values = table.given(("line", "time", "seconds_per_line"))
     found: dict[str, Lines] = {}
     for name, place in places.items():
         rows = np.flatnonzero(of_photos == place)

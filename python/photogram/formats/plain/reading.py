@@ -43,7 +43,6 @@ from photogram.formats.project import Project, Unused, assembled
 from photogram.formats.rigging import Stand, mounted
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import quoted
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed
 from photogram.network.observations import Control, Observation, of_records
@@ -260,7 +259,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     """
     names = table.names_once("point")
     values = table.vectors(AXES)
-    uses = [each.lower() for each in table.texts("use", "control")]
+    uses = table.words("use", _USES)
     sd = table.vectors(_SD, infinite=True)
     stray = ~np.isnan(sd) & np.isnan(values)
     if stray.any():
@@ -272,8 +271,6 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     else:
         sd = tables.deviations(table, "control", _SD)
     for row, use in enumerate(uses):
-        if use not in _USES:
-            raise table.error(row, f"column use: {quoted(use)} is none of {', '.join(_USES)}")
         if np.isnan(values[row]).all():
             raise table.error(row, f"{names[row]} has no coordinates")
         if use == "control" and (np.isnan(sd[row]) & ~np.isnan(values[row])).any():

@@ -37,9 +37,7 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
     InputError
         Cameras that are not there, sensors that are there twice, a first sensor with a pose.
     """
-    table = tables.read("rigs")
-    if table is None:
-        return {}
+    table = tables.rows("rigs")
     values, matrices = tables.vectors(table, AXES), tables.turns(table)
     lengths = table.vectors(deviation_columns(AXES), math.inf, infinite=True)
     angles = table.vectors(deviation_columns(ROTATIONS), math.inf, infinite=True, read=tables.angle)
@@ -96,9 +94,7 @@ def read_frames(
     InputError
         Rigs, photos and sensors that are not there, two photos of a sensor on one frame.
     """
-    table = tables.read("frames")
-    if table is None:
-        return []
+    table = tables.rows("frames")
     rows = indices_of(table, "photo", {name: row for row, name in enumerate(photos)}, "photo").tolist()
     found: dict[str, tuple[Rig, dict[str, int]]] = {}
     for row, (photo, frame, name, own) in enumerate(
@@ -124,8 +120,8 @@ def read_frames(
 
 def times_of_frames(tables: Tables) -> dict[str, float]:
     """Return when photos on frames were taken, of those that say it."""
-    table = tables.read("frames")
-    return {} if table is None else times_said(table.texts("photo"), table.numbers("time"))
+    table = tables.rows("frames")
+    return times_said(table.texts("photo"), table.numbers("time"))
 
 
 def times_said(photos: Sequence[str], times: Floats) -> dict[str, float]:
@@ -142,9 +138,7 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
     InputError
         Rigs and sensors that are not there, values that give no observation.
     """
-    table = tables.read("bases")
-    if table is None:
-        return []
+    table = tables.rows("bases")
     lengths = table.numbers("distance")
     sd = tables.deviations(table, "bases", ["sd"])[:, 0]
     table.check_given(np.column_stack([lengths, sd]), ("distance", "sd"))

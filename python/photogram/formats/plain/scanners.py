@@ -79,12 +79,9 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
     InputError
         Numbers that are none, a covariance of components that a scanner has not.
     """
-    table = tables.read("scanners")
-    if table is None:
-        return {}
+    table = tables.rows("scanners")
     names = table.names_once("scanner")
-    counts = table.vectors(("pitch_mm", "origin_column", "origin_row"))
-    table.check_given(counts, ("pitch_mm", "origin_column", "origin_row"))
+    counts = table.given(("pitch_mm", "origin_column", "origin_row"))
     given = np.column_stack([table.numbers(name, float(name in ("sx", "sy"))) for name in (*DEVICE, *CURVES)])
     sd = table.vectors([f"sd_{name}" for name in (*DEVICE, *CURVES)], 0.0, infinite=True)
     half = np.column_stack([table.numbers(name, 1.0) for name in ("hx", "hy")])
@@ -217,12 +214,10 @@ def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[st
     InputError
         Patterns and models that there are not, numbers that are none.
     """
-    table = tables.read("films")
+    table = tables.rows("films")
     found = {
         name: FilmKind(Roll(name, 0.0, 5e-4), default, (1e-4,) * 3, _bends(default), None) for name in names
     }
-    if table is None:
-        return found
     means, sd_means = table.numbers("m", 0.0), table.numbers("sd_m", 5e-4, infinite=True)
     size = np.column_stack(
         [table.numbers(f"sd_{name}", 1e-4, infinite=True) for name in ("photo_m", "b1", "b2")]

@@ -34,10 +34,8 @@ def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) ->
         Another word; a control point in vegetation.
     """
     found = []
-    for row, word in enumerate(table.texts("cover", COVERS[0])):
-        if word.lower() not in COVERS:
-            raise table.error(row, f"column cover: {quoted(word)} is none of {', '.join(COVERS)}")
-        if word.lower() == COVERS[0]:
+    for row, word in enumerate(table.words("cover", COVERS)):
+        if word == COVERS[0]:
             continue
         if uses[row] == "control":
             raise table.error(row, f"column cover: {names[row]} is control; only check points have a cover")
@@ -82,9 +80,7 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
 
 def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, Any], ...]:
     """Return the rows of the table of calibrated lengths."""
-    table = tables.read("lengths")
-    if table is None:
-        return ()
+    table = tables.rows("lengths")
     table.names("line")
     for end in _ENDS:
         indices_of(table, end, points, "point")

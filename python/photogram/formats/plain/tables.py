@@ -18,6 +18,7 @@ from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLE
 from photogram.formats.plain.settings import Settings
 from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
@@ -82,6 +83,14 @@ class Tables:
         metre = 1.0 / UNITS[self.settings.length]
         required = schema.needed(table.columns)
         return settled(table, given, known, metre, required, self.names, name, self.messages)
+
+    def rows(self, name: str) -> ColumnTable:
+        """Return a table, one without rows where there is none; errors as :meth:`read`."""
+        found = self.read(name)
+        if found is not None:
+            return found
+        path, columns = self.settings.path, TABLES[name].columns
+        return ColumnTable(path, Place(path), columns, 0, dict.fromkeys(columns, ()), ())
 
     def tell(self, text: str, path: Path | None = None) -> None:
         """Add a remark, on a file."""
