@@ -11,10 +11,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.carrying import carried, is_free
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.images import from_corner, to_corner
-from photogram.formats.intersection import intersected
+from photogram.formats.models import carried, intersected, is_free
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import WITH_SD, Settings

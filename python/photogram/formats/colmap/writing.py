@@ -26,8 +26,8 @@ from photogram.formats.colmap.content import (
 )
 from photogram.formats.colmap.text import text_files
 from photogram.formats.images import sizes_of, to_corner
-from photogram.formats.intersection import complete_positions
 from photogram.formats.lenses import lens_of
+from photogram.formats.models import complete_positions
 from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size

@@ -12,8 +12,7 @@ from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import conformal, is_mirrored, mirror_message, side_residuals, true_places
 from photogram.film.marks import which_mark
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.images import Images
-from photogram.formats.plain.photos import Photos
+from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import FALSE, TRUE, ColumnTable

@@ -109,9 +109,7 @@ def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Obse
 
 
 def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.read("velocities")
-    if table is None:
-        return []
+    table = tables.rows("velocities")
     of = subjects.of(tables, table)
     measured = _measured(tables, table, "velocities", VELOCITY)
     groups = grouped(tables, table, antennas(tables), "gnss_groups")
@@ -140,18 +138,14 @@ def _used(
 
 def _measured(tables: Tables, table: ColumnTable, name: str, columns: Sequence[str]) -> tuple[Floats, Floats]:
     """Return (rows, 3) what was observed, and (rows, 3, 3) covariances."""
-    values = table.vectors(columns)
-    table.check_given(values, columns)
-    names = deviation_columns(columns)
+    values, names = table.given(columns), deviation_columns(columns)
     sd = tables.deviations(table, name, names)
     table.check_given(sd, names, f"is empty: give it, or {name} under [sd]")
     return values, covariances_of(sd, table, columns)
 
 
 def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.read("rates")
-    if table is None:
-        return []
+    table = tables.rows("rates")
     of = subjects.of(tables, table)
     values, covariances = _measured(tables, table, "rates", RATE)
     # About axes that point as those of photos do.
@@ -164,19 +158,14 @@ def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
 
 
 def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.read("attitudes")
-    if table is None:
-        return []
+    table = tables.rows("attitudes")
     of = subjects.of(tables, table)
-    matrices = tables.matrices(table)
     given_sd = tables.settings.sd.get("attitudes")
     sd = table.vectors(_ROTATIONS, read=tables.angle)
     if given_sd is not None:
         sd = np.where(np.isnan(sd), [tables.angle(repr(each)) for each in given_sd], sd)
     table.check_given(sd, _ROTATIONS, "is empty: give it, or attitudes under [sd]")
-    unknown = np.isnan(matrices).any(axis=(1, 2))
-    if unknown.any():
-        raise table.error(int(np.argmax(unknown)), "there is no attitude")
+    matrices = tables.known_matrices(table, "there is no attitude")
     covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
     return [
@@ -186,20 +175,14 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
 
 
 def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observation]:
-    table = tables.read("relative_poses")
-    if table is None:
-        return []
-    names = list(photos)
+    table, names = tables.rows("relative_poses"), list(photos)
     first, second = (indices_of(table, column, photos, "photo").tolist() for column in ("from", "to"))
-    vectors, turns = tables.vectors(table, AXES), tables.turns(table)
-    table.check_given(vectors, AXES)
+    vectors = table.given(AXES) @ tables.flip
     lengths = tables.deviations(table, "relative_poses", deviation_columns(AXES))
     angles = table.vectors(_ROTATIONS, read=tables.angle)
     sd = np.column_stack([lengths, angles])
     table.check_given(sd, deviation_columns(POSE))
-    covariances = tables.pose_covariances(table, sd)
-    for row in np.flatnonzero(np.isnan(turns).any(axis=(1, 2))).tolist():
-        raise table.error(row, "there are no angles")
+    covariances, turns = tables.pose_covariances(table, sd), tables.flip @ tables.known_matrices(table)
     given = zip(first, second, vectors, turns, covariances, strict=True)
     return [
         made(table, row, partial(Relative, names[one], names[other], vector, turn, covariance=covariance))

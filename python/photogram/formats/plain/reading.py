@@ -26,10 +26,16 @@ from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_p
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.film_readings import Seen
 from photogram.formats.plain.films import on_film, read_scanned
-from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving_photos import placed, read_timed
 from photogram.formats.plain.observed_poses import read_observations
-from photogram.formats.plain.photos import Photos, read_photos
+from photogram.formats.plain.photos import (
+    Images,
+    Photos,
+    image_coordinates,
+    read_images,
+    read_photos,
+    sd_is_given,
+)
 from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
 from photogram.formats.plain.schema import AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams

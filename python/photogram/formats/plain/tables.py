@@ -134,6 +134,14 @@ class Tables:
             found[known] = matrices_of(self.settings, values[known])
         return found
 
+    def known_matrices(self, table: ColumnTable, why: str = "there are no angles") -> Floats:
+        """Return (rows, 3, 3) attitudes A, photo to object; a row without one is an error."""
+        found = self.matrices(table)
+        unknown = np.isnan(found).any(axis=(1, 2))
+        if unknown.any():
+            raise table.error(int(np.argmax(unknown)), why)
+        return found
+
     @property
     def radians(self) -> float:
         """What a number of the unit of angles is in radians, for covariances."""

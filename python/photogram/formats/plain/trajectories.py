@@ -109,10 +109,7 @@ def _turned(
     """Return (k,) times and (k, 3, 3) attitudes of each trajectory that a table has; `flip`: of no photo."""
     table = tables.rows(name)
     groups = _rows_of(table, places)
-    times, matrices = _times(table, groups), tables.matrices(table)
-    unknown = np.isnan(matrices).any(axis=(1, 2))
-    if unknown.any():
-        raise table.error(int(np.argmax(unknown)), "there are no angles")
+    times, matrices = _times(table, groups), tables.known_matrices(table)
     if flip is not None:
         matrices = matrices @ flip
     return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
