@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
-from photogram.formats.images import from_corner, to_corner
+from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
@@ -117,10 +117,7 @@ def read(path: Path, wishes: Wishes) -> Project:
                 "coordinates below 0 say that the middle of the first pixel is 0, 0: --pixel-origin center"
             )
         )
-    xy = corner.copy()
-    for row, camera in enumerate(cameras.cameras):
-        own = which == row
-        xy[own] = from_corner(camera, cameras.sizes[row], corner[own])
+    xy = by_camera(corner, which, lambda row, own: from_corner(cameras.cameras[row], cameras.sizes[row], own))
     keep = table.flags("use")
     if not keep.all():
         messages.append(Message(f"{np.count_nonzero(~keep)} images are not used", path))

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
-from photogram.formats.images import from_corner, to_corner
+from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.models import carried, intersected, is_free
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
@@ -249,11 +249,8 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
     new = [name for name in names.names if name not in known]
     known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
     points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
-    corner = corner_of(table, pixel_origin)
-    xy = corner.copy()
-    for row, camera in enumerate(block.cameras):
-        own = block.photo_cameras[photos] == row
-        xy[own] = from_corner(camera, project.sizes[row], corner[own])
+    corner, which = corner_of(table, pixel_origin), block.photo_cameras[photos]
+    xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], project.sizes[row], own))
     fill = np.full((len(new), 3), np.nan)
     default = float(np.median(block.image_sd)) if len(block.image_sd) else 1.0
     sd = np.column_stack([table.numbers("sd", default)] * 2)

@@ -8,7 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import deviation_columns
+from photogram.formats.plain.schema import BENDS, PITCHES, deviation_columns
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
 from photogram.network.block import Block
@@ -22,8 +22,6 @@ REGULARISED = "regularise"
 """The detail, and the column of boards, of the weak priors that a calibration adds to its cameras."""
 TIMES = "times of photos on frames"
 """The detail: seconds by the clocks of cameras, by the names of photos of a board."""
-BENDS = ("bend_x", "bend_y")
-_LENGTHS = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
 
 
 def read_boards(tables: Tables) -> dict[str, Board]:
@@ -53,9 +51,9 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
         # Their places are those of the control, which is read later.
         given["points"] = np.zeros((0, 3))
         return Board(**given)
-    lengths = {name: float(table.numbers(name)[row]) for name in _LENGTHS}
+    lengths = {name: float(table.numbers(name)[row]) for name in PITCHES}
     given |= {name: int(table.numbers(name, 0.0)[row]) for name in ("columns", "rows")}
-    given |= {name: lengths[name] for name in _LENGTHS[2:] if not np.isnan(lengths[name])}
+    given |= {name: lengths[name] for name in PITCHES[2:] if not np.isnan(lengths[name])}
     if "tag_size" not in given:
         given["spacing"] = lengths["spacing_x"], lengths["spacing_y"]
     return made(table, row, lambda: Board(**given))
@@ -107,9 +105,9 @@ def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | No
     columns: dict[str, Any] = {"board": [*boards], "kind": [own.kind for own in each]}
     for name in ("columns", "rows"):
         columns[name] = [None if own is None else getattr(own, name) for own in grids]
-    for k, name in enumerate(_LENGTHS[:2]):
+    for k, name in enumerate(PITCHES[:2]):
         columns[name] = [None if own is None or own.tag_size else own.pitch[k] for own in grids]
-    for name in _LENGTHS[2:]:
+    for name in PITCHES[2:]:
         columns[name] = [getattr(own, name) for own in each]
     columns["shape"] = [own.shape or "" for own in each]
     if regularise:

@@ -27,11 +27,12 @@ from photogram.formats.plain.groups import (
 from photogram.formats.plain.observation_tables import kind_tables, read_kinds
 from photogram.formats.plain.rigs import Rigs, read_bases
 from photogram.formats.plain.schema import (
-    ANGLES,
     AXES,
+    OPK,
     POSE,
     RATE,
     ROTATIONS,
+    SD_ROTATIONS,
     VELOCITY,
     deviation_columns,
 )
@@ -54,8 +55,6 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity
 
-_ROTATIONS = deviation_columns(ROTATIONS)
-_ANGLES = ANGLES["omega_phi_kappa"]
 _Columns = dict[str, dict[str, Any]]
 _Kind = TypeVar("_Kind", bound=Observation)
 _Group = TypeVar("_Group", Antenna, Inertial)
@@ -161,10 +160,10 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
     table = tables.rows("attitudes")
     of = subjects.of(tables, table)
     given_sd = tables.settings.sd.get("attitudes")
-    sd = table.vectors(_ROTATIONS, read=tables.angle)
+    sd = table.vectors(SD_ROTATIONS, read=tables.angle)
     if given_sd is not None:
         sd = np.where(np.isnan(sd), [tables.angle(repr(each)) for each in given_sd], sd)
-    table.check_given(sd, _ROTATIONS, "is empty: give it, or attitudes under [sd]")
+    table.check_given(sd, SD_ROTATIONS, "is empty: give it, or attitudes under [sd]")
     matrices = tables.known_matrices(table, "there is no attitude")
     covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
@@ -179,7 +178,7 @@ def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observati
     first, second = (indices_of(table, column, photos, "photo").tolist() for column in ("from", "to"))
     vectors = table.given(AXES) @ tables.flip
     lengths = tables.deviations(table, "relative_poses", deviation_columns(AXES))
-    angles = table.vectors(_ROTATIONS, read=tables.angle)
+    angles = table.vectors(SD_ROTATIONS, read=tables.angle)
     sd = np.column_stack([lengths, angles])
     table.check_given(sd, deviation_columns(POSE))
     covariances, turns = tables.pose_covariances(table, sd), tables.flip @ tables.known_matrices(table)
@@ -255,7 +254,7 @@ def _inertial_tables(block: Block) -> _Columns:
     found: _Columns = {}
     if attitudes:
         angles = angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)
-        turned = _written(attitudes, _ANGLES, angles, ROTATIONS, (DEGREE,) * 3)
+        turned = _written(attitudes, OPK, angles, ROTATIONS, (DEGREE,) * 3)
         found["attitudes"] = subject_columns(attitudes, block) | turned
     if rates:
         values = np.array([each.observed[:3] for each in rates])
@@ -280,4 +279,4 @@ def _pose_tables(block: Block) -> _Columns:
     )
     units = (1.0,) * 3 + (DEGREE,) * 3
     ends = {"from": [each.first for each in poses], "to": [each.second for each in poses]}
-    return {"relative_poses": ends | _written(poses, (*AXES, *_ANGLES), values, POSE, units)}
+    return {"relative_poses": ends | _written(poses, (*AXES, *OPK), values, POSE, units)}

@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.images import from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, deviation_columns
+from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, SD_AXES, deviation_columns
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
@@ -21,7 +21,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import listed, quoted
 from photogram.network.observations import Attitude, Observation
 
-_SD = deviation_columns(AXES)
 _OF_IMAGES = ("sd", "sd_column", "sd_row", "sd_x", "sd_y")
 
 
@@ -56,8 +55,8 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     use = table.flags("use")
     centres = table.vectors(AXES)
     flown = np.array([bool(each) for each in table.texts("trajectory")], dtype=bool)
-    sd = tables.deviations(table, "photos", _SD, math.inf)
-    sd[flown] = table.vectors(_SD, math.inf, infinite=True)[flown]
+    sd = tables.deviations(table, "photos", SD_AXES, math.inf)
+    sd[flown] = table.vectors(SD_AXES, math.inf, infinite=True)[flown]
     weighted = np.isfinite(sd) & np.isnan(centres)
     if weighted.any():
         row, axis = np.argwhere(weighted)[0].tolist()

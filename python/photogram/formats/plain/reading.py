@@ -37,7 +37,7 @@ from photogram.formats.plain.photos import (
     sd_is_given,
 )
 from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
-from photogram.formats.plain.schema import AXES
+from photogram.formats.plain.schema import AXES, SD_AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
@@ -60,7 +60,6 @@ LEVELS = "no standard deviation of an image of level 0: 1 px is assumed (--sd im
 """What is told of images whose table has levels alone."""
 DIFFER = 1e-6
 """What the positions of a point in two tables may differ by."""
-_SD = tuple(f"sd_{axis}" for axis in AXES)
 _USES = ("control", "check", "off")
 
 
@@ -266,16 +265,15 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     names = table.names_once("point")
     values = table.vectors(AXES)
     uses = table.words("use", _USES)
-    sd = table.vectors(_SD, infinite=True)
+    sd = table.vectors(SD_AXES, infinite=True)
     stray = ~np.isnan(sd) & np.isnan(values)
     if stray.any():
         row, k = np.argwhere(stray)[0].tolist()
-        raise table.error(row, f"column {_SD[k]}: there is a standard deviation, but no {AXES[k]}")
+        raise table.error(row, f"column {SD_AXES[k]}: there is a standard deviation, but no {AXES[k]}")
     check = np.array([each == "check" for each in uses], dtype=bool)[:, np.newaxis]
+    sd = tables.deviations(table, "control", SD_AXES)
     if "check" in tables.settings.sd:
-        sd = np.where(check, tables.deviations(table, "check", _SD), tables.deviations(table, "control", _SD))
-    else:
-        sd = tables.deviations(table, "control", _SD)
+        sd = np.where(check, tables.deviations(table, "check", SD_AXES), sd)
     for row, use in enumerate(uses):
         if np.isnan(values[row]).all():
             raise table.error(row, f"{names[row]} has no coordinates")
@@ -332,7 +330,7 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
     if table is not None:
         rows = np.array([places[name] for name in own], dtype=np.int64)
         given = table.vectors(AXES)
-        own_sd = tables.deviations(table, "points", _SD, math.inf)
+        own_sd = tables.deviations(table, "points", SD_AXES, math.inf)
         given, _ = transform.positions("points", given, None, table)
         starts[rows] = given
         held: Bools = np.asarray(np.isfinite(own_sd).any(axis=1))

@@ -11,10 +11,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
+from photogram.formats.plain.schema import AXES, OPK, POSE, ROTATIONS, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of
 from photogram.formats.rigging import FrameOf, Rig
+from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
@@ -22,7 +23,6 @@ from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
-_ANGLES = ANGLES["omega_phi_kappa"]
 FRAME = "frame itself"
 """What the first sensor of a rig is called where sensors have names of their own."""
 ZERO = 1e-6
@@ -102,10 +102,8 @@ def read_frames(
     ):
         if name not in rigs:
             raise table.error(row, f"column rig: there is no rig {quoted(name)}")
-        rig, sensor = rigs[name], own or cameras[photo]
-        if sensor != rig.reference and sensor not in rig.sensors:
-            what = "sensor" if own else "camera"
-            raise table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+        rig = rigs[name]
+        sensor = sensor_of(table, row, rig, own, cameras[photo])
         _, members = found.setdefault(frame, (rig, {}))
         if found[frame][0] is not rig or sensor in members:
             what = "sensor" if own else "camera"
@@ -116,6 +114,21 @@ def read_frames(
             )
         members[sensor] = photo
     return [FrameOf(name, rig, members) for name, (rig, members) in found.items()]
+
+
+def sensor_of(table: ColumnTable, row: int, rig: Rig, own: str, camera: str) -> str:
+    """Return what a rig calls the sensor of a photo: as the row says, else as the camera.
+
+    Raises
+    ------
+    InputError
+        The rig does not have it.
+    """
+    sensor = own or camera
+    if sensor != rig.reference and sensor not in rig.sensors:
+        what = "sensor" if own else "camera"
+        raise table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+    return sensor
 
 
 def times_of_frames(tables: Tables) -> dict[str, float]:
@@ -318,6 +331,6 @@ def _poses(sensors: Sequence[Sensor | None], block: Block) -> dict[str, Any]:
     sd[:, 3:] = np.degrees(sd[:, 3:])
     return {
         **columns_of(AXES, values),
-        **columns_of(_ANGLES, angles),
+        **columns_of(OPK, angles),
         **columns_of(deviation_columns(POSE), sd),
     }

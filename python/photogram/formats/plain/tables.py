@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 
+_Named = TypeVar("_Named")
 DEGREE = 180 / np.pi
 """Of a radian."""
 
@@ -270,6 +271,21 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
         row = int(np.flatnonzero(found.rows == missing)[0])
         raise table.error(row, f"column {column}: there is no {kind} {quoted(found.names[missing])}")
     return rows[found.rows]
+
+
+def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind: str) -> list[_Named | None]:
+    """Return which of the named things each row names; None where the cell is empty.
+
+    Raises
+    ------
+    InputError
+        A name that is not there.
+    """
+    names = table.texts(column)
+    for row, name in enumerate(names):
+        if name and name not in known:
+            raise table.error(row, f"column {column}: there is no {kind} {quoted(name)}")
+    return [known.get(name) for name in names]
 
 
 def vectors_of(

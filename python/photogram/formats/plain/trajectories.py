@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import AXES, BASES, FACTORS, VELOCITY, deviation_columns
+from photogram.formats.plain.schema import AXES, BASES, FACTORS, SD_AXES, VELOCITY
 from photogram.formats.plain.tables import Tables, covariances_of, indices_of, vectors_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import replace
@@ -29,7 +29,6 @@ from photogram.network.trajectories import (
     Trajectory,
 )
 
-_SD = deviation_columns(AXES)
 _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
     "body_rotations",
@@ -241,7 +240,7 @@ class _Bases:
         table = self.coefficients
         values, deviations = np.zeros((count, 3)), np.full((count, 3), sd)
         numbers = table.numbers("k")[rows]
-        given, own = table.vectors(AXES, 0.0)[rows], table.vectors(_SD, infinite=True)[rows]
+        given, own = table.vectors(AXES, 0.0)[rows], table.vectors(SD_AXES, infinite=True)[rows]
         seen: set[int] = set()
         for row, number, value, each in zip(rows.tolist(), numbers.tolist(), given, own, strict=True):
             if number not in range(count):
@@ -249,7 +248,7 @@ class _Bases:
             if number in seen:
                 raise table.error(row, f"the coefficient {number:g} is there twice")
             if (each < 0).any():
-                raise table.error(row, f"column {_SD[int(np.argmax(each < 0))]}: is negative")
+                raise table.error(row, f"column {SD_AXES[int(np.argmax(each < 0))]}: is negative")
             seen.add(number)
             values[int(number)] = value * self.unit
             deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
@@ -266,8 +265,8 @@ def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> l
     """
     table = tables.rows("smoothness")
     groups = _rows_of(table, {name: row for row, name in enumerate(trajectories)}, bases=True)
-    sd = tables.deviations(table, "smoothness", _SD)
-    table.check_given(sd, _SD)
+    sd = tables.deviations(table, "smoothness", SD_AXES)
+    table.check_given(sd, SD_AXES)
     observed, covariances = table.vectors(AXES, 0.0), covariances_of(sd, table)
     factors, first = table.vectors(FACTORS), table.numbers("k")
     found: dict[int, Observation] = {}
