@@ -23,6 +23,7 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
 from photogram.io.delimited import ColumnTable
+from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
@@ -254,7 +255,7 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
     fill = np.full((len(new), 3), np.nan)
     default = float(np.median(block.image_sd)) if len(block.image_sd) else 1.0
     sd = np.column_stack([table.numbers("sd", default)] * 2)
-    try:
+    with at_place(Place(path)):
         larger = block.replace(
             point_ids=[*block.point_ids, *new],
             point_positions=np.vstack([block.point_positions, fill]),
@@ -265,8 +266,6 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
             image_xy=np.vstack([block.image_xy, xy]),
             image_sd=np.vstack([block.image_sd, sd]),
         )
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
     return project.replace(block=larger, starts=np.vstack([project.starts, fill]))
 
 
