@@ -32,9 +32,7 @@ def read_boards(tables: Tables) -> dict[str, Board]:
     InputError
         A kind or shape that there is not, what is no board, more than one.
     """
-    table = tables.read("boards")
-    if table is None or not table.count:
-        return {}
+    table = tables.rows("boards")
     if table.count > 1:
         raise table.error(1, "several boards: those fixed to each other are one of the kind points")
     return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
@@ -67,8 +65,8 @@ def read_regularised(tables: Tables) -> str | None:
     InputError
         Another word.
     """
-    table = tables.read("boards")
-    if table is None or not table.count:
+    table = tables.rows("boards")
+    if not table.count:
         return None
     word = table.texts(REGULARISED)[0]
     if word and word not in get_args(Regularisation):
@@ -84,8 +82,8 @@ def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
     InputError
         A standard deviation that is none.
     """
-    table = tables.read("boards")
-    if table is None or all(each.shape != "bend" for each in boards.values()):
+    table = tables.rows("boards")
+    if all(each.shape != "bend" for each in boards.values()):
         return []
     values = np.nan_to_num(table.vectors(BENDS))
     sd = table.vectors(deviation_columns(BENDS), np.inf, infinite=True)

@@ -220,9 +220,7 @@ def _named(table: ColumnTable, common: _Common, known: dict[str, Unknown]) -> li
 
 
 def _commons(tables: Tables, transform: Transform, common: _Common) -> dict[str, Unknown]:
-    table = tables.read(common.table)
-    if table is None:
-        return {}
+    table = tables.rows(common.table)
     table.names(common.column)
     given: dict[str, Floats] = {}
     for name, columns in common.values.items():
