@@ -8,8 +8,8 @@ import pytest
 from moving_blocks import rolling, scanned
 from photogram import InputError, adjust, formats, predict
 from photogram.absolute_orientation import relative_model
-from photogram.formats.carrying import is_free
 from photogram.formats.format_coordinates import in_pixels, in_topocentric
+from photogram.formats.models import is_free
 from photogram.formats.project import Repeated
 from photogram.formats.registry import FORMATS, cannot_hold, to_files
 from photogram.formats.supplements import repeated_remarks

@@ -39,7 +39,7 @@ def test_a_round_trip_keeps_the_geometry(tmp_path, name):
 
 def agreement_of_all(project):
     """Return the median residual with all points intersected."""
-    from photogram.formats.intersection import complete_positions
+    from photogram.formats.models import complete_positions
 
     return agreement(project.replace(starts=complete_positions(project))).median
 

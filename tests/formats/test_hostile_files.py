@@ -4,6 +4,7 @@ import json
 import shutil
 import time
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from photogram.io.delimited import read_columns
 from photogram.network.directions import without_lenses
 from photogram.network.similarity import similarity
 
-EXAMPLE = formats.__path__[0].replace("formats", "examples/project")
+EXAMPLE = Path(formats.__path__[0]).with_name("examples") / "project"
 
 
 def packed(path, content, kind=zipfile.ZIP_DEFLATED):

@@ -23,6 +23,7 @@ from photogram.errors import InputError
 from photogram.formats.cards import Card, cards, has_suffix, one_file
 from photogram.formats.format import Format, Wishes
 from photogram.formats.project import Project, Size, assembled
+from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
@@ -97,10 +98,8 @@ def _cameras(path: Path, found: _Found) -> None:
         size = int(columns), int(rows)
         if name in found.cameras or min(*size, width, height) <= 0 or size != (columns, rows):
             raise head.place.error(f"the camera {name} is there twice, or its pictures have no size")
-        try:
+        with at_place(head.place):
             found.cameras[name] = Camera("brown_forward", values, name=f"camera {name}")
-        except InputError as error:
-            raise head.place.error(error.message) from None
         found.sizes[name] = size, width / columns
         told = "as such files have it" if c < 0 else "where such files have the negative of it"
         text = f"camera {name}: c stands there as {c:g}, {told}; the principal distance is {abs(c):g} mm"

@@ -46,6 +46,13 @@ class Card:
         )
 
 
+def filled_lines(path: Path) -> Iterator[Place]:
+    """Yield the lines of a file that are neither empty nor comments (`# ...`)."""
+    for record, line in enumerate(read_lines(path), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            yield Place(path, record, line)
+
+
 def cards(path: Path) -> Iterator[Card]:
     """Yield the lines of a file that are no comments (`C ...`), blank ones too."""
     for record, line in enumerate(read_lines(path), 1):

@@ -1,8 +1,13 @@
-"""Collections of photos, each with a camera f, k1, k2, as projects: Bundler and BAL."""
+"""Collections of photos, each with a camera f, k1, k2, as projects.
+
+Bundler has `bundle.out`, with the names of photos in `list.txt` beside it; problems of "Bundle Adjustment in
+the Large" have numbers for names.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +17,12 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
-from photogram.formats.intersection import complete_positions
+from photogram.formats.format import Format, Wishes
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size, assembled
+from photogram.io.files import read_lines
+from photogram.io.packed_numbers import pieces
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
@@ -22,14 +30,75 @@ from photogram.network.directions import image_directions
 if TYPE_CHECKING:
     from photogram.collection.collection import Collection
 
+FILE, LIST = "bundle.out", "list.txt"
+PROBLEM = "problem.txt"
+_FIRST = re.compile(
+    rb"[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+[0-9]+[ \t\r]*\n[ \t]*[0-9]+[ \t]+[0-9]+[ \t]+\S+[ \t]+\S+"
+)
+"""How a problem begins: three counts, and the first image."""
 
-def project_of(
-    found: Collection, path: Path, title: str, names: Sequence[str], messages: Sequence[Message] = ()
-) -> Project:
+
+def _begin(path: Path) -> bytes:
+    """Return how a file begins, unpacked; nothing of what is no file, or cannot be read."""
+    try:
+        return next(pieces(path), b"") if path.is_file() else b""
+    except InputError:
+        return b""
+
+
+def _place(path: Path) -> Path:
+    return path / FILE if path.is_dir() else path
+
+
+def _read_bundler(path: Path, wishes: Wishes) -> Project:
+    """Read a Bundle file of version 0.3, and the list of photos beside it."""
+    from photogram.collection.formats import bundler
+
+    del wishes
+    place = _place(path)
+    found = bundler.FORMAT.read(place, pieces(place))
+    count = len(found.photo_parameters)
+    names = [str(row) for row in range(count)]
+    beside = place.parent / LIST
+    if beside.is_file():
+        lines = [line.rsplit(" 0 ", 1)[0].strip() for line in read_lines(beside) if line.strip()]
+        if len(lines) != count:
+            raise InputError(f"names {len(lines)} photos, but {place.name} has {count}", file=beside)
+        if len(set(lines)) < count or not all(line.isprintable() for line in lines):
+            raise InputError("names a photo twice, or with characters that do not print", file=beside)
+        names = lines
+    return project_of(found, place, BUNDLER.title, names)
+
+
+def _write_bundler(project: Project) -> Mapping[str, bytes]:
+    """Return `bundle.out` and `list.txt`."""
+    from photogram.collection.formats import bundler
+
+    found, names = collection_of(project)
+    return {FILE: bundler.FORMAT.to_bytes(found), LIST: "".join(f"{name}\n" for name in names).encode()}
+
+
+def _read_bal(path: Path, wishes: Wishes) -> Project:
+    """Read a problem, packed by bzip2 or gzip or not; photos and points are called by their numbers."""
+    from photogram.collection.formats import bal
+
+    del wishes
+    found = bal.FORMAT.read(path, pieces(path))
+    return project_of(found, path, BAL.title, [str(row) for row in range(len(found.photo_parameters))])
+
+
+def _write_bal(project: Project) -> Mapping[str, bytes]:
+    """Return the file of a problem."""
+    from photogram.collection.formats import bal
+
+    return {PROBLEM: bal.FORMAT.to_bytes(collection_of(project)[0])}
+
+
+def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) -> Project:
     """Return the project of a collection; photos of which nothing is known (f is 0) are left out."""
     registered = found.photo_parameters[:, 6] != 0
     rows = np.flatnonzero(registered)
-    remarks = list(messages)
+    remarks = []
     if len(rows) < len(registered):
         lost = [names[row] for row in np.flatnonzero(~registered).tolist()]
         remarks.append(Message(f"{len(lost)} photos were not registered and are left out: {listed(lost, 4)}"))
@@ -158,3 +227,25 @@ def _moved(
         elif camera.model == "radial" and size is not None:
             found[own] = np.column_stack([found[own, 0] - size[0] / 2, size[1] / 2 - found[own, 1]])
     return found
+
+
+BUNDLER = Format(
+    name="bundler",
+    title="Bundle file",
+    recognises=lambda path: _begin(_place(path)).startswith(b"# Bundle file"),
+    read=_read_bundler,
+    write=_write_bundler,
+    files=(FILE, "*.out"),
+    cannot_hold=cannot_hold,
+    pixels=True,
+)
+BAL = Format(
+    name="bal",
+    title='problem of "Bundle Adjustment in the Large"',
+    recognises=lambda path: _FIRST.match(_begin(path)[:1000]) is not None,
+    read=_read_bal,
+    write=_write_bal,
+    files=(PROBLEM, "problem-*.txt", "*.bal"),
+    cannot_hold=cannot_hold,
+    pixels=True,
+)

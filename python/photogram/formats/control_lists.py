@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from photogram.formats.cards import filled_lines
 from photogram.formats.project import Project
 from photogram.io.delimited import ColumnTable
 from photogram.io.files import read_lines
@@ -78,12 +79,7 @@ def system_of(line: str, place: Place) -> str:
 
 
 def _of_text(path: Path) -> ControlList:
-    lines = [
-        Place(path, record, line)
-        for record, line in enumerate(read_lines(path), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    head, *rest = lines
+    head, *rest = filled_lines(path)
     crs = system_of((head.text or "").strip(), head)
     points: dict[str, tuple[str, str, str]] = {}
     places: dict[str, int] = {}

@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import heading_of
-from photogram.formats.intersection import intersected
+from photogram.formats.models import intersected
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project

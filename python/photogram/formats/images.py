@@ -5,15 +5,34 @@ What needs the size of the pictures of a camera, and does not know it, is an :cl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
 from photogram.network.cameras import Camera
+
+
+def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Floats]) -> Floats:
+    """Return (m, 2) image coordinates of which those of each camera are converted by themselves.
+
+    Parameters
+    ----------
+    xy
+        (m, 2) image coordinates.
+    which
+        (m,) the camera of each, by its row; -1: it stays as it is.
+    convert
+        Makes others of some, by the row of their camera.
+    """
+    found = xy.copy()
+    for row in np.unique(which[which >= 0]).tolist():
+        own = which == row
+        found[own] = convert(row, xy[own])
+    return found
 
 
 def from_corner(camera: Camera, size: Size | None, corner: Floats) -> Floats:
@@ -41,12 +60,10 @@ def to_corner(project: Project) -> Floats:
     block = project.block
     if block.image_unit != "px" or block.photo_cameras is None:
         raise InputError("images are in millimetres: they have no columns and rows")
-    found = block.image_xy.copy()
-    cameras = block.photo_cameras[block.image_photos]
-    for row, camera in enumerate(block.cameras):
-        own = cameras == row
-        found[own] = in_corner(camera, project.sizes[row], found[own])
-    return found
+    which = block.photo_cameras[block.image_photos]
+    return by_camera(
+        block.image_xy, which, lambda row, own: in_corner(block.cameras[row], project.sizes[row], own)
+    )
 
 
 def known_size(camera: Camera, size: Size | None) -> Size:

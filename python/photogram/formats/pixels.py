@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Format, Wishes
-from photogram.formats.images import from_corner, to_corner
+from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
@@ -69,8 +69,7 @@ def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
     InputError
         An empty cell.
     """
-    found = table.vectors(_NEEDED[2:])
-    table.check_given(found, _NEEDED[2:])
+    found = table.given(_NEEDED[2:])
     return found + 0.5 if pixel_origin == "center" else found
 
 
@@ -118,10 +117,7 @@ def read(path: Path, wishes: Wishes) -> Project:
                 "coordinates below 0 say that the middle of the first pixel is 0, 0: --pixel-origin center"
             )
         )
-    xy = corner.copy()
-    for row, camera in enumerate(cameras.cameras):
-        own = which == row
-        xy[own] = from_corner(camera, cameras.sizes[row], corner[own])
+    xy = by_camera(corner, which, lambda row, own: from_corner(cameras.cameras[row], cameras.sizes[row], own))
     keep = table.flags("use")
     if not keep.all():
         messages.append(Message(f"{np.count_nonzero(~keep)} images are not used", path))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io.places import Place
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
@@ -263,7 +263,7 @@ def assembled(
         angles[known] = Attitudes(matrices[known]).values(
             "omega_phi_kappa_photo_to_ground" if photo_to_ground else "omega_phi_kappa"
         )
-    try:
+    with at_place(place):
         block = Block(
             photo_ids=photo_ids,
             photo_positions=centres,
@@ -291,8 +291,6 @@ def assembled(
             spheroid=spheroid,
             photo_to_ground=photo_to_ground,
         )
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
     return Project(
         block=block,
         path=path,

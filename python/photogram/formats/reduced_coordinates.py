@@ -11,7 +11,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.format import Wishes
-from photogram.formats.intersection import complete_positions
+from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, assembled
 from photogram.formats.self_check import agreement

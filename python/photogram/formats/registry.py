@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from types import MappingProxyType
 
 from photogram.errors import InputError, PhotogramError
@@ -38,32 +38,35 @@ __all__ = [
 ]
 
 FORMATS: dict[str, Format] = {
-    name: import_module(f"photogram.formats.{name}").FORMAT
-    for name in (
-        "plain",
-        "colmap",
-        "colmap_text",
-        "opensfm",
-        "blocks_exchange",
-        "agisoft",
-        "bundler",
-        "bal",
-        "pixels",
-        "patb",
-        "bingo",
-        "dbat",
-        "aicon",
-        "giant",
-        "isis",
-        "targets",
-        "results",
+    each.name: each
+    for each in (
+        resolve_name(f"photogram.formats.{home}")
+        for home in (
+            "plain:FORMAT",
+            "colmap:FORMAT",
+            "colmap:TEXT",
+            "opensfm:FORMAT",
+            "blocks_exchange:FORMAT",
+            "agisoft:FORMAT",
+            "collections:BUNDLER",
+            "collections:BAL",
+            "pixels:FORMAT",
+            "patb:FORMAT",
+            "bingo:FORMAT",
+            "dbat:FORMAT",
+            "aicon:FORMAT",
+            "giant:FORMAT",
+            "isis:FORMAT",
+            "targets:FORMAT",
+            "results:FORMAT",
+        )
     )
 }
 """By name, in the order in which help lists them."""
 
 
 def _written(name: str, project: Project) -> Mapping[str, bytes]:
-    from photogram.formats.targets.cameras import rig_of_project
+    from photogram.formats.targets.calibrations import rig_of_project
     from photogram.targets.output.formats import CAMERA_FORMATS
 
     return CAMERA_FORMATS[name](rig_of_project(project))
@@ -83,7 +86,7 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
             recognises=lambda _: False,
             read=_unread,
             write=partial(_written, name),
-            cannot_hold=later("photogram.formats.targets.cameras", "lost_beside_cameras"),
+            cannot_hold=later("photogram.formats.targets.calibrations", "lost_beside_cameras"),
             pixels=True,
             geographic=True,
         )

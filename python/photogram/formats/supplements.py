@@ -11,10 +11,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.carrying import carried, is_free
 from photogram.formats.columns import PLAIN, Columns
-from photogram.formats.images import from_corner, to_corner
-from photogram.formats.intersection import intersected
+from photogram.formats.images import by_camera, from_corner, to_corner
+from photogram.formats.models import carried, intersected, is_free
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import WITH_SD, Settings
@@ -24,6 +23,7 @@ from photogram.formats.plain.transform import Transform
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
 from photogram.io.delimited import ColumnTable
+from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
@@ -250,15 +250,12 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
     new = [name for name in names.names if name not in known]
     known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
     points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
-    corner = corner_of(table, pixel_origin)
-    xy = corner.copy()
-    for row, camera in enumerate(block.cameras):
-        own = block.photo_cameras[photos] == row
-        xy[own] = from_corner(camera, project.sizes[row], corner[own])
+    corner, which = corner_of(table, pixel_origin), block.photo_cameras[photos]
+    xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], project.sizes[row], own))
     fill = np.full((len(new), 3), np.nan)
     default = float(np.median(block.image_sd)) if len(block.image_sd) else 1.0
     sd = np.column_stack([table.numbers("sd", default)] * 2)
-    try:
+    with at_place(Place(path)):
         larger = block.replace(
             point_ids=[*block.point_ids, *new],
             point_positions=np.vstack([block.point_positions, fill]),
@@ -269,8 +266,6 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
             image_xy=np.vstack([block.image_xy, xy]),
             image_sd=np.vstack([block.image_sd, sd]),
         )
-    except InputError as error:
-        raise InputError(error.message, file=path) from None
     return project.replace(block=larger, starts=np.vstack([project.starts, fill]))
 
 

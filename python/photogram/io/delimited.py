@@ -297,6 +297,12 @@ class ColumnTable:
         found = [self.numbers(each, default, infinite=infinite, read=read) for each in columns]
         return np.stack(found, axis=1)
 
+    def given(self, columns: Sequence[str], why: str = "is empty") -> Floats:
+        """Return (rows, k) k columns of numbers, none of which may be missing; see :meth:`check_given`."""
+        found = self.vectors(columns)
+        self.check_given(found, columns, why)
+        return found
+
     def check_given(self, values: Floats, columns: Sequence[str], why: str = "is empty") -> None:
         """Refuse NaN among (rows, k) numbers of some columns.
 
@@ -309,6 +315,20 @@ class ColumnTable:
         if len(missing):
             row, column = missing[0].tolist()
             raise self.error(row, f"column {columns[column]}: {why}")
+
+    def words(self, column: str, known: Sequence[str], default: str | None = None) -> list[str]:
+        """Return a column of some known words in small letters; empty cells have the default, or the first.
+
+        Raises
+        ------
+        InputError
+            Another word.
+        """
+        found = [each.lower() for each in self.texts(column, known[0] if default is None else default)]
+        for row, word in enumerate(found):
+            if word not in known:
+                raise self.error(row, f"column {column}: {quoted(word)} is none of {', '.join(known)}")
+        return found
 
     def flags(self, column: str) -> Bools:
         """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true.

@@ -12,6 +12,7 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
+from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.rotations import Y_DOWN, checked_rotation
 from photogram.formats.xml_stream import Element, read_stream
@@ -237,8 +238,7 @@ class _Positions:
 
     def carried(self, xyz: Floats, sd: Floats) -> tuple[Floats, Floats]:
         """Return positions and covariances in the frame."""
-        covariances = np.zeros((len(xyz), 3, 3))
-        covariances[:, range(3), range(3)] = sd**2
+        covariances = covariances_of(sd)
         if self.frame.kind == "cartesian" or not len(xyz):
             return xyz, covariances
         from photogram.formats.crs import to_frame

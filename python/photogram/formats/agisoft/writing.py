@@ -13,6 +13,7 @@ from photogram.formats.agisoft import FILE
 from photogram.formats.block_contents import correlated_control, lost_observations, posed
 from photogram.formats.images import to_corner
 from photogram.formats.lenses import lens_of
+from photogram.formats.plain.tables import covariances_of
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Frame, Project, Size
 from photogram.formats.rotations import Y_DOWN
@@ -206,11 +207,10 @@ def _markers(project: Project, world: _World) -> list[str]:
     if not rows:
         return []
     positions, sd = block.point_positions[rows].copy(), block.point_sd[rows]
-    covariances = np.zeros((len(rows), 3, 3))
     checks: Bools = np.asarray(~np.isfinite(sd).any(axis=1))
     if block.point_check_sd is not None:
         sd = np.where(checks[:, np.newaxis], block.point_check_sd[rows], sd)
-    covariances[:, range(3), range(3)] = np.where(np.isfinite(sd), sd, 0.0) ** 2
+    covariances = covariances_of(np.where(np.isfinite(sd), sd, 0.0))
     for k, row in enumerate(rows):
         if (each := full.get(block.point_ids[row])) is not None:
             positions[k], covariances[k], checks[k] = each.observed, each.precision, False

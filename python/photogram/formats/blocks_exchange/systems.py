@@ -9,6 +9,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
+from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame
 from photogram.formats.xml_stream import Element
 from photogram.lazy_dataclasses import dataclass
@@ -125,11 +126,9 @@ class Systems:
                     text = "a part of a position cannot be carried into another system"
                     raise points[row].place.error(text)
             deviation = np.array([np.zeros(3) if points[row].sd is None else points[row].sd for row in rows])
-            covariances = np.zeros((len(rows), 3, 3))
-            covariances[:, range(3), range(3)] = np.nan_to_num(deviation) ** 2
-            found, turned = given.copy(), covariances
+            found, turned = given.copy(), covariances_of(np.nan_to_num(deviation))
             if whole.any():
-                found[whole], turned[whole] = self._carried(srs, given[whole], covariances[whole])
+                found[whole], turned[whole] = self._carried(srs, given[whole], turned[whole])
             for k, row in enumerate(rows):
                 each = points[row]
                 starts[row] = found[k]

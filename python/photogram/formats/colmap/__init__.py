@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from photogram.formats.colmap.reading import TITLE, place_of, read
-from photogram.formats.colmap.writing import cannot_hold, covariance_files, write
+from photogram.formats.colmap.writing import cannot_hold, covariance_files, write, write_as_text
 from photogram.formats.format import Format
 
-__all__ = ["FORMAT"]
-
+__all__ = ["FORMAT", "TEXT"]
 
 FORMAT = Format(
     name="colmap",
@@ -20,3 +19,13 @@ FORMAT = Format(
     results=covariance_files,
     folders=("sparse",),
 )
+TEXT = Format(
+    name="colmap_text",
+    title=f"{TITLE} as text",
+    recognises=lambda _: False,
+    read=read,
+    write=write_as_text,
+    cannot_hold=cannot_hold,
+    pixels=True,
+)
+"""For writing: what is text is read, and recognised, by the other one."""

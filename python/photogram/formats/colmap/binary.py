@@ -10,23 +10,12 @@ from typing import TypeVar
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.formats.colmap.content import (
-    CAMERA,
-    IMU,
-    MODELS,
-    Camera,
-    Frame,
-    Images,
-    Model,
-    Points,
-    Pose,
-    Rig,
-)
+from photogram.formats.colmap import content
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 
 _Made = TypeVar("_Made")
-_SENSORS = {0: CAMERA, 1: IMU}
+_SENSORS = {0: content.CAMERA, 1: content.IMU}
 _NUMBERS = {name: number for number, name in _SENSORS.items()}
 _FEATURE = np.dtype([("xy", "<f8", 2), ("point", "<u8")])
 _POINT = np.dtype(
@@ -68,10 +57,10 @@ class _Reader:
             raise self.place.error(f"announces {number} {what} of {least} bytes at least; {left} are left")
         return number
 
-    def pose(self) -> Pose:
+    def pose(self) -> content.Pose:
         """Return a quaternion and a translation."""
         values = self.take("7d")
-        return Pose(values[:4], values[4:])
+        return content.Pose(values[:4], values[4:])
 
     def sensor(self) -> tuple[str, int]:
         """Return the type and the number of a sensor."""
@@ -93,7 +82,7 @@ class _Reader:
             raise self.place.error(f"has {len(self.data) - self.at} bytes beyond the last record")
 
 
-def read_binary(folder: Path) -> Model:
+def read_binary(folder: Path) -> content.Model:
     """Read a model."""
     paths = {name: folder / f"{name}.bin" for name in ("cameras", "images", "points3D", "rigs", "frames")}
     cameras = _Reader(paths["cameras"]).records(24, "cameras", _camera)
@@ -101,22 +90,22 @@ def read_binary(folder: Path) -> Model:
     points = _points(_Reader(paths["points3D"]))
     rigs = _Reader(paths["rigs"]).records(8, "rigs", _rig) if paths["rigs"].is_file() else []
     frames = _Reader(paths["frames"]).records(68, "frames", _frame) if paths["frames"].is_file() else []
-    return Model(folder, cameras, images, points, rigs, frames)
+    return content.Model(folder, cameras, images, points, rigs, frames)
 
 
-def _camera(reader: _Reader) -> Camera:
+def _camera(reader: _Reader) -> content.Camera:
     place = reader.place
     number, model, width, height = (int(each) for each in reader.take("IiQQ"))
-    if not 0 <= model < len(MODELS):
+    if not 0 <= model < len(content.MODELS):
         raise place.error(
             f"camera {number} has a model of the number {model}, which is not known: what follows cannot be"
             " read"
         )
-    name, count = MODELS[model]
-    return Camera(number, name, width, height, reader.take(f"{count}d"), place)
+    name, count = content.MODELS[model]
+    return content.Camera(number, name, width, height, reader.take(f"{count}d"), place)
 
 
-def _images(reader: _Reader) -> Images:
+def _images(reader: _Reader) -> content.Images:
     heads: list[tuple[float | int, ...]] = []
     names, features, places = [], [], []
     for record in range(1, reader.count(73, "images") + 1):
@@ -134,7 +123,7 @@ def _images(reader: _Reader) -> Images:
     reader.end()
     table = np.array([each[1:8] for each in heads], dtype=float).reshape(len(heads), 7)
     whole = np.concatenate(features) if features else np.zeros(0, _FEATURE)
-    return Images(
+    return content.Images(
         np.array([each[0] for each in heads], dtype=np.int64),
         np.array([each[8] for each in heads], dtype=np.int64),
         table[:, :4],
@@ -147,7 +136,7 @@ def _images(reader: _Reader) -> Images:
     )
 
 
-def _points(reader: _Reader) -> Points:
+def _points(reader: _Reader) -> content.Points:
     size = _POINT.itemsize
     count = reader.count(size, "points")
     starts = np.empty(count, dtype=np.int64)
@@ -168,7 +157,7 @@ def _points(reader: _Reader) -> Points:
         part = starts[first : first + (1 << 16), np.newaxis] + np.arange(size)
         rows[first : first + (1 << 16)] = raw[part]
     table = rows.reshape(-1).view(_POINT)
-    return Points(
+    return content.Points(
         table["number"].astype(np.int64),
         np.array(table["xyz"]).reshape(-1, 3),
         table["rgb"].astype(np.int64).reshape(-1, 3),
@@ -190,21 +179,21 @@ class _Places(Sequence[Place]):
         return Place(self.path, row + 1)
 
 
-def _rig(reader: _Reader) -> Rig:
+def _rig(reader: _Reader) -> content.Rig:
     place = reader.place
     number, sensors = (int(each) for each in reader.take("II"))
     if not sensors:
-        return Rig(number, None, (), place)
+        return content.Rig(number, None, (), place)
     reference = reader.sensor()
     others = []
     for _ in range(sensors - 1):
         kind, own = reader.sensor()
         has_pose = reader.take("B")[0]
         others.append((kind, own, reader.pose() if has_pose else None))
-    return Rig(number, reference, tuple(others), place)
+    return content.Rig(number, reference, tuple(others), place)
 
 
-def _frame(reader: _Reader) -> Frame:
+def _frame(reader: _Reader) -> content.Frame:
     place = reader.place
     number, rig = (int(each) for each in reader.take("II"))
     pose = reader.pose()
@@ -212,12 +201,12 @@ def _frame(reader: _Reader) -> Frame:
     for _ in range(int(reader.take("I")[0])):
         kind, sensor = reader.sensor()
         data.append((kind, sensor, int(reader.take("Q")[0])))
-    return Frame(number, rig, pose, tuple(data), place)
+    return content.Frame(number, rig, pose, tuple(data), place)
 
 
-def binary_files(model: Model) -> dict[str, bytes]:
+def binary_files(model: content.Model) -> dict[str, bytes]:
     """Return the files of a model."""
-    names = {name: number for number, (name, _) in enumerate(MODELS)}
+    names = {name: number for number, (name, _) in enumerate(content.MODELS)}
     cameras = [
         struct.pack("<IiQQ", c.number, names[c.model], c.width, c.height)
         + struct.pack(f"<{len(c.parameters)}d", *c.parameters)
@@ -236,7 +225,7 @@ def _file(records: list[bytes]) -> bytes:
     return struct.pack("<Q", len(records)) + b"".join(records)
 
 
-def _packed_images(images: Images) -> list[bytes]:
+def _packed_images(images: content.Images) -> list[bytes]:
     features = np.empty(len(images.xy), _FEATURE)
     features["xy"], features["point"] = images.xy, images.points.astype(np.uint64)
     ends = np.cumsum(images.counts)
@@ -254,7 +243,7 @@ def _packed_images(images: Images) -> list[bytes]:
     return found
 
 
-def tracks_of(model: Model) -> list[Indices]:
+def tracks_of(model: content.Model) -> list[Indices]:
     """Return of each point the images that show it with the index of the feature there."""
     images, points = model.images, model.points
     rows = np.repeat(np.arange(len(images.counts)), images.counts)
@@ -268,7 +257,7 @@ def tracks_of(model: Model) -> list[Indices]:
     return np.split(pairs, ends[:-1]) if len(points.numbers) else []
 
 
-def _packed_points(model: Model) -> list[bytes]:
+def _packed_points(model: content.Model) -> list[bytes]:
     points = model.points
     return [
         struct.pack("<Q3d3BdQ", number, *position, *colour, -1.0, len(track)) + track.astype("<u4").tobytes()
@@ -282,11 +271,11 @@ def _packed_points(model: Model) -> list[bytes]:
     ]
 
 
-def _packed_pose(pose: Pose) -> bytes:
+def _packed_pose(pose: content.Pose) -> bytes:
     return struct.pack("<7d", *pose.quaternion, *pose.translation)
 
 
-def _packed_rig(rig: Rig) -> bytes:
+def _packed_rig(rig: content.Rig) -> bytes:
     if rig.reference is None:
         return struct.pack("<II", rig.number, 0)
     kind, number = rig.reference
@@ -297,7 +286,7 @@ def _packed_rig(rig: Rig) -> bytes:
     return found
 
 
-def _packed_frame(frame: Frame) -> bytes:
+def _packed_frame(frame: content.Frame) -> bytes:
     found = struct.pack("<II", frame.number, frame.rig) + _packed_pose(frame.pose)
     found += struct.pack("<I", len(frame.data))
     return found + b"".join(

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.formats.cards import filled_lines
+from photogram.formats.colmap import content
 from photogram.formats.colmap.binary import tracks_of
-from photogram.formats.colmap.content import (
-    MODELS,
-    NO_POINT,
-    Camera,
-    Frame,
-    Images,
-    Model,
-    Points,
-    Pose,
-    Rig,
-)
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 
@@ -59,10 +50,10 @@ class _Words:
         """Return the next word as a whole number."""
         return self.place.whole(self.word(what), what, highest)
 
-    def pose(self) -> Pose:
+    def pose(self) -> content.Pose:
         """Return a quaternion and a translation."""
         values = [self.number(name) for name in ("QW", "QX", "QY", "QZ", "TX", "TY", "TZ")]
-        return Pose(tuple(values[:4]), tuple(values[4:]))
+        return content.Pose(tuple(values[:4]), tuple(values[4:]))
 
     def rest(self) -> list[str]:
         """Return all words that are left."""
@@ -74,40 +65,34 @@ class _Words:
             raise self.place.error(f"has more than it should: {' '.join(self.rest()[:4])}")
 
 
-def _lines(path: Path) -> Iterator[Place]:
-    for record, line in enumerate(read_lines(path), 1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            yield Place(path, record, line)
-
-
-def read_text(folder: Path) -> Model:
+def read_text(folder: Path) -> content.Model:
     """Read a model."""
     rigs, frames = folder / "rigs.txt", folder / "frames.txt"
-    return Model(
+    return content.Model(
         folder,
-        [_camera(_Words(place)) for place in _lines(folder / "cameras.txt")],
+        [_camera(_Words(place)) for place in filled_lines(folder / "cameras.txt")],
         _images(folder / "images.txt"),
         _points(folder / "points3D.txt"),
-        [_rig(_Words(place)) for place in _lines(rigs)] if rigs.is_file() else [],
-        [_frame(_Words(place)) for place in _lines(frames)] if frames.is_file() else [],
+        [_rig(_Words(place)) for place in filled_lines(rigs)] if rigs.is_file() else [],
+        [_frame(_Words(place)) for place in filled_lines(frames)] if frames.is_file() else [],
     )
 
 
-def _camera(words: _Words) -> Camera:
+def _camera(words: _Words) -> content.Camera:
     number, model = words.whole("CAMERA_ID"), words.word("MODEL")
-    counts = dict(MODELS)
+    counts = dict(content.MODELS)
     if model not in counts:
         raise words.place.error(f"camera {number} has the model {model}, which is not known")
     width, height = words.whole("WIDTH"), words.whole("HEIGHT")
     parameters = tuple(words.number(f"parameter {k + 1} of {counts[model]}") for k in range(counts[model]))
     words.end()
-    return Camera(number, model, width, height, parameters, words.place)
+    return content.Camera(number, model, width, height, parameters, words.place)
 
 
-def _images(path: Path) -> Images:
+def _images(path: Path) -> content.Images:
     lines = read_lines(path)
     numbers, cameras, names, places = [], [], [], []
-    poses: list[Pose] = []
+    poses: list[content.Pose] = []
     features: list[Floats] = []
     record = 0
     while record < len(lines):
@@ -127,7 +112,7 @@ def _images(path: Path) -> Images:
         features.append(_features(Place(path, record + 1, lines[record] if record < len(lines) else "")))
         record += 1
     whole = np.concatenate(features) if features else np.zeros((0, 3))
-    return Images(
+    return content.Images(
         np.array(numbers, dtype=np.int64),
         np.array(cameras, dtype=np.int64),
         np.array([each.quaternion for each in poses], dtype=float).reshape(-1, 4),
@@ -153,20 +138,20 @@ def _features(place: Place) -> Floats:
         raise place.error(f"has {len(values)} numbers: they come in threes, X, Y, POINT3D_ID")
     found = values.reshape(-1, 3).copy()
     # 2^64 - 1 is how the binary files say that there is no point.
-    found[found[:, 2] == float(_EMPTY), 2] = NO_POINT
+    found[found[:, 2] == float(_EMPTY), 2] = content.NO_POINT
     bad = np.flatnonzero(
-        (found[:, 2] != np.floor(found[:, 2])) | (found[:, 2] < NO_POINT) | (found[:, 2] >= 2**53)
+        (found[:, 2] != np.floor(found[:, 2])) | (found[:, 2] < content.NO_POINT) | (found[:, 2] >= 2**53)
     )
     if len(bad):
         raise place.error(f"feature {bad[0] + 1}: {found[bad[0], 2]:g} is no number of a point")
     return found
 
 
-def _points(path: Path) -> Points:
+def _points(path: Path) -> content.Points:
     numbers, tracks, places = [], [], []
     positions: list[list[float]] = []
     colours: list[list[int]] = []
-    for place in _lines(path):
+    for place in filled_lines(path):
         words = _Words(place)
         numbers.append(words.whole("POINT3D_ID", 2**53))
         positions.append([words.number(name) for name in "XYZ"])
@@ -177,7 +162,7 @@ def _points(path: Path) -> Points:
             raise place.error(f"the track has {len(rest)} numbers: they come in twos, IMAGE_ID, POINT2D_IDX")
         tracks.append(len(rest) // 2)
         places.append(place)
-    return Points(
+    return content.Points(
         np.array(numbers, dtype=np.int64),
         np.array(positions, dtype=float).reshape(-1, 3),
         np.array(colours, dtype=np.int64).reshape(-1, 3),
@@ -186,31 +171,31 @@ def _points(path: Path) -> Points:
     )
 
 
-def _rig(words: _Words) -> Rig:
+def _rig(words: _Words) -> content.Rig:
     number, sensors = words.whole("RIG_ID"), words.whole("NUM_SENSORS", 10_000)
     if not sensors:
         words.end()
-        return Rig(number, None, (), words.place)
+        return content.Rig(number, None, (), words.place)
     reference = words.word("REF_SENSOR_TYPE"), words.whole("REF_SENSOR_ID")
     others = []
     for _ in range(sensors - 1):
         kind, own = words.word("SENSOR_TYPE"), words.whole("SENSOR_ID")
         others.append((kind, own, words.pose() if words.whole("HAS_POSE", 1) else None))
     words.end()
-    return Rig(number, reference, tuple(others), words.place)
+    return content.Rig(number, reference, tuple(others), words.place)
 
 
-def _frame(words: _Words) -> Frame:
+def _frame(words: _Words) -> content.Frame:
     number, rig, pose = words.whole("FRAME_ID"), words.whole("RIG_ID"), words.pose()
     data = [
         (words.word("SENSOR_TYPE"), words.whole("SENSOR_ID"), words.whole("DATA_ID", 2**53))
         for _ in range(words.whole("NUM_DATA_IDS", 100_000))
     ]
     words.end()
-    return Frame(number, rig, pose, tuple(data), words.place)
+    return content.Frame(number, rig, pose, tuple(data), words.place)
 
 
-def text_files(model: Model) -> dict[str, bytes]:
+def text_files(model: content.Model) -> dict[str, bytes]:
     """Return the files of a model; names have underscores for blanks, at which COLMAP ends them."""
     images, points = model.images, model.points
     ends = np.cumsum(images.counts)
@@ -246,11 +231,11 @@ def text_files(model: Model) -> dict[str, bytes]:
     return {f"{name}.txt": "\n".join([_HEADS[name], *own, ""]).encode() for name, own in lines.items()}
 
 
-def _numbers(pose: Pose) -> tuple[float, ...]:
+def _numbers(pose: content.Pose) -> tuple[float, ...]:
     return *pose.quaternion, *pose.translation
 
 
-def _rig_line(rig: Rig) -> str:
+def _rig_line(rig: content.Rig) -> str:
     if rig.reference is None:
         return _line([rig.number, 0])
     words: list[object] = [rig.number, 1 + len(rig.sensors), *rig.reference]

@@ -11,23 +11,12 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
+from photogram.formats.colmap import content
 from photogram.formats.colmap.binary import binary_files
-from photogram.formats.colmap.content import (
-    CAMERA,
-    MODELS,
-    NO_POINT,
-    Camera,
-    Frame,
-    Images,
-    Model,
-    Points,
-    Pose,
-    Rig,
-)
 from photogram.formats.colmap.text import text_files
 from photogram.formats.images import sizes_of, to_corner
-from photogram.formats.intersection import complete_positions
 from photogram.formats.lenses import lens_of
+from photogram.formats.models import complete_positions
 from photogram.formats.names import names_file, numbered
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size
@@ -36,11 +25,11 @@ from photogram.io.json import to_json
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes
-from photogram.network.cameras import Camera as HouseCamera
+from photogram.network.cameras import Camera
 from photogram.network.rigs import Mount
 from photogram.results.result import Result
 
-_NAMES = dict(MODELS)
+_NAMES = dict(content.MODELS)
 
 
 def cannot_hold(project: Project) -> list[str]:
@@ -95,7 +84,7 @@ def write_as_text(project: Project) -> Mapping[str, bytes]:
 class _Made:
     """A model with the numbers that photos, points and cameras have in it, and its images in their order."""
 
-    model: Model
+    model: content.Model
     photos: dict[str, int]
     points: dict[str, int]
     cameras: dict[str, int]
@@ -125,7 +114,7 @@ def _made(project: Project) -> _Made:
     images, rows = _images(project, shown, ids, camera_numbers, quaternions, translations, placed, points)
     colours = project.details.get("colours", {})
     poses = {
-        name: Pose(tuple(q), tuple(t))
+        name: content.Pose(tuple(q), tuple(t))
         for name, q, t in zip(photos, quaternions.tolist(), translations.tolist(), strict=True)
     }
     of_photo = dict(zip(photos, camera_numbers.tolist(), strict=True))
@@ -133,7 +122,7 @@ def _made(project: Project) -> _Made:
     point_numbers = np.array(list(points.values()), dtype=np.int64)
     order = np.argsort(point_numbers, kind="stable")
     shown_colours = [colours.get(block.point_ids[row], (0, 0, 0)) for row in placed[order]]
-    of_points = Points(
+    of_points = content.Points(
         point_numbers[order],
         positions[placed[order]],
         np.array(shown_colours, dtype=np.int64).reshape(-1, 3),
@@ -141,14 +130,14 @@ def _made(project: Project) -> _Made:
         [],
     )
     by_number = sorted(lines, key=lambda each: each.number)
-    model = Model(project.path, by_number, images, of_points, rigs, frames)
+    model = content.Model(project.path, by_number, images, of_points, rigs, frames)
     return _Made(model, photos, points, numbers, rows)
 
 
-def _camera(camera: HouseCamera, size: Size, number: int) -> Camera:
+def _camera(camera: Camera, size: Size, number: int) -> content.Camera:
     model = camera.model.upper()
     if model in _NAMES and camera.unit == "px":
-        return Camera(number, model, *size, tuple(camera.values.tolist()), Place())
+        return content.Camera(number, model, *size, tuple(camera.values.tolist()), Place())
     lens = lens_of(camera, size)
     if lens is None:
         raise InputError(
@@ -156,8 +145,10 @@ def _camera(camera: HouseCamera, size: Size, number: int) -> Camera:
             " fitted"
         )
     if lens.fx == lens.fy and lens.is_plain("k1", "k2"):
-        return Camera(number, "RADIAL", *size, (lens.fx, lens.cx, lens.cy, lens.k1, lens.k2), Place())
-    return Camera(number, "FULL_OPENCV", *size, (lens.fx, lens.fy, lens.cx, lens.cy, *lens.terms), Place())
+        return content.Camera(number, "RADIAL", *size, (lens.fx, lens.cx, lens.cy, lens.k1, lens.k2), Place())
+    return content.Camera(
+        number, "FULL_OPENCV", *size, (lens.fx, lens.fy, lens.cx, lens.cy, *lens.terms), Place()
+    )
 
 
 def _images(
@@ -169,16 +160,16 @@ def _images(
     translations: Floats,
     placed: Indices,
     points: Mapping[str, int],
-) -> tuple[Images, Indices]:
+) -> tuple[content.Images, Indices]:
     block = project.block
-    number = np.full(len(block.point_ids), NO_POINT, dtype=np.int64)
+    number = np.full(len(block.point_ids), content.NO_POINT, dtype=np.int64)
     number[placed] = list(points.values())
     rank = np.full(len(block.photo_ids), -1, dtype=np.int64)
     by_id = np.argsort(ids, kind="stable")
     rank[shown[by_id]] = np.arange(len(shown))
     rows = np.flatnonzero(rank[block.image_photos] >= 0)
     rows = rows[np.argsort(rank[block.image_photos[rows]], kind="stable")]
-    images = Images(
+    images = content.Images(
         ids[by_id],
         cameras[by_id],
         quaternions[by_id],
@@ -194,13 +185,13 @@ def _images(
 
 def _rigs(
     project: Project,
-    poses: Mapping[str, Pose],
+    poses: Mapping[str, content.Pose],
     photos: Mapping[str, int],
     cameras: Mapping[str, int],
     numbers: list[int],
-) -> tuple[list[Rig], list[Frame]]:
+) -> tuple[list[content.Rig], list[content.Frame]]:
     """Return rigs and frames: those of mounts, and of each other camera and photo one of its own."""
-    sensors: dict[int, dict[int, Pose]] = {}
+    sensors: dict[int, dict[int, content.Pose]] = {}
     members: dict[str, list[str]] = {name: [name] for name in poses}
     mounts = [each for each in project.block.mounts if each.photo in poses and each.frame in poses]
     for mount in mounts if _told_by_cameras(mounts, cameras) else []:
@@ -209,21 +200,21 @@ def _rigs(
         members[mount.frame].append(mount.photo)
         del members[mount.photo]
     rigs = [
-        Rig(
+        content.Rig(
             number,
-            (CAMERA, number),
-            tuple((CAMERA, other, pose) for other, pose in sorted(sensors.get(number, {}).items())),
+            (content.CAMERA, number),
+            tuple((content.CAMERA, other, pose) for other, pose in sorted(sensors.get(number, {}).items())),
             Place(),
         )
         for number in numbers
         if all(number not in own for own in sensors.values())
     ]
     frames = [
-        Frame(
+        content.Frame(
             photos[name],
             cameras[name],
             poses[name],
-            tuple((CAMERA, cameras[each], photos[each]) for each in own),
+            tuple((content.CAMERA, cameras[each], photos[each]) for each in own),
             Place(),
         )
         for name, own in members.items()
@@ -231,11 +222,11 @@ def _rigs(
     return rigs, sorted(frames, key=lambda each: each.number)
 
 
-def _sensor_pose(position: Floats, axes: Floats) -> Pose:
+def _sensor_pose(position: Floats, axes: Floats) -> content.Pose:
     """Return sensor from rig: R = F A' F and t = -R (F c)."""
     turn = Y_DOWN @ axes.T @ Y_DOWN
     quaternion = Attitudes(turn[np.newaxis]).values("quaternion")[0]
-    return Pose(tuple(quaternion.tolist()), tuple((-turn @ Y_DOWN @ position).tolist()))
+    return content.Pose(tuple(quaternion.tolist()), tuple((-turn @ Y_DOWN @ position).tolist()))
 
 
 def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:

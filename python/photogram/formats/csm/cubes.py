@@ -16,8 +16,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.csm.angles import Polynomials, of_angles, of_quaternions
 from photogram.formats.csm.isd import Detector, Isd, Positions, Turns
-from photogram.formats.csm.line_times import fitting, read_drift
-from photogram.formats.csm.reading import from_pixels, not_zero, transformed
+from photogram.formats.csm.reading import fitting, from_pixels, not_zero, read_drift, transformed
 from photogram.io.files import reading
 from photogram.io.json import Tree
 from photogram.io.places import at_place

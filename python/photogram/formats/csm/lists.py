@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from photogram.errors import InputError
+from photogram.formats.cards import filled_lines
 from photogram.formats.csm.cubes import is_cube, read_cube, read_label, serial_number
 from photogram.formats.csm.isd import Isd
 from photogram.formats.csm.reading import read_isd
-from photogram.io.files import read_lines
 
 
 def read_support(path: Path) -> Isd:
@@ -21,14 +20,6 @@ def read_support(path: Path) -> Isd:
         As :func:`read_cube` and :func:`read_isd` have it.
     """
     return read_cube(path) if is_cube(path) else read_isd(path)
-
-
-def listed_lines(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield numbers and texts of the lines of a list; empty ones and those that begin with # do not count."""
-    for record, line in enumerate(read_lines(path), 1):
-        text = line.strip()
-        if text and not text.startswith("#"):
-            yield record, text
 
 
 def read_list(path: Path) -> dict[str, Path]:
@@ -46,14 +37,14 @@ def read_list(path: Path) -> dict[str, Path]:
         Files that are not there; ISDs without a serial number; one that stands there twice; an empty list.
     """
     found: dict[str, Path] = {}
-    for record, text in listed_lines(path):
+    for place in filled_lines(path):
         try:
-            serial, file = _of_line(text, path.parent)
+            serial, file = _of_line((place.text or "").strip(), path.parent)
         except InputError as error:
             where = "" if error.file is None else f"{error.file}: "
-            raise InputError(f"{where}{error.message}", file=path, record=record, text=text) from None
+            raise place.error(f"{where}{error.message}") from None
         if serial in found:
-            raise InputError(f"{serial} stands there twice", file=path, record=record, text=text)
+            raise place.error(f"{serial} stands there twice")
         found[serial] = file
     if not found:
         raise InputError("names no images", file=path)

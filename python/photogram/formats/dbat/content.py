@@ -16,6 +16,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.format import Wishes
+from photogram.formats.images import by_camera
 from photogram.formats.project import Options, Project, Size, assembled
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed
@@ -152,17 +153,12 @@ def project_of(content: Content, wishes: Wishes) -> Project:
     photo_cameras = np.array([sensor_rows[content.cameras[number]] for number in order])
     image_photos = np.array([order[number] for number in content.image_photos], dtype=np.int64)
     of_images = photo_cameras[image_photos]
-    xy, image_sd = content.pixels.copy(), content.image_sd.copy()
-    if "images" in wishes.sd:
-        image_sd[:] = wishes.sd["images"]
-    for row, sensor in enumerate(sensors):
-        own = of_images == row
-        xy[own] = sensor.images(content.pixels[own])
-        image_sd[own] *= sensor.pixel
+    pixel = np.array([sensor.pixel for sensor in sensors])[of_images, np.newaxis]
+    given = wishes.sd.get("images", content.image_sd)
+    image_sd = pixel * np.broadcast_to(given, content.image_sd.shape)
     lacks = list(content.lacks)
     if (missing := np.isnan(image_sd)).any():
-        assumed = np.array([sensor.pixel for sensor in sensors])[of_images]
-        image_sd = np.where(missing, assumed[:, np.newaxis], image_sd)
+        image_sd = np.where(missing, pixel, image_sd)
         lacks.append("no standard deviations of image coordinates: 1 pixel is assumed (--sd images=..)")
     held = np.where([number in content.held for number in order], 0.0, np.inf)[:, np.newaxis] * np.ones(3)
     free = dict.fromkeys(content.free, np.inf)
@@ -185,7 +181,7 @@ def project_of(content: Content, wishes: Wishes) -> Project:
         point_check_sd=check_sd,
         image_photos=image_photos,
         image_points=np.array([places[number] for number in content.image_points], dtype=np.int64),
-        image_xy=xy,
+        image_xy=by_camera(content.pixels, of_images, lambda row, own: sensors[row].images(own)),
         image_sd=image_sd,
         options=content.options,
         lacks=lacks,

@@ -58,13 +58,6 @@ def _whole(table: ColumnTable, column: str) -> list[int]:
     return found
 
 
-def _filled(table: ColumnTable, *columns: str) -> Floats:
-    """Return (rows, k) numbers of which none may be missing."""
-    found = table.vectors(columns)
-    table.check_given(found, columns)
-    return found
-
-
 def _once(table: ColumnTable, numbers: Sequence[int], kind: str) -> None:
     seen: dict[int, int] = {}
     for row, number in enumerate(numbers):
@@ -100,8 +93,8 @@ def take_poses(table: ColumnTable, content: Content, unit: str = "degrees") -> N
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
     numbers = _whole(table, "id")
     _once(table, numbers, "photo")
-    centres = _filled(table, "x", "y", "z")
-    angles = _filled(table, "omega", "phi", "kappa") * _RADIANS[unit]
+    centres = table.given(("x", "y", "z"))
+    angles = table.given(("omega", "phi", "kappa")) * _RADIANS[unit]
     _check_photos(table, numbers, content)
     content.poses |= dict(zip(numbers, zip(centres, angles, strict=True), strict=True))
 
@@ -118,7 +111,7 @@ def take_points(
     table.require("id", "x", "y", "z")
     numbers = _whole(table, "id")
     _once(table, numbers, "point")
-    positions = _filled(table, "x", "y", "z")
+    positions = table.given(("x", "y", "z"))
     deviations = _deviations(table, ("sx", "sy", "sz"), "sxyz")
     if sd is not None:
         deviations = np.broadcast_to(sd, deviations.shape)
@@ -159,5 +152,5 @@ def take_images(table: ColumnTable, content: Content, sd: float = math.nan) -> N
         raise table.error(int(np.argwhere(own == 0)[0][0]), "a standard deviation is 0")
     content.image_photos += photos
     content.image_points += _whole(table, "id")
-    content.pixels = np.vstack([content.pixels, _filled(table, "x", "y")])
+    content.pixels = np.vstack([content.pixels, table.given(("x", "y"))])
     content.image_sd = np.vstack([content.image_sd, own])

@@ -27,6 +27,6 @@ FORMAT = Format(
     title=TITLE,
     recognises=_recognises,
     read=later(f"{__name__}.assembling", "read"),
-    results=later(f"{__name__}.writing_results", "results"),
+    results=later(f"{__name__}.writing", "results"),
     adjusting=later(f"{__name__}.rejection", "rejecting"),
 )

@@ -9,7 +9,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.csm.lists import listed_lines, read_list, read_support
+from photogram.formats.cards import filled_lines
+from photogram.formats.csm.lists import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import Wishes
 from photogram.formats.isis import TITLE
@@ -78,10 +79,11 @@ def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
         return set()
     names = {str(file.resolve()): serial for serial, file in files.items()}
     found = set()
-    for record, text in listed_lines(settings.held):
+    for place in filled_lines(settings.held):
+        text = (place.text or "").strip()
         serial = text if text in files else names.get(str((settings.held.parent / text).resolve()))
         if serial is None:
-            raise InputError("is no image of --cubes", file=settings.held, record=record, text=text)
+            raise place.error("is no image of --cubes")
         found.add(serial)
     return found
 

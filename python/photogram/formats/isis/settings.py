@@ -160,18 +160,16 @@ PARAMETERS: Mapping[str, _Parameter] = {
     "OVERHERMITE": _Parameter("over_hermite", _yes),
     "RADIUS": _Parameter("radius", _yes),
     "CONTROL_POINT_COORDINATE_TYPE_BUNDLE": _Parameter("axes", _AXES),
-    "CAMERA_ANGLES_SIGMA": _Parameter("angle_sigmas", _sigma, 0),
-    "CAMERA_ANGULAR_VELOCITY_SIGMA": _Parameter("angle_sigmas", _sigma, 1),
-    "CAMERA_ANGULAR_ACCELERATION_SIGMA": _Parameter("angle_sigmas", _sigma, 2),
-    "SPACECRAFT_POSITION_SIGMA": _Parameter("position_sigmas", _sigma, 0),
-    "SPACECRAFT_VELOCITY_SIGMA": _Parameter("position_sigmas", _sigma, 1),
-    "SPACECRAFT_ACCELERATION_SIGMA": _Parameter("position_sigmas", _sigma, 2),
-    "POINT_LATITUDE_SIGMA": _Parameter("latitude_sigmas", _sigma, 0),
-    "POINT_LONGITUDE_SIGMA": _Parameter("latitude_sigmas", _sigma, 1),
-    "POINT_RADIUS_SIGMA": _Parameter("latitude_sigmas", _sigma, 2),
-    "POINT_X_SIGMA": _Parameter("rectangular_sigmas", _sigma, 0),
-    "POINT_Y_SIGMA": _Parameter("rectangular_sigmas", _sigma, 1),
-    "POINT_Z_SIGMA": _Parameter("rectangular_sigmas", _sigma, 2),
+    **{
+        f"{name}_SIGMA": _Parameter(own, _sigma, place)
+        for own, names in {
+            "angle_sigmas": ("CAMERA_ANGLES", "CAMERA_ANGULAR_VELOCITY", "CAMERA_ANGULAR_ACCELERATION"),
+            "position_sigmas": ("SPACECRAFT_POSITION", "SPACECRAFT_VELOCITY", "SPACECRAFT_ACCELERATION"),
+            "latitude_sigmas": ("POINT_LATITUDE", "POINT_LONGITUDE", "POINT_RADIUS"),
+            "rectangular_sigmas": ("POINT_X", "POINT_Y", "POINT_Z"),
+        }.items()
+        for place, name in enumerate(names)
+    },
     "OBSERVATIONS": _Parameter("observations", _yes),
     "HELDLIST": _Parameter("held", Path),
     "OUTLIER_REJECTION": _Parameter("rejects", _yes),

@@ -1,11 +1,16 @@
-"""Writing control networks: binary ones of version 5, and text."""
+"""Writing control networks, binary ones of version 5 and text, and all that stands beside an adjusted one."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+
+import numpy as np
 
 from photogram import _photocore
 from photogram.errors import InputError
+from photogram.formats.isis.contents import contents_of
+from photogram.formats.isis.jigsaw_files import jigsaw_files
 from photogram.formats.isis.network import (
     HEADER,
     MESSAGE,
@@ -13,11 +18,16 @@ from photogram.formats.isis.network import (
     columns_of_measures,
     columns_of_points,
 )
-from photogram.formats.isis.reading import LABEL_BYTES
+from photogram.formats.isis.outcome import Outcome
+from photogram.formats.isis.reading import LABEL_BYTES, is_binary
+from photogram.formats.isis.support import updated_support
+from photogram.formats.project import Project
 from photogram.io.pvl import Group, Value, label_text
+from photogram.results.result import Result
 
 _VERSION = 5
 _END = "End_Object\nEnd\n"
+_UPPER = np.triu_indices(3)
 
 
 def _header(network: ControlNetwork) -> list[tuple[str, Value]]:
@@ -84,3 +94,56 @@ def network_text(network: ControlNetwork) -> bytes:
     own = replace(network.others, name="ControlNetwork", kind="object", items=items)
     head = label_text(Group("", "label", inside=[own])).removesuffix(_END)
     return head.encode() + points + _END.encode()
+
+
+def results(project: Project, result: Result) -> Mapping[str, bytes]:
+    """Return the files of an adjusted network by their names."""
+    outcome = Outcome(contents_of(project.details), result)
+    path = outcome.contents.path
+    files = dict(jigsaw_files(outcome))
+    files[path.name] = (binary_network if is_binary(path) else network_text)(_updated_network(outcome))
+    names: dict[str, int] = {}
+    for image in outcome.contents.different:
+        content = updated_support(image, result.trajectories[image.solving.trajectory.name])
+        if content is None:
+            continue
+        count = names[image.path.name] = names.get(image.path.name, 0) + 1
+        folder = "support" if count == 1 else f"support-{count}"
+        files[f"{folder}/{image.path.name}"] = content
+    return files
+
+
+def _updated_network(outcome: Outcome) -> ControlNetwork:
+    """Return a network with adjusted coordinates, their covariances a posteriori, residuals and rejections.
+
+    What did not count stays as it was read; a point all of whose measures are rejected is rejected.
+    """
+    network = outcome.contents.network
+    points, measures, ignored = network.points, network.measures, network.is_ignored
+    used = np.flatnonzero(outcome.result.used_points)
+    rows = outcome.point_rows[used]
+    adjusted, covariance = np.array(points.adjusted), np.array(points.adjusted_covariance)
+    adjusted[rows] = outcome.xyz[used]
+    covariance[rows] = outcome.covariances[used][:, _UPPER[0], _UPPER[1]]
+    residuals = np.column_stack([measures.sample_residual, measures.line_residual])
+    residuals[~ignored] = np.nan
+    taken = outcome.result.used_images
+    residuals[outcome.measure_rows[taken]] = outcome.residuals[taken]
+    counts = ~np.isnan(outcome.contents.starts[:, 0])
+    out = counts.copy()
+    out[rows] = False
+    return replace(
+        network,
+        points=replace(
+            points,
+            adjusted=adjusted,
+            adjusted_covariance=covariance,
+            rejected=np.where(counts, out, points.rejected),
+        ),
+        measures=replace(
+            measures,
+            sample_residual=residuals[:, 0],
+            line_residual=residuals[:, 1],
+            rejected=np.where(ignored, measures.rejected, outcome.rejected),
+        ),
+    )

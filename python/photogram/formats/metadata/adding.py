@@ -8,12 +8,12 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.carrying import carried, is_free
 from photogram.formats.format import PhotoFiles, Wishes
 from photogram.formats.metadata.merged import WITHOUT, Metadata, counts, read_metadata, remarks_on, told
 from photogram.formats.metadata.record import ELLIPSOIDAL
 from photogram.formats.metadata.search import Photos
 from photogram.formats.metadata.systems import LEVER_SD, SHIFT_SD, Located, located
+from photogram.formats.models import carried, is_free
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Frame, Project
 from photogram.messages import Message, counted, listed

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.formats.cards import filled_lines
 from photogram.formats.column_words import words_of
 from photogram.formats.columns import PLAIN, is_geographic, settled
 from photogram.formats.control_lists import system_of
@@ -129,12 +130,7 @@ def read_geo_txt(path: Path) -> dict[str, Said]:
     Section 6 of the specification: `name x y [z [yaw pitch roll [sd_h sd_v]]]`; east and north have sd_h
     each. Without the two columns nothing is said of standard deviations: those of another source stay.
     """
-    places = [
-        Place(path, record, line)
-        for record, line in enumerate(read_lines(path), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not places:
+    if not (places := list(filled_lines(path))):
         raise Place(path).error("names no system of coordinates in its first line")
     head, *rest = places
     crs = system_of((head.text or "").strip(), head)

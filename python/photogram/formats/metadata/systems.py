@@ -14,6 +14,7 @@ from photogram.errors import InputError
 from photogram.formats.metadata.merged import Metadata, PhotoRecord
 from photogram.formats.metadata.record import ELLIPSOIDAL, SEA_LEVEL, Said
 from photogram.formats.plain.schema import AXES, deviation_columns
+from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
@@ -58,8 +59,7 @@ class Located:
         """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and what is to be said of it."""
         from photogram.formats.crs import to_frame
 
-        turned = np.zeros((len(self.sd), 3, 3))
-        turned[:, range(3), range(3)] = self.sd**2
+        turned = covariances_of(self.sd)
         xyz, remarks = np.empty_like(self.xyz), list[str]()
         for crs in dict.fromkeys(self.systems):
             own = np.array([each == crs for each in self.systems])

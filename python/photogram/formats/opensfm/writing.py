@@ -10,8 +10,8 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.images import sizes_of, to_corner
-from photogram.formats.intersection import complete_positions
 from photogram.formats.lenses import lens_of
+from photogram.formats.models import complete_positions
 from photogram.formats.opensfm.reading import MODEL, TRACKS
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
 from photogram.formats.project import Project, Size

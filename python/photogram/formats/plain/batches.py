@@ -25,8 +25,7 @@ from photogram.errors import InputError
 from photogram.formats.format import Wishes
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.cameras import read_cameras
-from photogram.formats.plain.images import image_coordinates, read_images
-from photogram.formats.plain.photos import read_photos
+from photogram.formats.plain.photos import image_coordinates, read_images, read_photos
 from photogram.formats.plain.reading import read_tables
 from photogram.formats.plain.settings import Settings, read_settings
 from photogram.formats.plain.tables import Tables

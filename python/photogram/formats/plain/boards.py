@@ -8,7 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import deviation_columns
+from photogram.formats.plain.schema import BENDS, PITCHES, deviation_columns
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
 from photogram.network.block import Block
@@ -22,8 +22,6 @@ REGULARISED = "regularise"
 """The detail, and the column of boards, of the weak priors that a calibration adds to its cameras."""
 TIMES = "times of photos on frames"
 """The detail: seconds by the clocks of cameras, by the names of photos of a board."""
-BENDS = ("bend_x", "bend_y")
-_LENGTHS = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
 
 
 def read_boards(tables: Tables) -> dict[str, Board]:
@@ -34,9 +32,7 @@ def read_boards(tables: Tables) -> dict[str, Board]:
     InputError
         A kind or shape that there is not, what is no board, more than one.
     """
-    table = tables.read("boards")
-    if table is None or not table.count:
-        return {}
+    table = tables.rows("boards")
     if table.count > 1:
         raise table.error(1, "several boards: those fixed to each other are one of the kind points")
     return {name: _board(table, row, tables) for row, name in enumerate(table.names_once("board"))}
@@ -53,9 +49,9 @@ def _board(table: ColumnTable, row: int, tables: Tables) -> Board:
         # Their places are those of the control, which is read later.
         given["points"] = np.zeros((0, 3))
         return Board(**given)
-    lengths = {name: float(table.numbers(name)[row]) for name in _LENGTHS}
+    lengths = {name: float(table.numbers(name)[row]) for name in PITCHES}
     given |= {name: int(table.numbers(name, 0.0)[row]) for name in ("columns", "rows")}
-    given |= {name: lengths[name] for name in _LENGTHS[2:] if not np.isnan(lengths[name])}
+    given |= {name: lengths[name] for name in PITCHES[2:] if not np.isnan(lengths[name])}
     if "tag_size" not in given:
         given["spacing"] = lengths["spacing_x"], lengths["spacing_y"]
     return made(table, row, lambda: Board(**given))
@@ -69,8 +65,8 @@ def read_regularised(tables: Tables) -> str | None:
     InputError
         Another word.
     """
-    table = tables.read("boards")
-    if table is None or not table.count:
+    table = tables.rows("boards")
+    if not table.count:
         return None
     word = table.texts(REGULARISED)[0]
     if word and word not in get_args(Regularisation):
@@ -86,8 +82,8 @@ def read_bends(tables: Tables, boards: Mapping[str, Board]) -> list[Figure]:
     InputError
         A standard deviation that is none.
     """
-    table = tables.read("boards")
-    if table is None or all(each.shape != "bend" for each in boards.values()):
+    table = tables.rows("boards")
+    if all(each.shape != "bend" for each in boards.values()):
         return []
     values = np.nan_to_num(table.vectors(BENDS))
     sd = table.vectors(deviation_columns(BENDS), np.inf, infinite=True)
@@ -107,9 +103,9 @@ def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | No
     columns: dict[str, Any] = {"board": [*boards], "kind": [own.kind for own in each]}
     for name in ("columns", "rows"):
         columns[name] = [None if own is None else getattr(own, name) for own in grids]
-    for k, name in enumerate(_LENGTHS[:2]):
+    for k, name in enumerate(PITCHES[:2]):
         columns[name] = [None if own is None or own.tag_size else own.pitch[k] for own in grids]
-    for name in _LENGTHS[2:]:
+    for name in PITCHES[2:]:
         columns[name] = [getattr(own, name) for own in each]
     columns["shape"] = [own.shape or "" for own in each]
     if regularise:

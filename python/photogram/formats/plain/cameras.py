@@ -19,6 +19,7 @@ from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutt
 from photogram.formats.plain.tables import Tables, columns_of
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
+from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import quoted
 from photogram.network.cameras import Camera, Weights
@@ -312,9 +313,7 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
     InputError
         Knots of a camera that has none there, or twice.
     """
-    table = tables.read("knots")
-    if table is None:
-        return list(cameras)
+    table = tables.rows("knots")
     splined = {each.name: both for each in cameras if (both := _both(each)) is not None}
     values, sd = ({name: np.zeros_like(both[0]) for name, both in splined.items()} for _ in range(2))
     seen = set[tuple[str, float, float]]()
@@ -331,13 +330,11 @@ def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
         seen.add((name, i, j))
         values[name][int(j), int(i)] = [given["dx"][row], given["dy"][row]]
         sd[name][int(j), int(i)] = [given[each][row] for each in _SD]
-    try:
+    with at_place(Place(tables.settings.path)):
         return [
             each.replace(knots=values[each.name], knot_sd=sd[each.name]) if each.name in splined else each
             for each in cameras
         ]
-    except InputError as error:
-        raise InputError(error.message, file=tables.settings.path) from None
 
 
 def _both(camera: Camera) -> tuple[Floats, Floats] | None:

@@ -277,18 +277,16 @@ def read_fiducials(
     InputError
         Cells that are no numbers, a mark that is there twice, marks in the table and in a certificate.
     """
-    found, table = Fiducials(tables), tables.read("fiducials")
-    if table is not None:
-        xy = table.vectors(("x", "y"))
-        table.check_given(xy, ("x", "y"))
-        sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)
-        use, texts = table.flags("use"), [table.texts(name) for name in ("camera", "fiducial")]
-        for row, (camera, name) in enumerate(zip(*texts, strict=True)):
-            if not use[row] or camera not in cameras:
-                continue
-            if name in found.places.setdefault(camera, {}):
-                raise table.error(row, f"the camera {camera} has the fiducial {name} twice")
-            found.places[camera][name] = xy[row]
-            found.sd.setdefault(camera, {})[name] = sd[row]
+    found, table = Fiducials(tables), tables.rows("fiducials")
+    xy = table.given(("x", "y"))
+    sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)
+    use, texts = table.flags("use"), [table.texts(name) for name in ("camera", "fiducial")]
+    for row, (camera, name) in enumerate(zip(*texts, strict=True)):
+        if not use[row] or camera not in cameras:
+            continue
+        if name in found.places.setdefault(camera, {}):
+            raise table.error(row, f"the camera {camera} has the fiducial {name} twice")
+        found.places[camera][name] = xy[row]
+        found.sd.setdefault(camera, {})[name] = sd[row]
     found.take(certificates)
     return found

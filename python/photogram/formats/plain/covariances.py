@@ -50,7 +50,7 @@ class Covariances:
     """The table, by kind and name of what it is of."""
 
     tables: Tables
-    table: ColumnTable | None
+    table: ColumnTable
     matrices: Mapping[tuple[str, str], _Matrix]
 
     def cameras(self, cameras: Sequence[Camera]) -> list[Camera]:
@@ -64,7 +64,6 @@ class Covariances:
         own = {name: each for (kind, name), each in self.matrices.items() if kind == CAMERA}
         if not own:
             return list(cameras)
-        assert self.table is not None
         known = {each.name for each in cameras}
         for name, matrix in own.items():
             if name not in known:
@@ -73,7 +72,6 @@ class Covariances:
 
     def _camera(self, camera: Camera, matrix: _Matrix) -> Camera:
         table = self.table
-        assert table is not None
         by_word = {name.lower(): name for name in camera.names}
         spelled = _Matrix(matrix.rows)
         for row, ((first, second), value) in zip(matrix.rows, matrix.values.items(), strict=True):
@@ -114,7 +112,6 @@ class Covariances:
         own = self.matrices.get((kind, name))
         if own is None:
             return None
-        assert self.table is not None
         words = self.names(kind, name)
         if strange := sorted(words - set(components)):
             raise self.table.error(
@@ -141,7 +138,6 @@ class Covariances:
             if kind in (CAMERA, *OF_FILMS):
                 continue
             table = self.table
-            assert table is not None
             if (kind, name) not in known:
                 there = listed(sorted(f"{own} {title}" for own, title in known), 8) or "none"
                 raise table.error(matrix.rows[0], f"there is no {kind} {quoted(name)}; there are {there}")
@@ -172,12 +168,8 @@ def read_covariances(tables: Tables) -> Covariances:
     InputError
         Empty cells, a pair of components that is there twice.
     """
-    table = tables.read("covariances")
-    matrices: dict[tuple[str, str], _Matrix] = {}
-    if table is None:
-        return Covariances(tables, None, matrices)
-    values = table.numbers("covariance")
-    table.check_given(values[:, np.newaxis], ("covariance",))
+    table, matrices = tables.rows("covariances"), dict[tuple[str, str], _Matrix]()
+    values = table.given(("covariance",))[:, 0]
     kinds = [text.lower().replace("_", " ") for text in table.texts("kind")]
     columns = (table.texts("name"), table.texts("first"), table.texts("second"))
     for row, (kind, name, *pair) in enumerate(zip(kinds, *columns, strict=True)):

@@ -16,7 +16,6 @@ from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.delimited import ColumnTable
-from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import Direction, LineSensor, Shutter
@@ -26,7 +25,6 @@ LINE = "line"
 """The model of a line of sensors behind the lens `brown`."""
 OF_LINES = ("x0", "y0", "s0")
 """Columns of a line of sensors that some models have as parameters."""
-_DIRECTIONS = get_args(Direction)
 Exposure = Shutter | LineSensor | None
 
 
@@ -71,7 +69,8 @@ def shutters(
         Words that say no direction, edges that are not known, a shutter of a line of sensors, columns of
         shutters where there is no readout time.
     """
-    edges = _edges(tables, table, cameras, sizes)
+    directions = cast("list[Direction]", table.words("readout_direction", get_args(Direction)))
+    edges = _edges(tables, table, cameras, sizes, directions)
     values, deviations = table.numbers("readout"), table.numbers("sd_readout", 0.0, infinite=True)
     found: list[Shutter | None] = []
     for row, (word, name) in enumerate(
@@ -91,22 +90,17 @@ def shutters(
         given = name or cameras[row].name, float(values[row]), float(deviations[row])
         readout = tables.shared.one(table, row, "shutter", Readout, *given)
         first, last = edges[row].tolist()
-        shutter = partial(Shutter, readout, (first, last), _direction(table, row, word))
+        shutter = partial(Shutter, readout, (first, last), directions[row])
         found.append(made(table, row, shutter))
     return found
 
 
-def _direction(table: ColumnTable, row: int, word: str) -> Direction:
-    found = word.lower() or _DIRECTIONS[0]
-    if found not in _DIRECTIONS:
-        raise table.error(
-            row, f"column readout_direction: {quoted(word)} is none of {', '.join(_DIRECTIONS)}"
-        )
-    return cast("Direction", found)
-
-
 def _edges(
-    tables: Tables, table: ColumnTable, cameras: Sequence[Camera], sizes: Sequence[Size | None]
+    tables: Tables,
+    table: ColumnTable,
+    cameras: Sequence[Camera],
+    sizes: Sequence[Size | None],
+    directions: Sequence[Direction],
 ) -> Floats:
     """Return (rows, 2) where reading begins and ends, in coordinates of the cameras; NaN if not known."""
     settings = tables.settings
@@ -117,8 +111,7 @@ def _edges(
     if not pixels:
         extents *= table.numbers("pixel_mm")[:, np.newaxis]
     found = np.full((table.count, 2), np.nan)
-    for row, (camera, word) in enumerate(zip(cameras, table.texts("readout_direction"), strict=True)):
-        direction = _direction(table, row, word)
+    for row, (camera, direction) in enumerate(zip(cameras, directions, strict=True)):
         if np.isnan(given[row]).all():
             found[row] = picture_edges(camera, direction, extents[row])
             continue

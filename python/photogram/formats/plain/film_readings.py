@@ -12,8 +12,7 @@ from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import conformal, is_mirrored, mirror_message, side_residuals, true_places
 from photogram.film.marks import which_mark
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.images import Images
-from photogram.formats.plain.photos import Photos
+from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import FALSE, TRUE, ColumnTable
@@ -240,12 +239,9 @@ class MarkReadings:
 
     def read(self, photos: Photos) -> None:
         """Read the readings of marks."""
-        table = self.tables.read("fiducial_images")
-        if table is None:
-            return
+        table = self.tables.rows("fiducial_images")
         names = ("column", "row") if "column" in table else ("x", "y")
-        xy = table.vectors(names)
-        table.check_given(xy, names)
+        xy = table.given(names)
         own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
         sd = self.tables.deviations(table, "fiducial_images", own)
         table.check_given(sd, own, "is empty: give sd, or [sd] fiducial_images")

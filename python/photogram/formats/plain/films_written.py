@@ -9,8 +9,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.plain.scanners import BENDS, CURVES, GRID, LOCAL, Machine
-from photogram.formats.plain.schema import deviation_columns
+from photogram.formats.plain.scanners import BENDS, LOCAL, Machine
+from photogram.formats.plain.schema import CURVES, GRID, deviation_columns
 from photogram.formats.plain.tables import columns_of
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, field, replace

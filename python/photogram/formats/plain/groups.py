@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.common_unknowns import called, word_of
-from photogram.formats.plain.schema import ANGLES, AXES, BIAS, ROTATIONS, deviation_columns
+from photogram.formats.plain.schema import AXES, BIAS, OPK, SD_ROTATIONS, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, columns_of
 from photogram.io.delimited import ColumnTable
@@ -21,8 +21,6 @@ from photogram.network.observations import Attitude, Position, Rate, Velocity
 from photogram.network.trajectories import Clock, GyroBias
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Shift, Unknown
 
-_ANGLES = ANGLES["omega_phi_kappa"]
-_ROTATIONS = deviation_columns(ROTATIONS)
 _Group = TypeVar("_Group", "Antenna", "Inertial")
 
 
@@ -79,9 +77,7 @@ def antennas(tables: Tables) -> dict[str, Antenna]:
     InputError
         A group that is there twice, other values of what has one name.
     """
-    table = tables.read("gnss_groups")
-    if table is None:
-        return {}
+    table = tables.rows("gnss_groups")
     values = {"lever": tables.vectors(table, [f"lever_{axis}" for axis in AXES], 0.0)}
     values |= {kind: table.vectors([f"{kind}_{axis}" for axis in AXES], 0.0) for kind in ("shift", "drift")}
     sd = {
@@ -120,12 +116,10 @@ def inertials(tables: Tables) -> dict[str, Inertial]:
     InputError
         A group that is there twice, other values of what has one name.
     """
-    table = tables.read("attitude_groups")
-    if table is None:
-        return {}
+    table = tables.rows("attitude_groups")
     # Both the photo and what carries it have axes as the settings say.
     matrices = tables.turns(table)
-    sd = table.vectors(_ROTATIONS, math.inf, infinite=True, read=tables.angle)
+    sd = table.vectors(SD_ROTATIONS, math.inf, infinite=True, read=tables.angle)
     biases = tables.vectors(table, BIAS, 0.0)
     bias_sd = table.vectors(deviation_columns(BIAS), math.inf, infinite=True)
     names = table.texts("group")
@@ -226,8 +220,8 @@ def inertial_columns(groups: Mapping[str, Inertial], block: Block) -> dict[str, 
     angles = angles_of(matrices, block)
     angles[[each is None or (isinstance(each, Boresight) and each.is_open) for each in boresights]] = np.nan
     sd = np.array([each.deviations if isinstance(each, Boresight) else np.zeros(3) for each in boresights])
-    found: dict[str, Any] = {"group": list(groups), **columns_of(_ANGLES, angles)}
-    found |= columns_of(_ROTATIONS, np.degrees(sd))
+    found: dict[str, Any] = {"group": list(groups), **columns_of(OPK, angles)}
+    found |= columns_of(SD_ROTATIONS, np.degrees(sd))
     words = [_boresight_word(name, each) for name, each in zip(groups, boresights, strict=True)]
     if set(words) != {"true"}:
         found["boresight"] = words

@@ -13,10 +13,10 @@ from photogram.arguments.types import Floats
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.photos import Photos
-from photogram.formats.plain.rigs import Rigs
+from photogram.formats.plain.rigs import Rigs, sensor_of
 from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
-from photogram.formats.plain.tables import Tables, columns_of, indices_of
+from photogram.formats.plain.tables import Tables, columns_of, indices_of, named_of
 from photogram.formats.rigging import Rig
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import replace
@@ -56,7 +56,7 @@ def read_timed(
         Names that are not there, line scanners without lines or times, what contradicts itself.
     """
     table = photos.table
-    on, lines = _trajectories(table, trajectories), _line_times(tables, photos)
+    on, lines = named_of(table, "trajectory", trajectories, "trajectory"), _line_times(tables, photos)
     motions = _motions(tables, table)
     clocks = scalars(tables, table, Clock, table.texts("photo"))
     rates = scalars(tables, table, Readout, table.texts("photo"), 1.0)
@@ -108,15 +108,6 @@ def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
         raise table.error(row, "line_rate is of line scanners, which the table line_times has")
 
 
-def _trajectories(table: ColumnTable, trajectories: Mapping[str, Trajectory]) -> list[Trajectory | None]:
-    """Return what the photo of each row is on; None where nothing is said."""
-    names = table.texts("trajectory")
-    for row, name in enumerate(names):
-        if name and name not in trajectories:
-            raise table.error(row, f"column trajectory: there is no trajectory {quoted(name)}")
-    return [trajectories.get(name) for name in names]
-
-
 def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
     """Return velocity and rate of each row, as arguments of :class:`Timed`; none where nothing is said."""
     values = table.vectors(_MOTION) * np.concatenate([np.ones(3), np.diag(tables.flip)])
@@ -141,23 +132,16 @@ def _on_rig(
     if name and name not in rigs:
         raise table.error(row, f"column rig: there is no rig {quoted(name)}")
     rig = rigs[name] if name else next(iter(rigs.values()))
-    sensor = own or camera
-    if sensor != rig.reference and sensor not in rig.sensors:
-        what = "sensor" if own else "camera"
-        raise table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+    sensor = sensor_of(table, row, rig, own, camera)
     return rig.sensors.get(sensor), rig.clocks.get(sensor)
 
 
 def _line_times(tables: Tables, photos: Photos) -> dict[str, Lines]:
     """Return the times of lines by the names of photos."""
-    table = tables.read("line_times")
-    if table is None:
-        return {}
+    table = tables.rows("line_times")
     places = {name: row for row, name in enumerate([*photos.names, *sorted(photos.unused)])}
     of_photos = indices_of(table, "photo", places, "photo")
-    columns = ("line", "time", "seconds_per_line")
-    values = table.vectors(columns)
-    table.check_given(values, columns)
+    values = table.given(("line", "time", "seconds_per_line"))
     found: dict[str, Lines] = {}
     for name, place in places.items():
         rows = np.flatnonzero(of_photos == place)

@@ -11,7 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
+from photogram.formats.plain.schema import AXES, DIFFERENCE, TABLES, deviation_columns
 from photogram.formats.plain.subjects import Subjects, clocked, scalar_columns, scalars, subject_columns
 from photogram.formats.plain.tables import (
     DEGREE,
@@ -109,7 +109,6 @@ class _Kind:
 
 
 _TILTS = ("sd_rotation_x", "sd_rotation_y")
-_DIFFERENCE = ("dx", "dy", "dz")
 _ENDS, _POINT = {"first": "from", "second": "to"}, {"point": "point"}
 _LEVER = ("lever_x", "lever_y", "lever_z")
 _INSTRUMENTS = _Common(
@@ -117,7 +116,7 @@ _INSTRUMENTS = _Common(
 )
 _LEVELS = _Common(Level, "level", {"height": ("z",)}, ("sd",))
 _PLANES = _Common(Plane, "plane", {_THROUGH: AXES, "normal": ("nx", "ny", "nz")}, ("sd_distance", *_TILTS))
-_LINES = _Common(Line, "line", {_THROUGH: AXES, "direction": _DIFFERENCE}, ("sd_x", "sd_y", *_TILTS))
+_LINES = _Common(Line, "line", {_THROUGH: AXES, "direction": DIFFERENCE}, ("sd_x", "sd_y", *_TILTS))
 _PLUMB_LINES = _Common(PlumbLine, "plumb_line", {_THROUGH: AXES}, ("sd_x", "sd_y"))
 _KINDS = (
     _Kind(Distance, "distances", _ENDS, {"length": ("distance",)}, unknown="instrument", common=_INSTRUMENTS),
@@ -131,7 +130,7 @@ _KINDS = (
         of_photos=True,
     ),
     _Kind(EqualHeight, "height_differences", _ENDS, {"difference": ("dz",)}),
-    _Kind(Difference, "coordinate_differences", _ENDS, {"vector": _DIFFERENCE}, _DIFFERENCE),
+    _Kind(Difference, "coordinate_differences", _ENDS, {"vector": DIFFERENCE}, DIFFERENCE),
     _Kind(OnLevel, "level_points", _POINT, {"difference": ("dz",)}, unknown="level", common=_LEVELS),
     _Kind(OnPlane, "plane_points", _POINT, {"distance": ("distance",)}, unknown="plane", common=_PLANES),
     _Kind(OnLine, "line_points", _POINT, sd=("x", "y"), unknown="line", common=_LINES),
@@ -221,9 +220,7 @@ def _named(table: ColumnTable, common: _Common, known: dict[str, Unknown]) -> li
 
 
 def _commons(tables: Tables, transform: Transform, common: _Common) -> dict[str, Unknown]:
-    table = tables.read(common.table)
-    if table is None:
-        return {}
+    table = tables.rows(common.table)
     table.names(common.column)
     given: dict[str, Floats] = {}
     for name, columns in common.values.items():

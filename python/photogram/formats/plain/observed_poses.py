@@ -27,11 +27,12 @@ from photogram.formats.plain.groups import (
 from photogram.formats.plain.observation_tables import kind_tables, read_kinds
 from photogram.formats.plain.rigs import Rigs, read_bases
 from photogram.formats.plain.schema import (
-    ANGLES,
     AXES,
+    OPK,
     POSE,
     RATE,
     ROTATIONS,
+    SD_ROTATIONS,
     VELOCITY,
     deviation_columns,
 )
@@ -54,8 +55,6 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity
 
-_ROTATIONS = deviation_columns(ROTATIONS)
-_ANGLES = ANGLES["omega_phi_kappa"]
 _Columns = dict[str, dict[str, Any]]
 _Kind = TypeVar("_Kind", bound=Observation)
 _Group = TypeVar("_Group", Antenna, Inertial)
@@ -109,9 +108,7 @@ def _gnss(tables: Tables, transform: Transform, subjects: Subjects) -> list[Obse
 
 
 def _velocities(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.read("velocities")
-    if table is None:
-        return []
+    table = tables.rows("velocities")
     of = subjects.of(tables, table)
     measured = _measured(tables, table, "velocities", VELOCITY)
     groups = grouped(tables, table, antennas(tables), "gnss_groups")
@@ -140,18 +137,14 @@ def _used(
 
 def _measured(tables: Tables, table: ColumnTable, name: str, columns: Sequence[str]) -> tuple[Floats, Floats]:
     """Return (rows, 3) what was observed, and (rows, 3, 3) covariances."""
-    values = table.vectors(columns)
-    table.check_given(values, columns)
-    names = deviation_columns(columns)
+    values, names = table.given(columns), deviation_columns(columns)
     sd = tables.deviations(table, name, names)
     table.check_given(sd, names, f"is empty: give it, or {name} under [sd]")
     return values, covariances_of(sd, table, columns)
 
 
 def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.read("rates")
-    if table is None:
-        return []
+    table = tables.rows("rates")
     of = subjects.of(tables, table)
     values, covariances = _measured(tables, table, "rates", RATE)
     # About axes that point as those of photos do.
@@ -164,19 +157,14 @@ def _rates(tables: Tables, subjects: Subjects) -> list[Observation]:
 
 
 def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
-    table = tables.read("attitudes")
-    if table is None:
-        return []
+    table = tables.rows("attitudes")
     of = subjects.of(tables, table)
-    matrices = tables.matrices(table)
     given_sd = tables.settings.sd.get("attitudes")
-    sd = table.vectors(_ROTATIONS, read=tables.angle)
+    sd = table.vectors(SD_ROTATIONS, read=tables.angle)
     if given_sd is not None:
         sd = np.where(np.isnan(sd), [tables.angle(repr(each)) for each in given_sd], sd)
-    table.check_given(sd, _ROTATIONS, "is empty: give it, or attitudes under [sd]")
-    unknown = np.isnan(matrices).any(axis=(1, 2))
-    if unknown.any():
-        raise table.error(int(np.argmax(unknown)), "there is no attitude")
+    table.check_given(sd, SD_ROTATIONS, "is empty: give it, or attitudes under [sd]")
+    matrices = tables.known_matrices(table, "there is no attitude")
     covariances = tables.flip @ covariances_of(sd, table, ROTATIONS, (tables.radians,) * 3) @ tables.flip
     groups = grouped(tables, table, inertials(tables), "attitude_groups")
     return [
@@ -186,20 +174,14 @@ def _attitudes(tables: Tables, subjects: Subjects) -> list[Observation]:
 
 
 def _relative_poses(tables: Tables, photos: Mapping[str, int]) -> list[Observation]:
-    table = tables.read("relative_poses")
-    if table is None:
-        return []
-    names = list(photos)
+    table, names = tables.rows("relative_poses"), list(photos)
     first, second = (indices_of(table, column, photos, "photo").tolist() for column in ("from", "to"))
-    vectors, turns = tables.vectors(table, AXES), tables.turns(table)
-    table.check_given(vectors, AXES)
+    vectors = table.given(AXES) @ tables.flip
     lengths = tables.deviations(table, "relative_poses", deviation_columns(AXES))
-    angles = table.vectors(_ROTATIONS, read=tables.angle)
+    angles = table.vectors(SD_ROTATIONS, read=tables.angle)
     sd = np.column_stack([lengths, angles])
     table.check_given(sd, deviation_columns(POSE))
-    covariances = tables.pose_covariances(table, sd)
-    for row in np.flatnonzero(np.isnan(turns).any(axis=(1, 2))).tolist():
-        raise table.error(row, "there are no angles")
+    covariances, turns = tables.pose_covariances(table, sd), tables.flip @ tables.known_matrices(table)
     given = zip(first, second, vectors, turns, covariances, strict=True)
     return [
         made(table, row, partial(Relative, names[one], names[other], vector, turn, covariance=covariance))
@@ -272,7 +254,7 @@ def _inertial_tables(block: Block) -> _Columns:
     found: _Columns = {}
     if attitudes:
         angles = angles_of(np.array([np.asarray(each.attitude) for each in attitudes]), block)
-        turned = _written(attitudes, _ANGLES, angles, ROTATIONS, (DEGREE,) * 3)
+        turned = _written(attitudes, OPK, angles, ROTATIONS, (DEGREE,) * 3)
         found["attitudes"] = subject_columns(attitudes, block) | turned
     if rates:
         values = np.array([each.observed[:3] for each in rates])
@@ -297,4 +279,4 @@ def _pose_tables(block: Block) -> _Columns:
     )
     units = (1.0,) * 3 + (DEGREE,) * 3
     ends = {"from": [each.first for each in poses], "to": [each.second for each in poses]}
-    return {"relative_poses": ends | _written(poses, (*AXES, *_ANGLES), values, POSE, units)}
+    return {"relative_poses": ends | _written(poses, (*AXES, *OPK), values, POSE, units)}

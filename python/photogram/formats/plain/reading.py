@@ -26,12 +26,18 @@ from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_p
 from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.film_readings import Seen
 from photogram.formats.plain.films import on_film, read_scanned
-from photogram.formats.plain.images import Images, image_coordinates, read_images, sd_is_given
 from photogram.formats.plain.moving_photos import placed, read_timed
 from photogram.formats.plain.observed_poses import read_observations
-from photogram.formats.plain.photos import Photos, read_photos
+from photogram.formats.plain.photos import (
+    Images,
+    Photos,
+    image_coordinates,
+    read_images,
+    read_photos,
+    sd_is_given,
+)
 from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
-from photogram.formats.plain.schema import AXES
+from photogram.formats.plain.schema import AXES, SD_AXES
 from photogram.formats.plain.seams import mounted_halves, with_seams
 from photogram.formats.plain.settings import Settings, read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
@@ -43,7 +49,6 @@ from photogram.formats.project import Project, Unused, assembled
 from photogram.formats.rigging import Stand, mounted
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import quoted
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed
 from photogram.network.observations import Control, Observation, of_records
@@ -55,7 +60,6 @@ LEVELS = "no standard deviation of an image of level 0: 1 px is assumed (--sd im
 """What is told of images whose table has levels alone."""
 DIFFER = 1e-6
 """What the positions of a point in two tables may differ by."""
-_SD = tuple(f"sd_{axis}" for axis in AXES)
 _USES = ("control", "check", "off")
 
 
@@ -260,20 +264,17 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     """
     names = table.names_once("point")
     values = table.vectors(AXES)
-    uses = [each.lower() for each in table.texts("use", "control")]
-    sd = table.vectors(_SD, infinite=True)
+    uses = table.words("use", _USES)
+    sd = table.vectors(SD_AXES, infinite=True)
     stray = ~np.isnan(sd) & np.isnan(values)
     if stray.any():
         row, k = np.argwhere(stray)[0].tolist()
-        raise table.error(row, f"column {_SD[k]}: there is a standard deviation, but no {AXES[k]}")
+        raise table.error(row, f"column {SD_AXES[k]}: there is a standard deviation, but no {AXES[k]}")
     check = np.array([each == "check" for each in uses], dtype=bool)[:, np.newaxis]
+    sd = tables.deviations(table, "control", SD_AXES)
     if "check" in tables.settings.sd:
-        sd = np.where(check, tables.deviations(table, "check", _SD), tables.deviations(table, "control", _SD))
-    else:
-        sd = tables.deviations(table, "control", _SD)
+        sd = np.where(check, tables.deviations(table, "check", SD_AXES), sd)
     for row, use in enumerate(uses):
-        if use not in _USES:
-            raise table.error(row, f"column use: {quoted(use)} is none of {', '.join(_USES)}")
         if np.isnan(values[row]).all():
             raise table.error(row, f"{names[row]} has no coordinates")
         if use == "control" and (np.isnan(sd[row]) & ~np.isnan(values[row])).any():
@@ -329,7 +330,7 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
     if table is not None:
         rows = np.array([places[name] for name in own], dtype=np.int64)
         given = table.vectors(AXES)
-        own_sd = tables.deviations(table, "points", _SD, math.inf)
+        own_sd = tables.deviations(table, "points", SD_AXES, math.inf)
         given, _ = transform.positions("points", given, None, table)
         starts[rows] = given
         held: Bools = np.asarray(np.isfinite(own_sd).any(axis=1))

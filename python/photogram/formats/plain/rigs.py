@@ -11,10 +11,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import ANGLES, AXES, POSE, ROTATIONS, deviation_columns
+from photogram.formats.plain.schema import AXES, OPK, POSE, ROTATIONS, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of
 from photogram.formats.rigging import FrameOf, Rig
+from photogram.io.delimited import ColumnTable
 from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
@@ -22,7 +23,6 @@ from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 
-_ANGLES = ANGLES["omega_phi_kappa"]
 FRAME = "frame itself"
 """What the first sensor of a rig is called where sensors have names of their own."""
 ZERO = 1e-6
@@ -37,9 +37,7 @@ def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
     InputError
         Cameras that are not there, sensors that are there twice, a first sensor with a pose.
     """
-    table = tables.read("rigs")
-    if table is None:
-        return {}
+    table = tables.rows("rigs")
     values, matrices = tables.vectors(table, AXES), tables.turns(table)
     lengths = table.vectors(deviation_columns(AXES), math.inf, infinite=True)
     angles = table.vectors(deviation_columns(ROTATIONS), math.inf, infinite=True, read=tables.angle)
@@ -96,9 +94,7 @@ def read_frames(
     InputError
         Rigs, photos and sensors that are not there, two photos of a sensor on one frame.
     """
-    table = tables.read("frames")
-    if table is None:
-        return []
+    table = tables.rows("frames")
     rows = indices_of(table, "photo", {name: row for row, name in enumerate(photos)}, "photo").tolist()
     found: dict[str, tuple[Rig, dict[str, int]]] = {}
     for row, (photo, frame, name, own) in enumerate(
@@ -106,10 +102,8 @@ def read_frames(
     ):
         if name not in rigs:
             raise table.error(row, f"column rig: there is no rig {quoted(name)}")
-        rig, sensor = rigs[name], own or cameras[photo]
-        if sensor != rig.reference and sensor not in rig.sensors:
-            what = "sensor" if own else "camera"
-            raise table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+        rig = rigs[name]
+        sensor = sensor_of(table, row, rig, own, cameras[photo])
         _, members = found.setdefault(frame, (rig, {}))
         if found[frame][0] is not rig or sensor in members:
             what = "sensor" if own else "camera"
@@ -122,10 +116,25 @@ def read_frames(
     return [FrameOf(name, rig, members) for name, (rig, members) in found.items()]
 
 
+def sensor_of(table: ColumnTable, row: int, rig: Rig, own: str, camera: str) -> str:
+    """Return what a rig calls the sensor of a photo: as the row says, else as the camera.
+
+    Raises
+    ------
+    InputError
+        The rig does not have it.
+    """
+    sensor = own or camera
+    if sensor != rig.reference and sensor not in rig.sensors:
+        what = "sensor" if own else "camera"
+        raise table.error(row, f"the rig {rig.name} has no {what} {sensor}, which took the photo")
+    return sensor
+
+
 def times_of_frames(tables: Tables) -> dict[str, float]:
     """Return when photos on frames were taken, of those that say it."""
-    table = tables.read("frames")
-    return {} if table is None else times_said(table.texts("photo"), table.numbers("time"))
+    table = tables.rows("frames")
+    return times_said(table.texts("photo"), table.numbers("time"))
 
 
 def times_said(photos: Sequence[str], times: Floats) -> dict[str, float]:
@@ -142,9 +151,7 @@ def read_bases(tables: Tables, rigs: Mapping[str, Rig]) -> list[Observation]:
     InputError
         Rigs and sensors that are not there, values that give no observation.
     """
-    table = tables.read("bases")
-    if table is None:
-        return []
+    table = tables.rows("bases")
     lengths = table.numbers("distance")
     sd = tables.deviations(table, "bases", ["sd"])[:, 0]
     table.check_given(np.column_stack([lengths, sd]), ("distance", "sd"))
@@ -324,6 +331,6 @@ def _poses(sensors: Sequence[Sensor | None], block: Block) -> dict[str, Any]:
     sd[:, 3:] = np.degrees(sd[:, 3:])
     return {
         **columns_of(AXES, values),
-        **columns_of(_ANGLES, angles),
+        **columns_of(OPK, angles),
         **columns_of(deviation_columns(POSE), sd),
     }

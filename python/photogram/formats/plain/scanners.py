@@ -12,6 +12,7 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
+from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID
 from photogram.formats.plain.tables import Tables
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
@@ -20,23 +21,16 @@ from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, S
 from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 
-DEVICE = ("sx", "sy", "alpha_rad")
-"""Columns of scales and obliqueness of a scanner."""
-CURVES = tuple(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj")
-"""Those of the coefficients of its polynomials."""
 BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}
 """What is not affine in films, by their model."""
 _BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
 _WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
-GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
-"""Numbers of a pattern of shifts of nodes."""
 UM = 1e-3
 """In millimetres."""
 KNOWN = 1e-6
 """Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)."""
 LOCAL = "local"
 """The pattern of films each of whose photos has a grid of its own."""
-MODELS = ("affine", "conformal", "bilinear", "projective")
 
 
 @dataclass(frozen=True)
@@ -79,12 +73,9 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
     InputError
         Numbers that are none, a covariance of components that a scanner has not.
     """
-    table = tables.read("scanners")
-    if table is None:
-        return {}
+    table = tables.rows("scanners")
     names = table.names_once("scanner")
-    counts = table.vectors(("pitch_mm", "origin_column", "origin_row"))
-    table.check_given(counts, ("pitch_mm", "origin_column", "origin_row"))
+    counts = table.given(("pitch_mm", "origin_column", "origin_row"))
     given = np.column_stack([table.numbers(name, float(name in ("sx", "sy"))) for name in (*DEVICE, *CURVES)])
     sd = table.vectors([f"sd_{name}" for name in (*DEVICE, *CURVES)], 0.0, infinite=True)
     half = np.column_stack([table.numbers(name, 1.0) for name in ("hx", "hy")])
@@ -217,22 +208,19 @@ def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[st
     InputError
         Patterns and models that there are not, numbers that are none.
     """
-    table = tables.read("films")
+    table = tables.rows("films")
     found = {
         name: FilmKind(Roll(name, 0.0, 5e-4), default, (1e-4,) * 3, _bends(default), None) for name in names
     }
-    if table is None:
-        return found
     means, sd_means = table.numbers("m", 0.0), table.numbers("sd_m", 5e-4, infinite=True)
     size = np.column_stack(
         [table.numbers(f"sd_{name}", 1e-4, infinite=True) for name in ("photo_m", "b1", "b2")]
     )
     models = table.texts("model", default)
     for row, name in enumerate(table.names_once("film")):
-        if models[row] not in MODELS:
-            raise table.error(
-                row, f"column model: there is no film {quoted(models[row])}{nearest(models[row], MODELS)}"
-            )
+        if models[row] not in FILM_MODELS:
+            what = f"there is no film {quoted(models[row])}{nearest(models[row], FILM_MODELS)}"
+            raise table.error(row, f"column model: {what}")
         bends = _bends(models[row])
         columns = [f"sd_{each}" for each in BENDS.get(models[row], ())]
         own = tuple(

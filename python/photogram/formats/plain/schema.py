@@ -30,6 +30,8 @@ ANGLES: Mapping[str, tuple[str, ...]] = {
     "matrix": ("m11", "m12", "m13", "m21", "m22", "m23", "m31", "m32", "m33"),
 }
 """Columns of each representation of attitudes."""
+OPK = ANGLES["omega_phi_kappa"]
+"""That which is written."""
 ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
 
 
@@ -85,13 +87,23 @@ class Schema:
         return tuple(each for each in self.required if self.stands_in.get(each) not in there)
 
 
-_SD_AXES, _SD_ROTATIONS = deviation_columns(AXES), deviation_columns(ROTATIONS)
+SD_AXES, SD_ROTATIONS = deviation_columns(AXES), deviation_columns(ROTATIONS)
+ENDS, DIFFERENCE = ("from", "to"), ("dx", "dy", "dz")
+DEVICE = ("sx", "sy", "alpha_rad")
+"""Scales and obliqueness of a scanner."""
+CURVES = tuple(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj")
+"""Coefficients of its polynomials."""
+GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
+"""Numbers of a pattern of shifts of nodes."""
+FILM_MODELS = ("affine", "conformal", "bilinear", "projective")
+BENDS = ("bend_x", "bend_y")
+"""Deflections of a board."""
+PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
+"""Lengths of a board."""
 _SD_ANGLES = deviation_columns(ALL_ANGLES[:9])
 """Of angles about axes."""
 _PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
-_ENDS, _DIFFERENCE = ("from", "to"), ("dx", "dy", "dz")
 _ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
-_DEVICE = ("sx", "sy", "alpha_rad", *(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj"))
 _CLOCK = ("time_offset", "sd_time_offset")
 _OF_BASES = tuple(
     name
@@ -134,7 +146,7 @@ TABLES: Mapping[str, Schema] = {
             *("film", "scanner", "mirrored", "certificate", "flown"),
         ),
         (
-            *(*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ANGLES, *_SD_ROTATIONS, "time"),
+            *(*AXES, *ALL_ANGLES, *SD_AXES, *_SD_ANGLES, *SD_ROTATIONS, "time"),
             *(*VELOCITY, *RATE, *deviation_columns((*VELOCITY, *RATE))),
             *(*_CLOCK, "line_rate", "sd_line_rate"),
             *("start_t1", "start_t2", "start_theta", "seam_column", "seam_row"),
@@ -166,7 +178,7 @@ TABLES: Mapping[str, Schema] = {
     "points": Schema(
         ("point", *AXES),
         ("point",),
-        (*AXES, *_SD_AXES),
+        (*AXES, *SD_AXES),
         "`point`, `x`, `y`, `z`; `sd_x` ..: initial values, may be left out altogether",
         deviations=(1, 3),
         has_system=True,
@@ -192,7 +204,7 @@ TABLES: Mapping[str, Schema] = {
         ("film", "model", "pattern"),
         (
             *("m", "sd_m", "sd_photo_m", "sd_b1", "sd_b2", "sd_h1", "sd_h2", "sd_g1", "sd_g2"),
-            *("half_format_mm", "grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows"),
+            *("half_format_mm", *GRID),
             *(*(f"sd_w{k}" for k in range(1, 11)), "sd_smooth"),
         ),
         "`film`; `model` (`affine`, `conformal`, `bilinear`, `projective`; default: `[film] model`), `m` of"
@@ -206,8 +218,8 @@ TABLES: Mapping[str, Schema] = {
         ("scanner", "pitch_mm", "origin_column", "origin_row"),
         ("scanner", "rows_down", "calibration"),
         (
-            *("pitch_mm", "origin_column", "origin_row", *_DEVICE, "hx", "hy"),
-            *deviation_columns(_DEVICE),
+            *("pitch_mm", "origin_column", "origin_row", *DEVICE, *CURVES, "hx", "hy"),
+            *deviation_columns((*DEVICE, *CURVES)),
         ),
         "`scanner`, `pitch_mm`, `origin_column`, `origin_row`; `rows_down` (true), `Sx`, `Sy` (1),"
         " `alpha_rad` (0), `xA` .. `yJ` (0; mm) over `hx`, `hy` (1; mm), `sd_Sx` .. (0; `inf` unknown): what"
@@ -217,7 +229,7 @@ TABLES: Mapping[str, Schema] = {
     "control": Schema(
         ("point",),
         ("point", "use", "cover"),
-        (*AXES, "sd", *_SD_AXES, *covariance_columns(AXES)),
+        (*AXES, "sd", *SD_AXES, *covariance_columns(AXES)),
         "`point`, one of `x`, `y`, `z`; `sd_x` .., `cov_xy`, `cov_xz`, `cov_yz`, `use` (`control`, `check`,"
         " `off`): of a check point `sd_x` .. say how good its coordinates are"
         " ([tests](tests.md#check-points)); `[sd]` has `check` for these; `cover` (`open`, `vegetated`) of"
@@ -226,8 +238,8 @@ TABLES: Mapping[str, Schema] = {
         has_system=True,
     ),
     "distances": Schema(
-        (*_ENDS, "distance"),
-        (*_ENDS, "instrument"),
+        (*ENDS, "distance"),
+        (*ENDS, "instrument"),
         ("distance", "sd"),
         "`from`, `to`, `distance`; `sd`, `instrument`",
         deviations=(1,),
@@ -244,8 +256,8 @@ TABLES: Mapping[str, Schema] = {
         stands_in={"photo": "trajectory"},
     ),
     "lengths": Schema(
-        ("line", *_ENDS, "length"),
-        ("line", *_ENDS),
+        ("line", *ENDS, "length"),
+        ("line", *ENDS),
         ("length", "sd", "temperature"),
         "`line`, `from`, `to`, `length`; `sd`, `temperature` (degrees Celsius): calibrated lengths, on the"
         " lines of VDI/VDE 2634; no observations: the statement holds adjusted ones against them",
@@ -258,16 +270,16 @@ TABLES: Mapping[str, Schema] = {
         "`instrument`; `scale` (1), `constant` (0), `sd_scale`, `sd_constant` (empty: free)",
     ),
     "height_differences": Schema(
-        (*_ENDS, "dz"),
-        _ENDS,
+        (*ENDS, "dz"),
+        ENDS,
         ("dz", "sd"),
         "`from`, `to`, `dz`; `sd`: levelled heights, above the ellipsoid in geographic space",
         deviations=(1,),
     ),
     "coordinate_differences": Schema(
-        (*_ENDS, *_DIFFERENCE),
-        _ENDS,
-        (*_DIFFERENCE, "sd", *deviation_columns(_DIFFERENCE), *covariance_columns(_DIFFERENCE)),
+        (*ENDS, *DIFFERENCE),
+        ENDS,
+        (*DIFFERENCE, "sd", *deviation_columns(DIFFERENCE), *covariance_columns(DIFFERENCE)),
         "`from`, `to`, `dx`, `dy`, `dz` (empty: not observed); `sd`, `sd_dx` .., `cov_dx_dy` ..",
         deviations=(1, 3),
     ),
@@ -296,7 +308,7 @@ TABLES: Mapping[str, Schema] = {
     "lines": Schema(
         ("line",),
         ("line",),
-        (*AXES, *_DIFFERENCE, "sd_x", "sd_y", "sd_rotation_x", "sd_rotation_y"),
+        (*AXES, *DIFFERENCE, "sd_x", "sd_y", "sd_rotation_x", "sd_rotation_y"),
         "`line`; `x`, `y`, `z` of a place, `dx`, `dy`, `dz` of the direction, `sd_x`, `sd_y`,"
         " `sd_rotation_x`, `sd_rotation_y`",
     ),
@@ -358,14 +370,14 @@ TABLES: Mapping[str, Schema] = {
     "trajectory_coefficients": Schema(
         ("trajectory", "of", "k"),
         ("trajectory", "of"),
-        ("k", *AXES, *_SD_AXES),
+        ("k", *AXES, *SD_AXES),
         "`trajectory`, `of` (`position`, `rotation`), `k` (from 0); `x`, `y`, `z` (0), `sd_x` .. (default:"
         " as `trajectories` says): in the unit of length, or of angles",
     ),
     "smoothness": Schema(
         ("trajectory", "of", "k", FACTORS[0]),
         ("trajectory", "of"),
-        ("k", *FACTORS, *AXES, "sd", *_SD_AXES, *covariance_columns(AXES)),
+        ("k", *FACTORS, *AXES, "sd", *SD_AXES, *covariance_columns(AXES)),
         "`trajectory`, `of`, `k` of the first of neighbouring coefficients, `factor_0` .. `factor_3`: their"
         " sum was observed as `x`, `y`, `z` (0); `sd`, `sd_x` .., `cov_xy` .. in the units of coefficients;"
         " beside `_smooth` and `_correlation`, in the place of these where it has all their coefficients",
@@ -387,7 +399,7 @@ TABLES: Mapping[str, Schema] = {
     "gnss": Schema(
         ("photo", *AXES),
         ("photo", "trajectory", "group"),
-        (*AXES, "sd", *_SD_AXES, *covariance_columns(AXES), "time"),
+        (*AXES, "sd", *SD_AXES, *covariance_columns(AXES), "time"),
         "`photo`, or `trajectory` and `time` (s), `x`, `y`, `z`; `sd`, `sd_x` .., `cov_xy` .., `group`,"
         " `time` of a photo, for drifts",
         deviations=(1, 3),
@@ -417,7 +429,7 @@ TABLES: Mapping[str, Schema] = {
     "attitudes": Schema(
         ("photo",),
         ("photo", "trajectory", "group"),
-        ("time", *ALL_ANGLES, *_SD_ANGLES, *_SD_ROTATIONS, *covariance_columns(ROTATIONS)),
+        ("time", *ALL_ANGLES, *_SD_ANGLES, *SD_ROTATIONS, *covariance_columns(ROTATIONS)),
         "`photo`, or `trajectory` and `time` (s), angles; `sd_rotation_x` .., `cov_rotation_x_rotation_y` ..,"
         " `group`",
         deviations=(1, 3),
@@ -435,23 +447,23 @@ TABLES: Mapping[str, Schema] = {
     "attitude_groups": Schema(
         ("group",),
         ("group", "boresight", "clock", "bias"),
-        (*ALL_ANGLES, *_SD_ROTATIONS, *_CLOCK, *BIAS, *deviation_columns(BIAS)),
+        (*ALL_ANGLES, *SD_ROTATIONS, *_CLOCK, *BIAS, *deviation_columns(BIAS)),
         "`group`; angles of the boresight (empty: from photos and attitudes), `sd_rotation_x` .. (empty:"
         " free), `boresight` (true, false, or a name that groups share); of records of trajectories"
         " `time_offset`, `sd_time_offset`, `clock` as in `gnss_groups`; of rates `bias` (true, false, or a"
         " name that groups share), `bias_x` .. (0; rad/s), `sd_bias_x` .. (empty: free)",
     ),
     "relative_poses": Schema(
-        (*_ENDS, *AXES),
-        _ENDS,
-        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS, *covariance_columns(POSE)),
+        (*ENDS, *AXES),
+        ENDS,
+        (*AXES, *ALL_ANGLES, *SD_AXES, *SD_ROTATIONS, *covariance_columns(POSE)),
         "`from`, `to` (photos), `x`, `y`, `z`, angles: the second photo in the axes of the first; `sd_x` ..,"
         " `sd_rotation_x` .., `cov_xy` .., `cov_x_rotation_z` ..",
     ),
     "rigs": Schema(
         ("rig",),
         ("rig", "camera", "sensor", "clock"),
-        (*AXES, *ALL_ANGLES, *_SD_AXES, *_SD_ROTATIONS, *_CLOCK),
+        (*AXES, *ALL_ANGLES, *SD_AXES, *SD_ROTATIONS, *_CLOCK),
         "`rig`, `camera` or `sensor`; `x`, `y`, `z`, angles, `sd_x` .., `sd_rotation_x` ..; the first row of"
         " a rig is its reference, a row with no numbers an unknown sensor; of sensors whose photos are on"
         " trajectories and say none of their own `time_offset` (0; s), `sd_time_offset` (s; 0: known),"
@@ -468,8 +480,8 @@ TABLES: Mapping[str, Schema] = {
         ("board", "kind"),
         ("board", "kind", "shape", "regularise"),
         (
-            *("columns", "rows", "spacing_x", "spacing_y", "tag_size", "tag_spacing"),
-            *("bend_x", "bend_y", "sd_bend_x", "sd_bend_y"),
+            *("columns", "rows", *PITCHES),
+            *(*BENDS, *deviation_columns(BENDS)),
         ),
         "`board`, `kind` (`chessboard`, `charuco`, `aprilgrid`, `circles`, `asymmetric_circles`, `points`):"
         " what the control is the points of ([targets](targets.md)); `columns`, `rows`, `spacing_x`,"
@@ -485,8 +497,8 @@ TABLES: Mapping[str, Schema] = {
         " `sd_tangential` (0: known): in units of its stereographic image, observed as 0 where weighted",
     ),
     "bases": Schema(
-        ("rig", *_ENDS, "distance"),
-        ("rig", *_ENDS),
+        ("rig", *ENDS, "distance"),
+        ("rig", *ENDS),
         ("distance", "sd"),
         "`rig`, `from`, `to` (cameras or sensors), `distance`; `sd`",
         deviations=(1,),

@@ -14,7 +14,7 @@ from photogram.arguments.arrays import shown
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns, columns_given
 from photogram.formats.format import PhotoFiles, Wishes
-from photogram.formats.plain.schema import TABLES
+from photogram.formats.plain.schema import ANGLES, FILM_MODELS, TABLES
 from photogram.formats.plain.statement_settings import KEYS, read_asked
 from photogram.formats.project import DatumName, Frame, Options
 from photogram.io.toml import Sections, day_of
@@ -36,19 +36,11 @@ _CHOICES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("units", "image"): ("px", "mm", "um"),
     ("axes", "image_y"): ("down", "up"),
     ("axes", "pixel_origin"): ("corner", "center"),
-    ("axes", "attitude"): (
-        "omega_phi_kappa",
-        "phi_omega_kappa",
-        "yaw_pitch_roll",
-        "azimuth_tilt_swing",
-        "quaternion",
-        "rotation_vector",
-        "matrix",
-    ),
+    ("axes", "attitude"): tuple(ANGLES),
     ("axes", "rotation"): ("object_to_photo", "photo_to_object"),
     ("axes", "photo"): ("y_up", "y_down"),
     ("time", "scale"): ("none", "utc", "gps", "tai", "et"),
-    ("film", "model"): ("affine", "conformal", "bilinear", "projective"),
+    ("film", "model"): FILM_MODELS,
     ("film", "interior"): ("inside", "before"),
     ("adjust", "datum"): ("control", "minimum", "inner"),
     ("adjust", "loss"): ("none", "huber", "cauchy"),
@@ -178,6 +170,13 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
         message = "[project] format is missing" if version is None else f"has format {shown(version)}"
         form = f"this is version {VERSION} of the schema, `format = {VERSION}`"
         file.fail("project", "format", f"{message}: {form}")
+    # Defaults of the keys are those of the settings.
+    words: dict[str, Any] = {
+        key: file.word(section, key)
+        for section in ("units", "axes")
+        for key in _KEYS[section] or ()
+        if file.has(section, key)
+    }
     return Settings(
         path=path,
         name=file.text("project", "name"),
@@ -188,14 +187,7 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
             # `free` is what earlier versions wrote where nobody had asked for anything.
             cast("Any", {"free": "constrained"}.get(basis := file.word("adjust", "unit_variance"), basis)),
         ),
-        length=file.word("units", "length"),
-        angle=file.word("units", "angle"),
-        image=file.word("units", "image"),
-        image_y=file.word("axes", "image_y") if file.has("axes", "image_y") else "",
-        pixel_origin=file.word("axes", "pixel_origin"),
-        attitude=file.word("axes", "attitude"),
-        rotation=file.word("axes", "rotation"),
-        photo=file.word("axes", "photo"),
+        **words,
         time_origin=file.time_origin(),
         time_scale=file.word("time", "scale"),
         sd={name: file.deviations(name) for name in WITH_SD if file.has("sd", name)} | dict(wishes.sd),

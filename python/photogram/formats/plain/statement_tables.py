@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from photogram.errors import InputError
+from photogram.formats.plain.schema import ENDS
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.delimited import ColumnTable
 from photogram.io.toml import TomlFile
@@ -15,7 +16,6 @@ from photogram.results.statement.request import Asked
 
 COVERS = ("open", "vegetated")
 """What check points lie in; the first is the default (ASPRS, Edition 2: NVA and VVA)."""
-_ENDS = ("from", "to")
 
 
 def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) -> frozenset[str]:
@@ -34,10 +34,8 @@ def read_cover(table: ColumnTable, names: Sequence[str], uses: Sequence[str]) ->
         Another word; a control point in vegetation.
     """
     found = []
-    for row, word in enumerate(table.texts("cover", COVERS[0])):
-        if word.lower() not in COVERS:
-            raise table.error(row, f"column cover: {quoted(word)} is none of {', '.join(COVERS)}")
-        if word.lower() == COVERS[0]:
+    for row, word in enumerate(table.words("cover", COVERS)):
+        if word == COVERS[0]:
             continue
         if uses[row] == "control":
             raise table.error(row, f"column cover: {names[row]} is control; only check points have a cover")
@@ -82,13 +80,11 @@ def asked_of(tables: Tables, points: Mapping[str, int], vegetated: frozenset[str
 
 def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, Any], ...]:
     """Return the rows of the table of calibrated lengths."""
-    table = tables.read("lengths")
-    if table is None:
-        return ()
+    table = tables.rows("lengths")
     table.names("line")
-    for end in _ENDS:
+    for end in ENDS:
         indices_of(table, end, points, "point")
-    lines, first, second = (table.texts(column) for column in ("line", *_ENDS))
+    lines, first, second = (table.texts(column) for column in ("line", *ENDS))
     sizes, warmth = table.numbers("length").tolist(), table.numbers("temperature").tolist()
     deviations = tables.deviations(table, "lengths", ("sd",))[:, 0].tolist()
     found = []
@@ -109,7 +105,7 @@ def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the columns of the table of lengths; none without any."""
     if not lengths:
         return {}
-    columns = {name: [each[name] for each in lengths] for name in ("line", *_ENDS, "length", "sd")}
+    columns = {name: [each[name] for each in lengths] for name in ("line", *ENDS, "length", "sd")}
     if any("temperature" in each for each in lengths):
         columns["temperature"] = [each.get("temperature") for each in lengths]
     return columns

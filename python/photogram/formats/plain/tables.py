@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -18,12 +18,14 @@ from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLE
 from photogram.formats.plain.settings import Settings
 from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.unknowns import Unknown
 
+_Named = TypeVar("_Named")
 DEGREE = 180 / np.pi
 """Of a radian."""
 
@@ -83,6 +85,14 @@ class Tables:
         required = schema.needed(table.columns)
         return settled(table, given, known, metre, required, self.names, name, self.messages)
 
+    def rows(self, name: str) -> ColumnTable:
+        """Return a table, one without rows where there is none; errors as :meth:`read`."""
+        found = self.read(name)
+        if found is not None:
+            return found
+        path, columns = self.settings.path, TABLES[name].columns
+        return ColumnTable(path, Place(path), columns, 0, dict.fromkeys(columns, ()), ())
+
     def tell(self, text: str, path: Path | None = None) -> None:
         """Add a remark, on a file."""
         self.messages.append(Message(text, path))
@@ -123,6 +133,14 @@ class Tables:
         if len(known):
             self._check_rows(table, values, known)
             found[known] = matrices_of(self.settings, values[known])
+        return found
+
+    def known_matrices(self, table: ColumnTable, why: str = "there are no angles") -> Floats:
+        """Return (rows, 3, 3) attitudes A, photo to object; a row without one is an error."""
+        found = self.matrices(table)
+        unknown = np.isnan(found).any(axis=(1, 2))
+        if unknown.any():
+            raise table.error(int(np.argmax(unknown)), why)
         return found
 
     @property
@@ -253,6 +271,21 @@ def indices_of(table: ColumnTable, column: str, places: Mapping[str, int], kind:
         row = int(np.flatnonzero(found.rows == missing)[0])
         raise table.error(row, f"column {column}: there is no {kind} {quoted(found.names[missing])}")
     return rows[found.rows]
+
+
+def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind: str) -> list[_Named | None]:
+    """Return which of the named things each row names; None where the cell is empty.
+
+    Raises
+    ------
+    InputError
+        A name that is not there.
+    """
+    names = table.texts(column)
+    for row, name in enumerate(names):
+        if name and name not in known:
+            raise table.error(row, f"column {column}: there is no {kind} {quoted(name)}")
+    return [known.get(name) for name in names]
 
 
 def vectors_of(

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.common_unknowns import made
-from photogram.formats.plain.schema import AXES, BASES, FACTORS, VELOCITY, deviation_columns
+from photogram.formats.plain.schema import AXES, BASES, FACTORS, SD_AXES, VELOCITY
 from photogram.formats.plain.tables import Tables, covariances_of, indices_of, vectors_of
 from photogram.io.delimited import ColumnTable
 from photogram.lazy_dataclasses import replace
@@ -29,7 +29,6 @@ from photogram.network.trajectories import (
     Trajectory,
 )
 
-_SD = deviation_columns(AXES)
 _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
     "body_rotations",
@@ -58,8 +57,8 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
     records = _records(tables, table, places)
     bases = [_Bases(tables, table, of, places) for of in BASES]
     bodies = _turned(tables, "body_rotations", places, tables.flip)
-    along = cast("list[PositionAxes]", _words(table, "position_axes", get_args(PositionAxes)))
-    angles = cast("list[Angles]", _words(table, "angles", get_args(Angles)))
+    along = cast("list[PositionAxes]", table.words("position_axes", get_args(PositionAxes)))
+    angles = cast("list[Angles]", table.words("angles", get_args(Angles)))
     found: dict[str, Trajectory] = {}
     for row, name in enumerate(names):
         own = records[row]
@@ -84,11 +83,7 @@ def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = Fal
     indices_of(table, "trajectory", places, "trajectory")
     words: Sequence[Sequence[str]] = [table.texts("trajectory")]
     if bases:
-        of = [each.lower() for each in table.texts("of")]
-        for row, word in enumerate(of):
-            if word not in BASES:
-                raise table.error(row, f"column of: {quoted(word)} is none of {', '.join(BASES)}")
-        words = [*words, of]
+        words = [*words, table.words("of", BASES, "")]
     found: dict[tuple[str, ...], list[int]] = {}
     for row, key in enumerate(zip(*words, strict=True)):
         found.setdefault(key, []).append(row)
@@ -97,8 +92,7 @@ def _rows_of(table: ColumnTable, places: Mapping[str, int], *, bases: bool = Fal
 
 def _times(table: ColumnTable, groups: Groups, column: str = "time", *, multiple: bool = False) -> Floats:
     """Return (rows,) times that increase in each group or, where there may be `multiple`, do not decrease."""
-    times = table.numbers(column)
-    table.check_given(times[:, np.newaxis], (column,))
+    times = table.given((column,))[:, 0]
     for rows in groups.values():
         steps = np.diff(times[rows])
         back = steps < 0 if multiple else steps <= 0
@@ -112,14 +106,9 @@ def _turned(
     tables: Tables, name: str, places: Mapping[str, int], flip: Floats | None = None
 ) -> dict[str, tuple[Floats, Floats]]:
     """Return (k,) times and (k, 3, 3) attitudes of each trajectory that a table has; `flip`: of no photo."""
-    table = tables.read(name)
-    if table is None:
-        return {}
+    table = tables.rows(name)
     groups = _rows_of(table, places)
-    times, matrices = _times(table, groups), tables.matrices(table)
-    unknown = np.isnan(matrices).any(axis=(1, 2))
-    if unknown.any():
-        raise table.error(int(np.argmax(unknown)), "there are no angles")
+    times, matrices = _times(table, groups), tables.known_matrices(table)
     if flip is not None:
         matrices = matrices @ flip
     return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
@@ -127,18 +116,13 @@ def _turned(
 
 def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> list[Table]:
     """Return what is known beforehand of the trajectory of each row."""
-    positions = {}
-    if (own := tables.read("trajectory_positions")) is not None:
-        groups = _rows_of(own, places)
-        times, values = _times(own, groups), own.vectors(AXES)
-        own.check_given(values, AXES)
-        values = np.column_stack([values, vectors_of(own, VELOCITY)])
-        positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
+    own = tables.rows("trajectory_positions")
+    groups = _rows_of(own, places)
+    times, values = _times(own, groups), np.column_stack([own.given(AXES), vectors_of(own, VELOCITY)])
+    positions = {of: (times[rows], values[rows]) for (of,), rows in groups.items()}
     attitudes = _turned(tables, "trajectory_attitudes", places)
-    kinds = [
-        cast("list[Interpolation]", _words(table, f"{of}interpolation", get_args(Interpolation)))
-        for of in ("", "attitude_")
-    ]
+    joined = [table.words(f"{of}interpolation", get_args(Interpolation)) for of in ("", "attitude_")]
+    kinds = cast("list[list[Interpolation]]", joined)
     found = []
     for name, row in places.items():
         for what, known in (("positions", positions), ("attitudes", attitudes)):
@@ -153,15 +137,6 @@ def _records(tables: Tables, table: ColumnTable, places: Mapping[str, int]) -> l
         velocities = values[:, 3:] if hermite else None
         given = times, values[:, :3], *attitudes[name], velocities, kinds[0][row], kinds[1][row]
         found.append(made(table, row, partial(Table, *given)))
-    return found
-
-
-def _words(table: ColumnTable, column: str, words: Sequence[str]) -> list[str]:
-    """Return what a column says, which is one of some words; the first where there is none."""
-    found = [each.lower() for each in table.texts(column, words[0])]
-    for row, word in enumerate(found):
-        if word not in words:
-            raise table.error(row, f"column {column}: {quoted(word)} is none of {', '.join(words)}")
     return found
 
 
@@ -187,19 +162,16 @@ class _Bases:
         self.numbers["sd"] = table.numbers(f"sd_{kind}", given, infinite=True) * self.unit
         if (negative := self.numbers["sd"] < 0).any():
             raise table.error(int(np.argmax(negative)), f"column sd_{kind}: is negative")
-        self.knots: dict[str, Floats] = {}
-        if (own := tables.read("trajectory_knots")) is not None:
-            groups = _rows_of(own, places, bases=True)
-            values = _times(own, groups, "knot", multiple=True)
-            self.knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
-        self.coefficients = tables.read("trajectory_coefficients")
-        self.rows: Groups = {}
-        if self.coefficients is not None:
-            self.rows = _rows_of(self.coefficients, places, bases=True)
+        own = tables.rows("trajectory_knots")
+        groups = _rows_of(own, places, bases=True)
+        values = _times(own, groups, "knot", multiple=True)
+        self.knots = {name: values[rows] for (name, of), rows in groups.items() if of == kind}
+        self.coefficients = tables.rows("trajectory_coefficients")
+        self.rows = _rows_of(self.coefficients, places, bases=True)
         self.words = [each.lower() for each in table.texts(kind, "none")]
         self.signs = np.ones((table.count, 3))  # which way the axes of coefficients point
         if kind == "rotation":
-            about_photo = [each != "zxz" for each in _words(table, "angles", get_args(Angles))]
+            about_photo = [each != "zxz" for each in table.words("angles", get_args(Angles))]
             self.signs[about_photo] = np.diag(tables.flip)
 
     def of(self, row: int, name: str, known: Table) -> Basis | None:
@@ -266,10 +238,9 @@ class _Bases:
     def _coefficients(self, rows: Indices, count: int, sd: float) -> tuple[Floats, Floats]:
         """Return (K, 3) values and standard deviations of coefficients, those of no row by their default."""
         table = self.coefficients
-        assert table is not None
         values, deviations = np.zeros((count, 3)), np.full((count, 3), sd)
         numbers = table.numbers("k")[rows]
-        given, own = table.vectors(AXES, 0.0)[rows], table.vectors(_SD, infinite=True)[rows]
+        given, own = table.vectors(AXES, 0.0)[rows], table.vectors(SD_AXES, infinite=True)[rows]
         seen: set[int] = set()
         for row, number, value, each in zip(rows.tolist(), numbers.tolist(), given, own, strict=True):
             if number not in range(count):
@@ -277,7 +248,7 @@ class _Bases:
             if number in seen:
                 raise table.error(row, f"the coefficient {number:g} is there twice")
             if (each < 0).any():
-                raise table.error(row, f"column {_SD[int(np.argmax(each < 0))]}: is negative")
+                raise table.error(row, f"column {SD_AXES[int(np.argmax(each < 0))]}: is negative")
             seen.add(number)
             values[int(number)] = value * self.unit
             deviations[int(number)] = np.where(np.isnan(each), sd, each * self.unit)
@@ -292,12 +263,10 @@ def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> l
     InputError
         Trajectories and coefficients that are not there, standard deviations that give no weight.
     """
-    table = tables.read("smoothness")
-    if table is None:
-        return []
+    table = tables.rows("smoothness")
     groups = _rows_of(table, {name: row for row, name in enumerate(trajectories)}, bases=True)
-    sd = tables.deviations(table, "smoothness", _SD)
-    table.check_given(sd, _SD)
+    sd = tables.deviations(table, "smoothness", SD_AXES)
+    table.check_given(sd, SD_AXES)
     observed, covariances = table.vectors(AXES, 0.0), covariances_of(sd, table)
     factors, first = table.vectors(FACTORS), table.numbers("k")
     found: dict[int, Observation] = {}

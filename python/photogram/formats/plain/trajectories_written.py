@@ -10,15 +10,20 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.plain.schema import ANGLES, AXES, BASES, FACTORS, VELOCITY, deviation_columns
+from photogram.formats.plain.schema import (
+    AXES,
+    BASES,
+    FACTORS,
+    OPK,
+    SD_AXES,
+    VELOCITY,
+)
 from photogram.formats.plain.tables import DEGREE, angles_of, columns_of, correlations
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness, all_trajectories
 from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
 
-_ANGLES = ANGLES["omega_phi_kappa"]
-_SD = deviation_columns(AXES)
 Place = tuple[str, str, int]
 """Trajectory, position or rotation, and the number of a coefficient."""
 
@@ -60,17 +65,14 @@ def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
     for name, usual in (("position_axes", "table"), ("angles", "vector")):
         words = [getattr(each, name) for each in own]
         columns[name] = words if set(words) != {usual} else [""] * len(own)
-    coefficients: list[dict[str, Any]] = []
+    coefficients: list[tuple[Trajectory, int]] = []
     for k, kind in enumerate(BASES):
         bases = [each.position if k == 0 else each.rotation for each in own]
         columns |= _basis_columns(kind, bases)
         sd = [_common_sd(each, k) for each in own]
         columns[f"sd_{kind}"] = np.array([math.nan if each is None else each for each in sd]) * _unit(kind)
-        coefficients += [
-            _coefficient_rows(each, k)
-            for each, common, basis in zip(own, sd, bases, strict=True)
-            if common is None and basis is not None
-        ]
+        parts = zip(own, sd, bases, strict=True)
+        coefficients += [(each, k) for each, common, basis in parts if common is None and basis is not None]
     found = {"trajectories": {name: each for name, each in columns.items() if not _is_empty(each)}}
     found["trajectory_positions"] = _position_records(own)
     attitudes = [(each.name, each.table.attitude_times, each.table.attitudes) for each in own]
@@ -81,7 +83,7 @@ def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
     if knots := _knots(own):
         found["trajectory_knots"] = knots
     if coefficients:
-        found["trajectory_coefficients"] = _joined(coefficients)
+        found["trajectory_coefficients"] = _coefficient_rows(coefficients)
     return found
 
 
@@ -124,69 +126,50 @@ def _common_sd(own: Trajectory, which: int) -> float | None:
     return sd.pop() if alike else None
 
 
-def _coefficient_rows(own: Trajectory, which: int) -> dict[str, Any]:
-    coefficients, unit = own.coefficients[which], _unit(BASES[which])
-    values = np.array([each.position for each in coefficients]) * unit
-    sd = np.array([each.deviations for each in coefficients]) * unit
+def _coefficient_rows(parts: Sequence[tuple[Trajectory, int]]) -> dict[str, Any]:
+    """Return the table of the coefficients of positions (0) or rotations (1) of trajectories."""
+    rows = [(own.name, which, each) for own, which in parts for each in own.coefficients[which]]
+    units = np.array([_unit(BASES[which]) for _, which, _ in rows])[:, np.newaxis]
     return {
-        "trajectory": [own.name] * len(coefficients),
-        "of": [BASES[which]] * len(coefficients),
-        "k": np.arange(len(coefficients)),
-        **columns_of(AXES, values),
-        **columns_of(_SD, sd),
-    }
-
-
-def _joined(parts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return tables of the same columns as one."""
-    arrays = {name: [each[name] for each in parts] for name in parts[0]}
-    return {
-        name: np.concatenate(own)
-        if isinstance(own[0], np.ndarray)
-        else [each for part in own for each in part]
-        for name, own in arrays.items()
+        "trajectory": [name for name, _, _ in rows],
+        "of": [BASES[which] for _, which, _ in rows],
+        "k": np.concatenate([np.arange(len(own.coefficients[which])) for own, which in parts]),
+        **columns_of(AXES, np.array([each.position for *_, each in rows]) * units),
+        **columns_of(SD_AXES, np.array([each.deviations for *_, each in rows]) * units),
     }
 
 
 def _position_records(own: Sequence[Trajectory]) -> dict[str, Any]:
-    parts = []
-    for each in own:
-        table = each.table
-        velocities = np.full((len(table.times), 3), np.nan) if table.velocities is None else table.velocities
-        parts.append(
-            {
-                "trajectory": [each.name] * len(table.times),
-                "time": table.times,
-                **columns_of(AXES, table.positions),
-                **columns_of(VELOCITY, velocities),
-            }
-        )
-    found = _joined(parts)
-    return {name: column for name, column in found.items() if name not in VELOCITY or not _is_empty(column)}
+    tables = [each.table for each in own]
+    velocities = np.vstack(
+        [each.positions * np.nan if each.velocities is None else each.velocities for each in tables]
+    )
+    return {
+        "trajectory": [each.name for each in own for _ in each.table.times],
+        "time": np.concatenate([each.times for each in tables]),
+        **columns_of(AXES, np.vstack([each.positions for each in tables])),
+        **({} if np.isnan(velocities).all() else columns_of(VELOCITY, velocities)),
+    }
 
 
 def _turned_records(records: Sequence[tuple[str, Any, Any]], block: Block) -> dict[str, Any]:
-    return _joined(
-        [
-            {
-                "trajectory": [name] * len(times),
-                "time": np.asarray(times),
-                **columns_of(_ANGLES, angles_of(np.asarray(matrices), block)),
-            }
-            for name, times, matrices in records
-        ]
-    )
+    return {
+        "trajectory": [name for name, times, _ in records for _ in np.asarray(times)],
+        "time": np.concatenate([times for _, times, _ in records]),
+        **columns_of(OPK, angles_of(np.concatenate([matrices for *_, matrices in records]), block)),
+    }
 
 
 def _knots(own: Sequence[Trajectory]) -> dict[str, Any]:
-    parts = [
-        {"trajectory": [each.name] * len(knots), "of": [kind] * len(knots), "knot": knots}
+    rows = [
+        (each.name, kind, float(knot))
         for each in own
         for kind, basis in zip(BASES, (each.position, each.rotation), strict=True)
         if isinstance(basis, Spline)
-        for knots in [np.asarray(basis.knots, dtype=float)]
+        for knot in np.asarray(basis.knots)
     ]
-    return _joined(parts) if parts else {}
+    columns = map(list, zip(*rows, strict=True))
+    return dict(zip(("trajectory", "of", "knot"), columns, strict=True)) if rows else {}
 
 
 def smoothness_table(block: Block) -> dict[str, Any]:
@@ -204,7 +187,7 @@ def smoothness_table(block: Block) -> dict[str, Any]:
     found: dict[str, Any] = {
         name: [place[k] for _, place in own] for k, name in enumerate(("trajectory", "of", "k"))
     }
-    numbers = columns_of((*FACTORS, *AXES, *_SD), np.hstack([factors, sums, sd]))
+    numbers = columns_of((*FACTORS, *AXES, *SD_AXES), np.hstack([factors, sums, sd]))
     found |= {name: column for name, column in numbers.items() if not _is_empty(column)}
     return found | correlations(covariances, AXES)
 

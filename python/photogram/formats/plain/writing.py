@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control
-from photogram.formats.images import to_tables
+from photogram.formats.images import by_camera, to_tables
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
 from photogram.formats.plain.cameras import knots_table
 from photogram.formats.plain.exposure import OF_LINES, Exposure, exposure_columns, of_cameras
@@ -18,11 +18,11 @@ from photogram.formats.plain.films_written import WrittenFilms
 from photogram.formats.plain.moving_photos import line_times_table, moving_columns
 from photogram.formats.plain.observed_poses import observed_tables
 from photogram.formats.plain.rigs import Rigs
-from photogram.formats.plain.schema import AXES, deviation_columns
+from photogram.formats.plain.schema import AXES, OPK, deviation_columns
 from photogram.formats.plain.settings import LENGTHS, VERSION, Settings
 from photogram.formats.plain.statement_settings import asked_files, asked_lines
 from photogram.formats.plain.statement_tables import COVERS, lengths_table
-from photogram.formats.plain.tables import columns_of, correlations
+from photogram.formats.plain.tables import columns_of, correlations, places_written
 from photogram.formats.plain.trajectories_written import lost_smoothness, smoothness_table, trajectory_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
@@ -34,8 +34,6 @@ from photogram.network.film_reduction import camera_unit
 from photogram.network.moving_photos import LineSensor
 from photogram.network.observations import Control, Position
 from photogram.results.features import Definition
-
-_ANGLES = ("omega", "phi", "kappa")
 
 
 def cannot_hold(project: Project) -> list[str]:
@@ -167,17 +165,6 @@ def _with_exposures(table: Mapping[str, Any], more: Mapping[str, Any]) -> dict[s
     return found
 
 
-def _written_xy(
-    found: Floats, cameras: Sequence[Camera], sizes: Sequence[Size | None], which: Indices, image_y: str
-) -> Floats:
-    """Return image coordinates (m, 2) as the table has them, each of a camera (m,); -1: as they are."""
-    for row, camera in enumerate(cameras):
-        own = which == row
-        if own.any():
-            found[own] = to_tables(image_y, camera, sizes[row], found[own])
-    return found
-
-
 def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
     block, frame, options = project.block, project.frame, project.options
     lines = [
@@ -267,13 +254,11 @@ def camera_table(project: Project, cameras: Sequence[Camera]) -> dict[str, Any]:
 def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
     block = project.block
     positions, sd = _given(block, "position")
-    if block.geographic:
-        positions = np.column_stack([np.degrees(positions[:, :2]), positions[:, 2]])
     attitudes, angle_sd = _given(block, "attitude")
     columns: dict[str, Any] = {"photo": block.photo_ids, "camera": cameras}
-    columns |= columns_of(AXES, positions)
-    columns |= columns_of(_ANGLES, np.degrees(attitudes))
-    for names, values in ((AXES, sd), (_ANGLES, np.degrees(angle_sd))):
+    columns |= columns_of(AXES, places_written(block, positions))
+    columns |= columns_of(OPK, np.degrees(attitudes))
+    for names, values in ((AXES, sd), (OPK, np.degrees(angle_sd))):
         if np.isfinite(values).any():
             columns |= columns_of(deviation_columns(names), values)
     drifts = any(isinstance(each, Position) and each.drift is not None for each in block.observations)
@@ -312,8 +297,12 @@ def _images(
     kept = [row for row, name in enumerate(left.photos) if name in places]
     of_photos = np.append(block.image_photos, [places[left.photos[row]] for row in kept]).astype(np.int64)
     which = np.where(plain, -1, photo_cameras)[of_photos]
-    xy = np.vstack([block.image_xy, left.xy[kept]])
-    xy = _written_xy(xy, cameras, _pictures(project, cameras)[0], which, image_y)
+    sizes, _ = _pictures(project, cameras)
+    xy = by_camera(
+        np.vstack([block.image_xy, left.xy[kept]]),
+        which,
+        lambda row, own: to_tables(image_y, cameras[row], sizes[row], own),
+    )
     columns: dict[str, Any] = {
         "photo": photos[of_photos],
         "point": np.append(points[block.image_points], [left.points[row] for row in kept]),
@@ -355,10 +344,8 @@ def control_table(project: Project) -> dict[str, Any]:
         if (each := full.get(block.point_ids[row])) is not None:
             positions[k], covariances[k] = each.observed, each.precision
             sd[k] = np.sqrt(np.diag(each.precision))
-    if block.geographic:
-        positions[:, :2] = np.degrees(positions[:, :2])
     columns: dict[str, Any] = {"point": [block.point_ids[row] for row in order]}
-    columns |= columns_of(AXES, positions)
+    columns |= columns_of(AXES, places_written(block, positions))
     columns |= {
         f"sd_{axis}": np.where(np.isinf(own), np.nan, own) for axis, own in zip(AXES, sd.T, strict=True)
     }
@@ -381,7 +368,5 @@ def _points(project: Project) -> dict[str, Any]:
     own = [row for row, name in enumerate(block.point_ids) if not held[row] and name not in full]
     if not own:
         return {}
-    starts = project.starts[own]
-    if block.geographic:
-        starts = np.column_stack([np.degrees(starts[:, :2]), starts[:, 2]])
+    starts = places_written(block, project.starts[own])
     return {"point": [block.point_ids[row] for row in own], **columns_of(AXES, starts)}

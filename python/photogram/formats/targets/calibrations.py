@@ -1,4 +1,4 @@
-"""Calibrations with targets as projects whose control is the board, and back."""
+"""Calibrations with targets as projects whose control is the board, and back; cameras of projects alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from photogram.formats.format import Wishes
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES
 from photogram.formats.project import Project, Unused
 from photogram.formats.targets import TITLE
-from photogram.messages import listed
+from photogram.messages import counted, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -26,6 +26,7 @@ from photogram.targets.calibration import Calibration
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners
 from photogram.targets.motion import motion_of
+from photogram.targets.output.rig import Rig
 from photogram.targets.reading import read
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
@@ -279,3 +280,54 @@ def shifted(camera: Camera, by: float = MIDDLE) -> Camera:
         return camera  # from the middle of the picture, which is the same place
     centre = {name: camera.parameters[name] + by for name in ("cx", "cy")}
     return camera.replace(parameters={**camera.parameters, **centre})
+
+
+def rig_of_project(project: Project) -> Rig:
+    """Return the cameras of a project whose images are pixels, and where those on frames are to camera 0."""
+    block = project.block
+    if not block.cameras:
+        raise InputError("has principal distances, and no cameras", file=project.path)
+    return Rig(
+        cameras=tuple(
+            shifted(each, -MIDDLE).replace(name=name)
+            for each, name in zip(block.cameras, block.camera_names, strict=True)
+        ),
+        sizes=tuple(project.sizes),
+        sensors=_sensors(project),
+    )
+
+
+def _sensors(project: Project) -> Floats:
+    """Return (K, 4, 4) camera 0 -> camera k; NaN where they are not one sensor on one frame."""
+    block = project.block
+    found = np.full((len(block.cameras), 4, 4), np.nan)
+    found[0] = np.eye(4)
+    own: dict[int, Sensor] = {}
+    torn = set[int]()
+    cameras = dict(zip(block.photo_ids, np.asarray(block.photo_cameras).tolist(), strict=True))
+    for photo, frame, sensor in tied_photos(block):
+        camera = cameras[photo]
+        if cameras[frame] != 0 or own.setdefault(camera, sensor) is not sensor:
+            torn.add(camera)
+    for camera in own.keys() - torn - {0}:
+        found[camera] = sensor_pose(own[camera].position, own[camera].attitude)
+    return found
+
+
+def lost_beside_cameras(project: Project) -> list[str]:
+    """Return what of a project is not in files of its cameras, in sentences."""
+    block = project.block
+    apart = [
+        each.title
+        for each, known in zip(block.cameras, np.isfinite(_sensors(project)), strict=True)
+        if not known.all()
+    ]
+    found = [
+        counted(len(block.photo_ids), "photo"),
+        counted(len(block.point_ids), "point"),
+        counted(len(block.image_xy), "image"),
+        "standard deviations and errors, which `photogram calibrate --to` writes of a board",
+    ]
+    if apart:
+        found.append(f"where these cameras are to the first, if anything says it: {listed(apart)}")
+    return found
