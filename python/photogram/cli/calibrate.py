@@ -292,7 +292,7 @@ def _weights(
 
 
 def _page(found: Calibrated, weights: VarianceComponents | None) -> Page:
-    from photogram.results.page.weights import components_section
+    from photogram.results.page.cleaning import components_section
     from photogram.show.methods import page_of
 
     page = page_of(found)

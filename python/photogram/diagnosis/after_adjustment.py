@@ -60,8 +60,7 @@ def explained(result: Result) -> list[Message]:
     found = _of_block(result.block) if _bad(result) else []
     if result.WHOLE and not found and (not result.converged or is_suspected(result)):
         from photogram.diagnosis.adjusting import Adjuster
-        from photogram.diagnosis.rolling import rolling_hints
-        from photogram.diagnosis.shutters import shutter_hints
+        from photogram.diagnosis.shutters import rolling_hints, shutter_hints
 
         found = shutter_hints(result.block, result, Adjuster({})) or rolling_hints(result)
     return found
