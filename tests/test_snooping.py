@@ -17,8 +17,8 @@ from photogram.cli import app
 from photogram.network.observations import Distance
 from photogram.results import network_trial
 from photogram.statistics import lambda0
-from photogram.statistics.snooping.robust_start import _robust_sizes
 from photogram.statistics.snooping.snooping import Settings, snooped
+from photogram.statistics.snooping.starts import _robust_sizes
 from photogram.statistics.snooping.suspects import Prediction
 from photogram.statistics.snooping.taking_out import with_prediction
 from shared_data import SHARED
