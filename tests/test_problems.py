@@ -14,7 +14,7 @@ from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 from photogram.giant import Project, read_project, write_project
 from photogram.statistics import normal_limit
-from photogram.statistics.outliers import Observations, outliers
+from photogram.statistics.findings import Observations, outliers
 from photogram.statistics.reliability import TESTABLE
 
 NETWORK: dict[str, Any] = {"strips": 2, "photos_per_strip": 5, "points_per_photo": 40, "control_spacing": 2}

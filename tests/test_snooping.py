@@ -10,15 +10,15 @@ from typer.testing import CliRunner
 
 import photogram
 import photogram.collection
+from linear_trial import LinearTrial
 from photogram import Block
 from photogram.adjustment.snooping import block_trial
 from photogram.cli import app
 from photogram.network.observations import Distance
 from photogram.results import network_trial
 from photogram.statistics import lambda0
-from photogram.statistics.snooping.linear import LinearTrial
-from photogram.statistics.snooping.robust_start import _robust_sizes
 from photogram.statistics.snooping.snooping import Settings, snooped
+from photogram.statistics.snooping.starts import _robust_sizes
 from photogram.statistics.snooping.suspects import Prediction
 from photogram.statistics.snooping.taking_out import with_prediction
 from shared_data import SHARED

@@ -19,13 +19,13 @@ from photogram.statistics.findings import (
     Agreement,
     Findings,
     GroupFactor,
+    Observations,
     Removed,
     Systematic,
     by_t,
     by_w,
-    of_groups,
 )
-from photogram.statistics.outliers import Observations
+from photogram.statistics.findings import Tested as Group
 from photogram.statistics.verdict import verdict, worst
 
 F = 81
@@ -151,7 +151,8 @@ def test_groups_and_singles_are_tested_together():
     blocks = np.tile(0.4 * np.eye(2), (30, 1, 1))
     v = np.random.default_rng(3).normal(size=(30, 2)) * math.sqrt(0.4)
     v[11] = [4.0, -4.0]
-    groups = of_groups("images", group_tests(blocks, v), lambda index: f"image {index[0]}")
+    tests = group_tests(blocks, v)
+    groups = Group("images", tests.statistic, lambda index: f"image {index[0]}", "T", tests.dimension)
     single = by_w(Observations("control", good()[:4], named))
     made = verdict(findings(good(), 2.0, observations=[groups, single]))
     largest = {test.name.partition(":")[0]: test for test in made.tests}

@@ -22,7 +22,7 @@ from photogram import AdjustmentError, Attitudes, adjust, diagnose, simulate
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.rolling import rolling_hints
+from photogram.diagnosis.shutters import rolling_hints
 from photogram.diagnosis.trajectory_hints import flown_hints
 from photogram.network.moving_photos import Lines
 from photogram.network.observations import Attitude

@@ -270,8 +270,7 @@ def test_no_green_mark_above_a_control_point_that_disagrees_or_a_warning_of_the_
     result = found.result
 
     def tone(left_out):
-        given = (result, found.asked, found.texts, found.compared, found.of_all, found.of_vegetated)
-        return judged(*given, left_out, (), found.standards, None).tone
+        return judged(replace(found, left_out=left_out, layout=None)).tone
 
     first, *others = found.left_out
     limit = 0.05 / len(found.left_out)

@@ -18,8 +18,7 @@ def plain(result):
 
 def judge(found, left_out, *, strict):
     """Judge a statement anew, with other control points left out."""
-    given = (found.result, found.asked, found.texts, found.compared, found.of_all, found.of_vegetated)
-    return judged(*given, left_out, (), found.standards, None, strict=strict)
+    return judged(replace(found, left_out=left_out, layout=None), strict=strict)
 
 
 def seen(found):
@@ -80,11 +79,11 @@ def test_lengths_alone_take_the_green_mark_away(result):
     assert "lengths.reference" in {each["key"] for each in found.assumptions}
     points = replace(found.of_all.points, p=np.ones(30), p_others=np.ones(30))
     agreed = replace(found.of_all, points=points)
-    given = (found.result, found.asked, found.texts, found.compared, agreed, None, found.left_out, ())
+    found = replace(found, of_all=agreed, of_vegetated=None, layout=None)
     enough = replace(found.standards.lengths.test, lines=7, least=5, longest=1.0, off_diagonal=0.0)
     for test, tone in ((enough, "look"), (replace(enough, together=None), "good")):
         lengths = replace(found.standards.lengths, test=test)
-        assert judged(*given, replace(found.standards, lengths=lengths), None).tone == tone
+        assert judged(replace(found, standards=replace(found.standards, lengths=lengths))).tone == tone
 
 
 def test_a_warning_of_the_adjustment_is_no_result_that_cannot_be_used(plain, monkeypatch):

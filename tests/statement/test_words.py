@@ -25,7 +25,7 @@ from photogram.results.findings import PLURALS
 from photogram.results.fixed_tests import HELD
 from photogram.results.group_sums import observables
 from photogram.results.result import adjusted
-from photogram.results.statement import sources, translation
+from photogram.results.statement import budget, translation
 from photogram.results.statement.texts import LANGUAGES, Texts, table_of
 
 PACKAGE = Path(photogram.__file__).parent
@@ -60,10 +60,10 @@ def lacking(family, names):
 def test_every_kind_of_observation_has_a_word(result):
     kinds = shipped(Observation) | shipped(Unknown)
     assert len(kinds) > 15
-    names = {sources.kind_of(each) for each in kinds} | set(sources._PLURALS.values())
+    names = {budget.kind_of(each) for each in kinds} | set(budget._PLURALS.values())
     names |= {"images", "control", "camera", *observables(result).stations}
     assert not lacking("kind", names)
-    singles = {sources.kind_of(each) for each in kinds} | {"image", "control", "camera", "attitude"}
+    singles = {budget.kind_of(each) for each in kinds} | {"image", "control", "camera", "attitude"}
     assert not lacking("one", singles)
     assert translation.kind(GERMAN, "prior, lever arm") == "Vorwerte, Hebelarm"
     assert translation.kind(GERMAN, "images, 2, x") == "Bildpunkte, 2, x"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photogram.cli.calibration_input import PriorName, Seen
+from photogram.cli.calibration_options import NOT_GOOD_ENOUGH, PriorName, Seen, Uncertainty, distances_of
 from photogram.cli.choices import LossName
 from photogram.cli.components import COMPONENTS
 from photogram.cli.console import print_remark, print_sections
@@ -17,7 +17,6 @@ from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, with_job
 from photogram.cli.options import Quiet, Snooping, Strict, Threads, default_out, out_option
 from photogram.cli.progress import adjustment_status, estimation_status
-from photogram.cli.uncertainty import NOT_GOOD_ENOUGH, Uncertainty, distances_of
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
@@ -292,7 +291,7 @@ def _weights(
 
 
 def _page(found: Calibrated, weights: VarianceComponents | None) -> Page:
-    from photogram.results.page.weights import components_section
+    from photogram.results.page.cleaning import components_section
     from photogram.show.methods import page_of
 
     page = page_of(found)

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from photogram.cli.command_classes import Command, GroupWithMain
 from photogram.cli.console import output
-from photogram.cli.groups import GroupWithMain
-from photogram.cli.panels import Command
 
 if TYPE_CHECKING:
     app: typer.Typer

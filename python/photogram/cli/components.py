@@ -114,7 +114,7 @@ class Found(Generic[Network]):
 
     def page(self) -> Page:
         """Return the report for the browser, with what components say."""
-        from photogram.results.page.weights import reweighed_page, weighed_page
+        from photogram.results.page.cleaning import reweighed_page, weighed_page
         from photogram.show.methods import page_of
 
         page = page_of(self.told)

@@ -26,8 +26,8 @@ from photogram.network.subset import image_rows
 from photogram.results.exchanged_names import exchanged_names
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, POSITION, NetworkTrial
 from photogram.results.snooping_result import Snooped
-from photogram.statistics.snooping.robust_start import MEDIAN_OF_TWO
 from photogram.statistics.snooping.snooping import Outcome, snooped
+from photogram.statistics.snooping.starts import MEDIAN_OF_TWO
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
 

@@ -60,8 +60,7 @@ def explained(result: Result) -> list[Message]:
     found = _of_block(result.block) if _bad(result) else []
     if result.WHOLE and not found and (not result.converged or is_suspected(result)):
         from photogram.diagnosis.adjusting import Adjuster
-        from photogram.diagnosis.rolling import rolling_hints
-        from photogram.diagnosis.shutters import shutter_hints
+        from photogram.diagnosis.shutters import rolling_hints, shutter_hints
 
         found = shutter_hints(result.block, result, Adjuster({})) or rolling_hints(result)
     return found
@@ -109,18 +108,15 @@ def _with_hints(result: Result) -> Result:
 
 def diagnosis_of(result: Result) -> Diagnosis:
     """Return what explains an adjustment that has failed or fits badly; its verdict is the judgement."""
-    from photogram.diagnosis.findings import Diagnosis, Finding, Level, Section
+    from photogram.diagnosis.findings import Diagnosis, Section, note_all, note_verdict
     from photogram.diagnosis.weights import weight_hints
 
     found = diagnosed(result)
     section = Section("Adjustment", "One mistake in the data makes every observation look wrong.")
-    section.findings += [Finding("convention", "grave", hint) for hint in found.hints]
-    section.findings += [Finding("exchanged-points", "grave", names) for names in found.exchanged]
-    section.findings += [Finding("moving", "look", str(each)) for each in remarks(found)]
+    note_all(section, "convention", "grave", found.hints)
+    note_all(section, "exchanged-points", "grave", found.exchanged)
+    note_all(section, "moving", "look", remarks(found))
     if found.converged and not found.hints:
-        section.findings += [Finding("weights", "look", str(hint)) for hint in weight_hints(found)]
-    verdict = found.verdict
-    if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
-        level: Level = "grave" if verdict.exit else "look"
-        section.findings.insert(0, Finding(verdict.code, level, verdict.headline))
+        note_all(section, "weights", "look", weight_hints(found))
+    note_verdict(section, found.verdict)
     return Diagnosis(result.block.title, [section], found, adjusted_before=True)

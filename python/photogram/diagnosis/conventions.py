@@ -17,7 +17,7 @@ import numpy as np
 
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Finding, Section, note
+from photogram.diagnosis.findings import Section, note, note_all
 from photogram.diagnosis.hypotheses import TURNS, Hypothesis, attitude_readings, hypotheses
 from photogram.diagnosis.regression import (
     LEAST,
@@ -360,4 +360,4 @@ def conventions(view: View) -> tuple[Section, View, bool]:
 
 def further(section: Section, view: View) -> None:
     """Add the hints that the sides of the cameras have not explained, nor anything before."""
-    section.findings += [Finding("convention", "grave", str(hint)) for hint in hints(view.block)]
+    note_all(section, "convention", "grave", hints(view.block))

@@ -29,7 +29,7 @@ from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_
 from photogram.diagnosis.orientation import orientation, spare_explained
 from photogram.diagnosis.positions import wrong_positions
 from photogram.diagnosis.residuals import residuals
-from photogram.diagnosis.rolling import rolling_hints
+from photogram.diagnosis.shutters import rolling_hints
 from photogram.diagnosis.stations import stations, two_ray_heights
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectories import flown_checked

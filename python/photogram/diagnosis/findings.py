@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from photogram import _photocore
@@ -32,6 +32,8 @@ __all__ = [
     "Section",
     "Words",
     "note",
+    "note_all",
+    "note_verdict",
     "small_unit",
 ]
 
@@ -276,6 +278,18 @@ def note(
 ) -> None:
     """Add a finding to a section; see :class:`Finding`."""
     section.findings.append(Finding(kind, level, text, list(photos), list(points), values or {}))
+
+
+def note_all(section: Section, kind: str, level: Level, sentences: Iterable[object]) -> None:
+    """Add sentences to a section, a finding each."""
+    section.findings += [Finding(kind, level, str(each)) for each in sentences]
+
+
+def note_verdict(section: Section, verdict: Verdict) -> None:
+    """Put what a verdict has to say on top of a section that has nothing grave."""
+    if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
+        level: Level = "grave" if verdict.exit else "look"
+        section.findings.insert(0, Finding(verdict.code, level, verdict.headline))
 
 
 @dataclass(repr=False)

@@ -1,22 +1,42 @@
-"""Rolling shutters whose readout is given wrongly: its direction, its unit, rows for columns."""
+"""Rolling shutters: whose readout is given wrongly, and which nobody has declared.
+
+Given wrongly are its direction, its unit, rows for columns: each is tried. Frames of a shutter that was not
+declared leave residuals that grow with row times velocity. Row r of h is exposed r/h T after the first, when
+the photo has moved on. With a the partials of an image by the position of its photo, and d the way from one
+exposure to the next, the image moves by
+
+    (a d) (r/h) tau,      tau = T / time between two exposures
+
+of which position, attitude and points take up a part. The score of tau tells what is left (Rao): its value,
+and by how much the sum of squares would fall. Its standard deviation is from how the photos differ: each of
+them turns meanwhile, its own way.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.adjusting import Adjuster, put_right
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.network.motion import timed_photos
 from photogram.network.moving_photos import Direction, Shutter, Timed
+from photogram.network.rays import local_axes
+from photogram.network.strips import strips_of
 from photogram.network.trajectories import Readout
-from photogram.results.fixed_tests import is_suspected
+from photogram.results.fixed_tests import as_adjusted, is_suspected, lens_partials, station_partials
+from photogram.results.group_sums import factored
 from photogram.results.result import Result
+from photogram.results.scores import Scores
+from photogram.statistics.limits import externally_studentized
 
 SIGNIFICANT = 5.0
-"""Standard deviations of a readout time below zero."""
+"""Standard deviations: of a readout time below zero, and of what a shutter explains."""
 LONGEST = 1.0
 """Seconds: no shutter reads for longer; such a number is one of milliseconds."""
 MILLISECOND = 1e-3
@@ -121,3 +141,118 @@ def _ends(block: Block, axis: int) -> tuple[float, float]:
     low, high = float(block.image_xy[:, axis].min()), float(block.image_xy[:, axis].max())
     down = any(each.image_y == "down" for each in block.cameras)
     return (low, high) if axis == 0 or down else (high, low)
+
+
+EXPLAINED = 0.8
+"""Of what readout, lens and affinity explain together the readout explains this part alone, at least; and
+beside these it is significant."""
+FEWEST = 4
+"""Photos of a camera that move."""
+MOST = 3
+"""Cameras that are looked at, those with the most photos."""
+READ = {
+    (1, True): "rows, from the upper edge to the lower",
+    (1, False): "rows, from the lower edge to the upper",
+    (0, True): "columns, from the left edge to the right",
+    (0, False): "columns, from the right edge to the left",
+}
+"""How a shutter reads: which coordinate counts, and whether from its beginning."""
+
+
+def rolling_hints(result: Result) -> list[Message]:
+    """Say which cameras have the residuals of a rolling shutter, where residuals are too large.
+
+    Photos are taken to be in the order of their exposures: along strips the way from one to the next is the
+    velocity. Photos on trajectories are left out.
+
+    Parameters
+    ----------
+    result
+        An adjustment with covariances; nothing is found where its global test does not reject.
+    """
+    block = result.block
+    if result.loss or not result.WHOLE or block.mounts or not is_suspected(result):
+        return []
+    ways = _ways(result)
+    moved = (ways != 0).any(axis=1)
+    cameras = np.zeros(len(moved), dtype=np.int64) if block.photo_cameras is None else block.photo_cameras
+    counts = np.bincount(cameras[moved], minlength=1)
+    chosen = [each for each in np.argsort(-counts, kind="stable")[:MOST].tolist() if counts[each] >= FEWEST]
+    if not chosen:
+        return []
+    # Those of residuals, observed minus computed.
+    partials = -np.einsum("kmi,mk->mi", station_partials(result)[:3], ways[block.image_photos])
+    found = (_of_camera(result, each, partials, moved & (cameras == each)) for each in chosen)
+    return [Message(text) for text in found if text]
+
+
+def _ways(result: Result) -> Floats:
+    """(P, 3) way of each photo from one exposure to the next, in metric axes; 0 where none is known."""
+    adjusted = as_adjusted(result)
+    places = local_axes(adjusted).positions(adjusted.photo_positions)
+    rest = np.flatnonzero(~timed_photos(adjusted))
+    ways = np.zeros_like(places)
+    for strip in strips_of(places[rest]) if len(rest) > 1 else ():
+        if len(strip) > 1:
+            ways[rest[strip]] = np.gradient(places[rest[strip]], axis=0)
+    return ways
+
+
+def _of_camera(result: Result, camera: int, motion: Floats, photos: Bools) -> str:
+    """Return what the residuals of a camera say; nothing where a readout does not explain them.
+
+    `motion` are (m, 2) ways of images from one exposure to the next.
+    """
+    block = result.block
+    own = result.used_images & photos[block.image_photos] & np.isfinite(motion).all(axis=1)
+    if not own.any():
+        return ""
+    residuals = np.where(result.used_images[:, np.newaxis], result.residuals / block.image_sd, 0.0)
+    factor, down = factored(result), _down(block, camera)
+    columns = {axis: _column(block, motion, own, axis, down) for axis in (1, 0)}
+    tried = {axis: Scores.of(factor, each[np.newaxis], residuals) for axis, each in columns.items()}
+    axis = max(tried, key=lambda each: tried[each].fall())
+    readout, sd = tried[axis].estimate(block.image_photos)
+    significant = _significance(result, tried[axis].fall()) > SIGNIFICANT
+    if not (significant and abs(readout) > SIGNIFICANT * sd):
+        return ""
+    rivals = np.concatenate([lens_partials(result, own), _affinities(block, own)])
+    together = Scores.of(factor, np.concatenate([columns[axis][np.newaxis], rivals]), residuals)
+    alone, beside = tried[axis].fall(), together.fall() - together.fall(1)
+    if not (alone > EXPLAINED * together.fall() and _significance(result, beside) > SIGNIFICANT):
+        return ""
+    name = block.camera_names[camera] if block.cameras else "the camera"
+    omega = result.sums_of_squares.total
+    return (
+        f"probably the shutter of {name} rolls: a readout of its {READ[axis, readout > 0]}, in"
+        f" {100 * abs(readout):.2g} % (sd {100 * sd:.1g}) of the time between two exposures, explains"
+        f" residuals that grow with {('column', 'row')[axis]} times velocity; they would be"
+        f" {math.sqrt(omega / (omega - alone)):.3g} times smaller"
+    )
+
+
+def _down(block: Block, camera: int) -> bool:
+    return bool(block.cameras) and block.cameras[camera].image_y == "down"
+
+
+def _column(block: Block, motion: Floats, own: Bools, axis: int, down: bool) -> Floats:
+    """(m, 2) partials by tau of a readout along an axis, over all that images reach, in their sd."""
+    along = block.image_xy[own, axis] * (-1.0 if axis == 1 and not down else 1.0)
+    shares = (along - along.min()) / max(float(np.ptp(along)), 1e-300)
+    column = np.zeros_like(block.image_xy)
+    column[own] = motion[own] * shares[:, np.newaxis] / block.image_sd[own]
+    return column
+
+
+def _affinities(block: Block, own: Bools) -> Floats:
+    """(2, m, 2) partials by a stretch and a shear of the image, in standard deviations."""
+    x, y = (block.image_xy[own] - block.image_xy[own].mean(axis=0)).T
+    columns = np.zeros((2, *block.image_xy.shape))
+    columns[:, own] = np.array([[x, -y], [y, x]]).transpose(0, 2, 1) / block.image_sd[own]
+    return columns
+
+
+def _significance(result: Result, fall: float) -> float:
+    """Return a fall of the sum of squares in standard deviations, with the unit weight that is left."""
+    omega, freedom = result.sum_and_freedom
+    return float(externally_studentized(math.sqrt(max(fall, 0.0)), omega, freedom))

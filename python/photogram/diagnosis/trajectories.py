@@ -14,7 +14,7 @@ from photogram.adjustment.snooping import snoop
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import explained, remarks
 from photogram.diagnosis.clocks import counted_lines
-from photogram.diagnosis.findings import Finding, Level, Section, note
+from photogram.diagnosis.findings import Finding, Section, note, note_all, note_verdict
 from photogram.diagnosis.shutters import shutter_hints
 from photogram.diagnosis.structure import structure_section
 from photogram.diagnosis.trajectory_hints import flown_hints
@@ -59,21 +59,17 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:
         note(section, "no-adjustment", "grave", f"it cannot be adjusted: {error}")
-        mistakes = flown_hints(block) or shutter_hints(block, None, adjusted)
-        section.findings += [Finding("convention", "grave", str(each)) for each in mistakes]
+        note_all(section, "convention", "grave", flown_hints(block) or shutter_hints(block, None, adjusted))
         return [structure, section], None
-    section.findings += [Finding("convention", "grave", str(each)) for each in explained(result)]
-    section.findings += [Finding("moving", "look", str(each)) for each in remarks(result)]
+    note_all(section, "convention", "grave", explained(result))
+    note_all(section, "moving", "look", remarks(result))
     section.findings += counted_lines(block, adjusted)
     found = _snooped(block, adjusted)
     if found is not None and (result.converged or found.result.converged):
         section.findings += [_finding(each) for each in found.removed]
     if result.converged:
-        section.findings += [Finding("weights", "look", str(each)) for each in weight_hints(result)]
-    verdict = result.verdict
-    if (verdict.exit or verdict.warning) and not any(each.level == "grave" for each in section.findings):
-        level: Level = "grave" if verdict.exit else "look"
-        section.findings.insert(0, Finding(verdict.code, level, verdict.headline))
+        note_all(section, "weights", "look", weight_hints(result))
+    note_verdict(section, result.verdict)
     return [structure, section], result
 
 

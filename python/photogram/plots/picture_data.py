@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.methods import Way
-from photogram.statistics.outliers import Observations
+from photogram.statistics.findings import Observations
 
 
 @dataclass(frozen=True, eq=False)

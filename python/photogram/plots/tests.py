@@ -21,7 +21,7 @@ from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.statistics.patterns import SPEAKING
 
 if TYPE_CHECKING:
-    from photogram.statistics.outliers import Observations
+    from photogram.statistics.findings import Observations
 
 QUANTILES = 1500
 """Test values that are drawn against the normal distribution at most; the largest are always among them."""

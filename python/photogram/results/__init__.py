@@ -8,8 +8,8 @@ WAYS = {
     "findings_of": ("findings", "snooping_result"),
     "page_of": {
         "Result": ("page.block",),
-        "Snooped": ("page.snooping",),
-        "VarianceComponents": ("page.weights",),
+        "Snooped": ("page.cleaning",),
+        "VarianceComponents": ("page.cleaning",),
     },
     "pictured": ("picture_data",),
     "report_of": ("report",),

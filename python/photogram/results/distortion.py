@@ -20,7 +20,7 @@ import re
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
@@ -40,6 +40,7 @@ __all__ = [
     "own_images",
     "radial_curve",
     "radial_part",
+    "rows_of_images",
 ]
 
 DISTANCES = ("c", "f", "fx")
@@ -94,12 +95,16 @@ class DistortionCurve:
     observed: float
 
 
+def rows_of_images(result: Result, camera: AdjustedCamera) -> Indices:
+    """Return which images of photos with a camera took part."""
+    block = result.block
+    row = block.camera_names.index(camera.name)
+    return np.flatnonzero(result.used_images & (np.asarray(block.photo_cameras) == row)[block.image_photos])
+
+
 def own_images(result: Result, camera: AdjustedCamera) -> Floats:
     """Return (k, 2) the images of a camera that took part, in the focal plane."""
-    block = result.block
-    cameras = np.asarray(block.photo_cameras)[block.image_photos]
-    row = [each.name for each in result.cameras].index(camera.name)
-    return np.asarray(focal_images(block)[result.used_images & (cameras == row)])
+    return np.asarray(focal_images(result.block)[rows_of_images(result, camera)])
 
 
 def largest_radius(result: Result, camera: AdjustedCamera) -> float:

@@ -23,13 +23,13 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.distortion import INTERIOR
+from photogram.results.distortion import INTERIOR, rows_of_images
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
 from photogram.results.scores import quadratic, score
@@ -307,7 +307,7 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
 
 def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> float:
     """Return how far terms of a camera move an image at the most, in standard deviations of the image."""
-    block, own = result.block, _images_of(result, camera)
+    block, own = result.block, rows_of_images(result, camera)
     if not own.size:
         return math.nan
     own = own[np.unique(np.linspace(0, own.size - 1, SEEN).round().astype(np.int64))]
@@ -343,7 +343,7 @@ def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Fl
     Forward cameras compare measured with computed images, backward ones corrected with ideal images.
     """
     block = result.block
-    own = _images_of(result, camera)
+    own = rows_of_images(result, camera)
     columns = np.zeros((len(rows), len(block.image_xy), 2))
     plain = camera.camera.replace(sd=0.0, covariance=None)
     measured, residuals = focal_images(block)[own], result.residuals[own]
@@ -371,14 +371,6 @@ def _corrected(camera: Camera, measured: Floats) -> Floats:
     """Return what the lens of a backward camera makes of measured positions: c (u1, u2) / u3 of rays."""
     u = camera.rays(measured)
     return np.asarray(camera.parameters["c"] * u[:, :2] / u[:, 2:])
-
-
-def _images_of(result: Result, camera: AdjustedCamera) -> Indices:
-    """Return the images that were used of photos with a camera."""
-    block = result.block
-    _, photo_cameras = block.core_cameras()
-    number = block.camera_names.index(camera.name)
-    return np.flatnonzero(result.used_images & (photo_cameras[block.image_photos] == number))
 
 
 def _camera(result: Result, name: str | None) -> AdjustedCamera:

@@ -14,7 +14,7 @@ from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     from photogram import _photocore
-    from photogram.statistics.outliers import Observations
+    from photogram.statistics.findings import Observations
 
 __all__ = ["ObservedKind", "observed_kinds", "tested_kind"]
 
@@ -143,7 +143,7 @@ def tested_kind(kind: ObservedKind) -> Observations:
     def named(index: tuple[int, ...]) -> str:
         return f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}"
 
-    from photogram.statistics.outliers import Observations
+    from photogram.statistics.findings import Observations
 
     standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
     return Observations(f"components of observations of the kind {kind.kind}", standardized, named)

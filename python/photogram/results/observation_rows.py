@@ -15,8 +15,7 @@ from photogram.results.network_tables import control, images, part, terms_of
 from photogram.results.observation_kinds import tested_kind
 from photogram.show.lines import field, stacked, table_lines
 from photogram.show.quantity import Quantity, chosen, labelled, long
-from photogram.statistics.findings import Tested, by_t, by_w
-from photogram.statistics.outliers import Observations
+from photogram.statistics.findings import Observations, Tested, by_t, by_w
 from photogram.statistics.reliability import TESTABLE
 
 NOTABLE = 3.0

@@ -32,7 +32,7 @@ from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observation_rows import tested_observations
 from photogram.results.result import Result
-from photogram.statistics.outliers import Observations
+from photogram.statistics.findings import Observations
 
 
 class PicturedNetwork(Pictured):

@@ -41,8 +41,8 @@ from photogram.show.lines import Field, field, stacked, table_lines
 from photogram.show.methods import report_of
 from photogram.show.quantity import Axis, Quantity, chosen, labelled
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
+from photogram.statistics.findings import outliers
 from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
-from photogram.statistics.outliers import outliers
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats

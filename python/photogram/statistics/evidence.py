@@ -17,9 +17,8 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Findings, Systematic, Tested, by_f, by_t
+from photogram.statistics.findings import Findings, Observations, Systematic, Tested, by_f, by_t
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
-from photogram.statistics.outliers import Observations
 
 NAMED = 5
 """Observations that a sentence names at most."""

@@ -15,10 +15,28 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import Message
 from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
-from photogram.statistics.groups import GroupTests
 from photogram.statistics.limits import GlobalTest, externally_studentized
-from photogram.statistics.outliers import Observations
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Observations of one kind and their test values.
+
+    Attributes
+    ----------
+    kind
+        What they are, in the plural.
+    values
+        Test values in any shape, of either sign; NaN where nothing is tested.
+    name
+        Names the observation at an index of `values`.
+    """
+
+    kind: str
+    values: Floats
+    name: Callable[[tuple[int, ...]], str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,17 +149,6 @@ def by_f(tested: Tested, weighted_sum_of_squares: float, degrees_of_freedom: flo
         left = np.maximum(weighted_sum_of_squares - tested.values, 1e-12 * weighted_sum_of_squares) / others
         values = np.where(others > 0, tested.values / dimension / left, math.nan)
     return replace(tested, values=values, statistic="F", second=np.where(others > 0, others, math.nan))
-
-
-def of_groups(
-    kind: str, tests: GroupTests, name: Callable[[tuple[int, ...]], str], *, freedom: float | None = None
-) -> Tested:
-    """Return tests of groups; `freedom` is f where the unit weight is estimated."""
-    dimension = np.where(tests.dimension > 0, tests.dimension, math.nan)
-    if freedom is None:
-        values = np.where(tests.dimension > 0, tests.statistic, math.nan)
-        return Tested(kind, values, name, "T", dimension)
-    return Tested(kind, tests.fisher, name, "F", dimension, freedom - dimension)
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,3 +340,34 @@ class Findings:
     if_usable: Sequence[str] = ()
     if_withheld: Sequence[str] = ()
     level: float = LEVEL
+
+
+def outliers(groups: list[Observations], limit: Callable[[int], float], what: str) -> list[Message]:
+    """Return one remark for each kind of observations that has outliers: how many, and the worst.
+
+    The limit of a test depends on how many observations are tested (Bonferroni): of a block without blunders
+    one in twenty has a residual beyond it.
+
+    Parameters
+    ----------
+    groups
+        The observations that are tested together.
+    limit
+        Of the size of a test value, for a number of tests.
+    what
+        Name of the test value, in the plural.
+    """
+    sizes = [np.nan_to_num(np.abs(group.values), nan=-1.0, posinf=np.inf) for group in groups]
+    allowed = limit(sum(int(np.count_nonzero(size >= 0)) for size in sizes))
+    messages = []
+    for group, size in zip(groups, sizes, strict=True):
+        count = int(np.count_nonzero(size > allowed))
+        if count:
+            worst = tuple(int(index) for index in np.unravel_index(int(size.argmax()), size.shape))
+            messages.append(
+                Message(
+                    f"{count} of {np.count_nonzero(size >= 0)} {group.kind} have {what} beyond"
+                    f" {allowed:.2f}: the largest, {group.values[worst]:.1f}, is that of {group.name(worst)}"
+                )
+            )
+    return messages

@@ -144,10 +144,7 @@ def frame_pattern(
     """
     if not len(xy):
         return None
-    low, high = xy.min(axis=0), xy.max(axis=0)
-    width = np.where(high > low, high - low, 1.0)
-    cells = np.minimum((BINS * (xy - low) / width).astype(np.int64), BINS - 1)
-    bins = cells[:, 0] * BINS + cells[:, 1]
+    bins = _cells(xy, BINS)
     sums, checked, places = (_summed(bins, each) for each in (residuals, redundancy, xy))
     counts = np.bincount(bins, minlength=BINS**2)
     full = (checked >= FULL).all(axis=1)
@@ -166,6 +163,14 @@ def frame_pattern(
         largest=(float(means[worst, 0]), float(means[worst, 1])),
         at=(float(at[0]), float(at[1])),
     )
+
+
+def _cells(xy: Floats, count: int) -> Indices:
+    """Return (m,) the cell of each image, of so many in each direction over all that they reach."""
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    width = np.where(high > low, high - low, 1.0)
+    places = np.minimum((count * (xy - low) / width).astype(np.int64), count - 1)
+    return np.asarray(places[:, 0] * count + places[:, 1])
 
 
 def _summed(groups: Indices, values: Floats) -> Floats:
@@ -289,10 +294,7 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
     """
     if not len(xy):
         return math.nan
-    low, high = xy.min(axis=0), xy.max(axis=0)
-    width = np.where(high > low, high - low, 1.0)
-    places = np.minimum((CELLS * (xy - low) / width).astype(np.int64), CELLS - 1)
-    cells = places[:, 0] * CELLS + places[:, 1]
+    cells = _cells(xy, CELLS)
     _, shared = np.unique(cells * (int(photos.max()) + 1) + photos, return_inverse=True)
     neighbours = np.bincount(cells)[cells] - np.bincount(shared)[shared]
     seen = neighbours > 0

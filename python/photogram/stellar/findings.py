@@ -8,8 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.methods import findings_of
-from photogram.statistics.findings import Findings, Tested, by_t
-from photogram.statistics.outliers import Observations
+from photogram.statistics.findings import Findings, Observations, Tested, by_t
 from photogram.statistics.reliability import TESTABLE
 from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.outliers import studentized

@@ -9,9 +9,9 @@ from photogram.io import json
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.result import Result
+from photogram.results.statement.budget import kind_of
 from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.request import lengths_in
-from photogram.results.statement.sources import kind_of
 from photogram.results.statement.statement import Statement
 from photogram.show.methods import document_of
 from photogram.show.quantity import members

@@ -8,17 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.result import Result
 from photogram.results.statement import translation
 from photogram.results.statement.asprs import wording
-from photogram.results.statement.assumptions import assumptions
-from photogram.results.statement.budget import Budget, budget_line
+from photogram.results.statement.budget import budget_line
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.figures import Figures, Sized
+from photogram.results.statement.grounds import Grounds, Said, assumptions
 from photogram.results.statement.honest import LEVEL, Bias, PointTests, Prediction, Surface
 from photogram.results.statement.layout import Layout
 from photogram.results.statement.leave_one_out import LeftOut, limit_of
-from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import Asprs, Lengths, Standards
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
@@ -26,8 +24,6 @@ from photogram.statistics.distributions import critical_normal
 
 NOT_USABLE = 4
 """Exit code of a statement that must not be handed over as it is."""
-Said = list[tuple[str, str]]
-"""Keys of the table of words, and texts."""
 HEIGHT_KINDS = 10.0
 """Standard deviations of a mean difference beyond which heights of two kinds may have been compared."""
 NAMED = 10
@@ -81,33 +77,20 @@ class _Against:
 
 
 def judged(
-    result: Result,
-    asked: Asked,
-    texts: Texts,
-    found: Compared,
-    of_all: Figures | None,
-    of_vegetated: Figures | None,
-    left_out: Sequence[LeftOut],
-    taken_apart: Sequence[Budget],
-    standards: Standards,
-    layout: Layout | None,
-    *,
-    assumed: Sequence[str] = (),
-    removed: Sequence[str] = (),
-    strict: bool = False,
+    found: Grounds, *, assumed: Sequence[str] = (), removed: Sequence[str] = (), strict: bool = False
 ) -> Judged:
     """Return what the statement says of all that was found."""
-    against = _against(result, of_all, left_out, standards)
+    texts, of_all, standards = found.texts, found.of_all, found.standards
+    against = _against(found)
     bad = against.always or (strict and against.strictly)
     doubtful = against.strictly or _doubtful(of_all)
-    held = not result.photo_given_sd.any()
-    remarks = _remarks(asked, texts, found, of_all, of_vegetated, standards, layout, held)
+    remarks = _remarks(found)
     remarks += [
         texts("control.wrong", point=each.point, p=texts.significant(each.p, 2))
         for each in against.control[:NAMED]
     ]
     named = texts.listed([each.point for each in against.control], NAMED)
-    n, verdict = 0 if of_all is None else of_all.n, translation.verdict(texts, result.verdict)
+    n, verdict = 0 if of_all is None else of_all.n, translation.verdict(texts, found.result.verdict)
     return Judged(
         exit=NOT_USABLE if bad else 0,
         tone="bad" if bad else "look" if remarks or doubtful else "good",
@@ -115,31 +98,28 @@ def judged(
             _headline(against, of_all, standards, strict=strict), verdict=verdict, points=named, n=n
         ),
         sentences=[
-            *_asprs(asked, texts, standards.asprs),
-            *(_nssda(texts, standards) if "nssda" in asked.standards else []),
-            *_lengths(texts, standards.lengths),
-            *_honest(asked, texts, found, of_all),
-            *(("budget.line", budget_line(texts, each)) for each in taken_apart),
+            *_asprs(found),
+            *(_nssda(found) if "nssda" in found.asked.standards else []),
+            *_lengths(found),
+            *_honest(found),
+            *(("budget.line", budget_line(texts, each)) for each in found.taken_apart),
         ],
-        assumptions=assumptions(
-            result, asked, texts, found, layout, assumed, removed, lengths=standards.lengths
-        ),
+        assumptions=assumptions(found, assumed, removed),
         remarks=remarks,
     )
 
 
-def _against(
-    result: Result, of_all: Figures | None, left_out: Sequence[LeftOut], standards: Standards
-) -> _Against:
-    high, low = _rejected(of_all)
+def _against(found: Grounds) -> _Against:
+    high, low = _rejected(found.of_all)
+    verdict, standards = found.result.verdict, found.standards
     lengths = None if standards.lengths is None else standards.lengths.test.together
     return _Against(
-        spoilt=not result.verdict.usable,
+        spoilt=not verdict.usable,
         missed=_missed(standards),
         high=high,
-        warning=result.verdict.warning,
+        warning=verdict.warning,
         low=low,
-        control=[each for each in left_out if each.p < limit_of(left_out)],
+        control=[each for each in found.left_out if each.p < limit_of(found.left_out)],
         lengths=lengths is not None and (lengths.rejected_high or lengths.rejected_low),
     )
 
@@ -195,12 +175,13 @@ def _headline(against: _Against, of_all: Figures | None, standards: Standards, *
     return "headline.found"
 
 
-def _asprs(asked: Asked, texts: Texts, found: Asprs | None) -> Said:
+def _asprs(of: Grounds) -> Said:
+    texts, found = of.texts, of.standards.asprs
     if found is None:
         return []
     said: Said = []
     for name in ("h", "v", "3d"):
-        figure, size = found.figures[name], asked.classes.get(name)
+        figure, size = found.figures[name], of.asked.classes.get(name)
         own = {f"rmse_{name}": texts.length(figure.rmse)} if figure is not None else {}
         if size is None:
             if figure is not None and name != "3d":
@@ -220,8 +201,8 @@ def _asprs(asked: Asked, texts: Texts, found: Asprs | None) -> Said:
     return said
 
 
-def _nssda(texts: Texts, standards: Standards) -> Said:
-    found = standards.nssda
+def _nssda(of: Grounds) -> Said:
+    texts, found = of.texts, of.standards.nssda
     if found is None:
         return []
     said: Said = []
@@ -237,7 +218,8 @@ def _nssda(texts: Texts, standards: Standards) -> Said:
     return said if found.enough else [*said, texts.said("nssda.few", n=found.count)]
 
 
-def _lengths(texts: Texts, found: Lengths | None) -> Said:
+def _lengths(of: Grounds) -> Said:
+    texts, found = of.texts, of.standards.lengths
     if found is None:
         return []
     test = found.test
@@ -263,7 +245,8 @@ def _lengths(texts: Texts, found: Lengths | None) -> Said:
     return said
 
 
-def _honest(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None) -> Said:
+def _honest(found: Grounds) -> Said:
+    texts, of_all = found.texts, found.of_all
     if of_all is None:
         return [texts.said("honest.none")]
     said: Said = []
@@ -285,12 +268,12 @@ def _honest(asked: Asked, texts: Texts, found: Compared, of_all: Figures | None)
                 "mean": texts.length(shift.mean),
                 "expanded": texts.length(shift.expanded),
                 "k": texts.number(shift.expanded / shift.sd_of_mean, 2),
-                "p": texts.percent(asked.coverage),
+                "p": texts.percent(found.asked.coverage),
             }
             said.append(texts.said("bias.found", **fields))
     if shifts and not any(shift.rejected for _, shift in shifts):
         said.append(texts.said("bias.none"))
-    return [*said, *_surface(texts, of_all.surface), *_points(asked, texts, found, of_all.points)]
+    return [*said, *_surface(texts, of_all.surface), *_points(found, of_all.points)]
 
 
 def _surface(texts: Texts, found: Surface | None) -> Said:
@@ -316,44 +299,37 @@ def _factor(texts: Texts, factor: float, interval: tuple[float, float]) -> dict[
     }
 
 
-def _points(asked: Asked, texts: Texts, found: Compared, tests: PointTests) -> Said:
+def _points(found: Grounds, tests: PointTests) -> Said:
     """Return which single points disagree, and which were set beside."""
+    texts, names, without = found.texts, found.compared.names, found.asked.without
     said = [
-        texts.said("point.wrong", point=found.names[row], p=texts.significant(float(tests.least[row]), 2))
+        texts.said("point.wrong", point=names[row], p=texts.significant(float(tests.least[row]), 2))
         for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]
     ]
-    if asked.without:
-        reasons = "; ".join(f"{point}: {reason}" for point, reason in asked.without.items())
-        said.append(texts.said("point.left", points=texts.listed(list(asked.without)), reasons=reasons))
+    if without:
+        reasons = "; ".join(f"{point}: {reason}" for point, reason in without.items())
+        said.append(texts.said("point.left", points=texts.listed(list(without)), reasons=reasons))
     return said
 
 
-def _remarks(
-    asked: Asked,
-    texts: Texts,
-    found: Compared,
-    of_all: Figures | None,
-    of_vegetated: Figures | None,
-    standards: Standards,
-    layout: Layout | None,
-    held: bool,
-) -> list[str]:
+def _remarks(found: Grounds) -> list[str]:
+    texts, of_all, standards = found.texts, found.of_all, found.standards
     said = [
         texts("unusable", point=name, reason=texts.word("reason", reason))
-        for name, reason in found.not_usable[:NAMED]
+        for name, reason in found.compared.not_usable[:NAMED]
     ]
     said += [texts("language.missing", sentence=key) for key in texts.missing]
-    if held:
+    if not found.result.photo_given_sd.any():
         said.append(texts("assume.fixed"))
     if standards.asprs is not None:
-        said += _asprs_remarks(asked, texts, found, of_all, of_vegetated, standards.asprs)
+        said += _asprs_remarks(found, standards.asprs)
     if standards.lengths is not None:
         said += _lengths_remarks(texts, standards.lengths)
-    if layout is not None:
-        said += _layout(texts, layout)
+    if found.layout is not None:
+        said += _layout(texts, found.layout)
     shift = None if of_all is None else of_all.bias["h"]
     heights = None if of_all is None else of_all.parts["h"]
-    if shift is not None and heights is not None and _two_heights(found, shift, heights):
+    if shift is not None and heights is not None and _two_heights(found.compared, shift, heights):
         said.append(texts("bias.heights", mean=texts.length(shift.mean), sd=texts.length(heights.sd)))
     return said
 
@@ -373,14 +349,8 @@ def _lengths_remarks(texts: Texts, found: Lengths) -> list[str]:
     return said
 
 
-def _asprs_remarks(
-    asked: Asked,
-    texts: Texts,
-    found: Compared,
-    of_all: Figures | None,
-    of_vegetated: Figures | None,
-    own: Asprs,
-) -> list[str]:
+def _asprs_remarks(found: Grounds, own: Asprs) -> list[str]:
+    asked, texts, of_all, of_vegetated = found.asked, found.texts, found.of_all, found.of_vegetated
     said = []
     counts = [0 if of_all is None else of_all.n] if asked.classes else []
     counts += [of_vegetated.n] if of_vegetated is not None else []
@@ -405,7 +375,7 @@ def _asprs_remarks(
         if each.point is None:
             said.append(texts("asprs.mean", **fields))
         else:
-            said.append(texts("asprs.difference", point=found.names[each.point], **fields))
+            said.append(texts("asprs.difference", point=found.compared.names[each.point], **fields))
     return said
 
 

@@ -14,17 +14,18 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import nearest
 from photogram.results.result import Result
-from photogram.results.statement.budget import Budget, budgets
+from photogram.results.statement.budget import budgets
 from photogram.results.statement.comparison import Compared, compared, control_places
-from photogram.results.statement.figures import Figures, figures
+from photogram.results.statement.figures import figures
 from photogram.results.statement.given_coordinates import NOTHING, Survey, System, surveyed
+from photogram.results.statement.grounds import Grounds
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
-from photogram.results.statement.leave_one_out import LeftOut, leave_one_out
+from photogram.results.statement.leave_one_out import leave_one_out
 from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
-from photogram.results.statement.standards import Standards, standards
+from photogram.results.statement.standards import standards
 from photogram.results.statement.texts import Texts
 from photogram.show.methods import document_of, page_of, statement_of
 from photogram.show.run import InputFile
@@ -34,28 +35,14 @@ __all__ = ["Statement", "statement"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Statement(Brief):
+class Statement(Grounds, Brief):
     """What a surveyor hands to a client: how accurate, by whose standard, found how, assuming what.
 
-    Lengths are in the linear unit of the block, along east, north and up.
+    It has what it rests on, :class:`photogram.results.statement.grounds.Grounds`. Lengths are in the linear
+    unit of the block, along east, north and up.
 
     Attributes
     ----------
-    result, asked, texts
-        The adjusted block, what was asked for, and its words.
-    compared
-        Check points with their joint covariance.
-    of_all, of_rest, of_vegetated
-        Figures of all check points, of those that are left without some, and of heights in vegetation; None
-        where there are none.
-    left_out
-        Control points as the others predict them.
-    taken_apart
-        Budgets of uncertainty.
-    standards
-        What standards say.
-    layout
-        How check points lie; None without any.
     judged
         Headline, sentences, assumptions, remarks and exit code: one judgement for all that is written.
     removed
@@ -66,17 +53,6 @@ class Statement(Brief):
         What it was made of, where a command has made it.
     """
 
-    result: Result
-    asked: Asked
-    texts: Texts
-    compared: Compared
-    of_all: Figures | None
-    of_rest: Figures | None
-    of_vegetated: Figures | None
-    left_out: tuple[LeftOut, ...]
-    taken_apart: tuple[Budget, ...]
-    standards: Standards
-    layout: Layout | None
     judged: Judged
     removed: tuple[str, ...] = ()
     survey: Survey = NOTHING
@@ -268,9 +244,7 @@ def statement(
     taken_apart = budgets(
         result, quantities, covariances, coverage=options.coverage, components=options.components
     )
-    said = standards(result, options, found, of_all, of_vegetated, left_out)
-    lie = _layout(result, found)
-    return Statement(
+    grounds = Grounds(
         result=result,
         asked=options,
         texts=texts,
@@ -280,23 +254,12 @@ def statement(
         of_vegetated=of_vegetated,
         left_out=tuple(left_out),
         taken_apart=tuple(taken_apart),
-        standards=said,
-        layout=lie,
-        judged=judged(
-            result,
-            options,
-            texts,
-            found,
-            of_all,
-            of_vegetated,
-            left_out,
-            taken_apart,
-            said,
-            lie,
-            assumed=assumed,
-            removed=removed,
-            strict=strict,
-        ),
+        standards=standards(result, options, found, of_all, of_vegetated, left_out),
+        layout=_layout(result, found),
+    )
+    return Statement(
+        **vars(grounds),
+        judged=judged(grounds, assumed=assumed, removed=removed, strict=strict),
         removed=tuple(removed),
         survey=surveyed(result, found, system),
         inputs=tuple(inputs),

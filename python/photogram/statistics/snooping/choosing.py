@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.distributions import LEVEL, critical_chi_square, critical_fisher
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial
@@ -281,19 +281,10 @@ def _critical(unit: UnitWeight, dimension: int, limit: float) -> float:
 def _among_all(choice: Choice, places: Indices, offsets: Indices) -> Choice:
     """Count rows and rivals among all."""
     own = choice.chosen
-    rivals = tuple((int(places[place]), *rest) for place, *rest in own.rivals)
-    moved = Chosen(
-        group=choice.group,
-        rows=own.rows + offsets[own.group],
-        statistic=own.statistic,
-        dimension=own.dimension,
-        log_probability=own.log_probability,
-        fisher=own.fisher,
-        error=own.error,
-        cofactors=own.cofactors,
-        rivals=rivals,  # type: ignore[arg-type]
-    )
-    return Choice(choice.group, choice.first_statistic, moved, choice.limit)
+    rivals = tuple((int(places[place]), t, m, odds) for place, t, m, odds in own.rivals)
+    rows = own.rows + offsets[own.group]
+    moved = replace(own, group=choice.group, rows=rows, rivals=rivals)
+    return replace(choice, chosen=moved)
 
 
 class _Load:

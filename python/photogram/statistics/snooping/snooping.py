@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.statistics.snooping.consensus import begun
 from photogram.statistics.snooping.log import Removal, Round
-from photogram.statistics.snooping.robust_start import needs_robust_start, scales, start_robustly
+from photogram.statistics.snooping.starts import begun, needs_robust_start, scales, start_robustly
 from photogram.statistics.snooping.suspects import Aside, Out, Standing, Tests, Trial
 from photogram.statistics.snooping.taking_out import (
     Settings,

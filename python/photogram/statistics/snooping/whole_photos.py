@@ -47,7 +47,7 @@ def take_bad_photos_out(work: TakingOut) -> None:
 
 
 def take_photos_out(work: TakingOut, number: int) -> list[int]:
-    """Take out as a whole the photos most of whose images are out, each by itwork."""
+    """Take out as a whole the photos most of whose images are out, each by itself."""
     suspects = work.suspects
     single = [work.log[place] for place in range(len(work.log)) if work.log[place].is_out]
     photos = [int(suspects.photos[each.group]) for each in single if each.group in work.images]

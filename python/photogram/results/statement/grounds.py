@@ -1,4 +1,4 @@
-"""What a statement assumes, each a line that is filled from the run."""
+"""What a statement rests on, and what it assumes: each a line that is filled from the run."""
 
 from __future__ import annotations
 
@@ -7,36 +7,68 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.results.components import VarianceComponents
+from photogram.lazy_dataclasses import dataclass
 from photogram.results.result import Result
 from photogram.results.statement import translation
+from photogram.results.statement.budget import Budget
 from photogram.results.statement.comparison import Compared
-from photogram.results.statement.figures import root_mean
+from photogram.results.statement.figures import Figures, root_mean
 from photogram.results.statement.layout import Layout
+from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.request import Asked
-from photogram.results.statement.standards import Lengths
+from photogram.results.statement.standards import Standards
 from photogram.results.statement.texts import Texts
 
+Said = list[tuple[str, str]]
+"""Keys of the table of words, and texts."""
 
-def assumptions(
-    result: Result,
-    asked: Asked,
-    texts: Texts,
-    found: Compared,
-    layout: Layout | None,
-    assumed: Sequence[str],
-    removed: Sequence[str],
-    *,
-    lengths: Lengths | None = None,
-) -> list[tuple[str, str]]:
-    """Return keys and texts."""
-    said = [*_weights(result, asked.components, texts)]
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Grounds:
+    """All that was found of an adjusted block and its check points, and what was asked of it.
+
+    Attributes
+    ----------
+    result, asked, texts
+        The adjusted block, what was asked for, and its words.
+    compared
+        Check points with their joint covariance.
+    of_all, of_rest, of_vegetated
+        Figures of all check points, of those that are left without some, and of heights in vegetation; None
+        where there are none.
+    left_out
+        Control points as the others predict them.
+    taken_apart
+        Budgets of uncertainty.
+    standards
+        What standards say.
+    layout
+        How check points lie; None without any.
+    """
+
+    result: Result
+    asked: Asked
+    texts: Texts
+    compared: Compared
+    of_all: Figures | None
+    of_rest: Figures | None
+    of_vegetated: Figures | None
+    left_out: tuple[LeftOut, ...]
+    taken_apart: tuple[Budget, ...]
+    standards: Standards
+    layout: Layout | None
+
+
+def assumptions(found: Grounds, assumed: Sequence[str], removed: Sequence[str]) -> Said:
+    """Return what was assumed: as files were read, in sentences, and of a block without what was removed."""
+    asked, texts, layout, lengths = found.asked, found.texts, found.layout, found.standards.lengths
+    said = [*_weights(found)]
     said += [texts.said("assume.read", said=translation.read(texts, each)) for each in assumed]
-    said += [*_adjustment(result, texts, removed)]
-    if len(found):
-        said += _survey(asked, texts, found)
-        if found.step > 1:
-            said.append(texts.said("assume.taken", all=found.known, step=found.step))
+    said += [*_adjustment(found, removed)]
+    if len(found.compared):
+        said += _survey(found)
+        if found.compared.step > 1:
+            said.append(texts.said("assume.taken", all=found.compared.known, step=found.compared.step))
         said.append(texts.said("assume.heights"))
         if "asprs-2023" in asked.standards:
             said.append(texts.said("assume.slopes"))
@@ -52,9 +84,9 @@ def assumptions(
     return [*said, texts.said("assume.not_covered")]
 
 
-def _weights(result: Result, components: VarianceComponents | None, texts: Texts) -> list[tuple[str, str]]:
-    said = []
-    test = result.global_test
+def _weights(found: Grounds) -> Said:
+    result, texts, said = found.result, found.texts, Said()
+    test, components = result.global_test, found.asked.components
     if components is not None:
         parts = [
             f"{translation.kind(texts, each.name)} x {texts.number(each.factor_of_sd, 2)}"
@@ -73,7 +105,8 @@ def _weights(result: Result, components: VarianceComponents | None, texts: Texts
     return [*said, texts.said("weights.posterior", s2=s2, f=f), texts.said("honest.approximate")]
 
 
-def _adjustment(result: Result, texts: Texts, removed: Sequence[str]) -> list[tuple[str, str]]:
+def _adjustment(found: Grounds, removed: Sequence[str]) -> Said:
+    result, texts = found.result, found.texts
     total, out = int(result.used_images.sum()), len(removed) + len(result.set_aside)
     block = result.block
     held = translation.held(texts, result)
@@ -89,12 +122,12 @@ def _adjustment(result: Result, texts: Texts, removed: Sequence[str]) -> list[tu
     ]
 
 
-def _survey(asked: Asked, texts: Texts, found: Compared) -> list[tuple[str, str]]:
-    known = np.isfinite(found.survey_sd)
-    if not found.survey_sd[known].any():
+def _survey(found: Grounds) -> Said:
+    asked, texts, sd = found.asked, found.texts, found.compared.survey_sd
+    if not sd[np.isfinite(sd)].any():
         said = [texts.said("assume.survey_exact")]
     else:
-        east, north, height = (texts.length(root_mean(column**2)) for column in found.survey_sd.T)
+        east, north, height = (texts.length(root_mean(column**2)) for column in sd.T)
         said = [texts.said("assume.survey", east=east, north=north, height=height)]
     if any(asked.survey_common_sd):
         size = " / ".join(texts.length(each) for each in asked.survey_common_sd)

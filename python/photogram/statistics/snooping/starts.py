@@ -1,0 +1,362 @@
+"""How snooping begins where many observations are wrong, or some so much that the adjustment runs off.
+
+Where many are wrong: with robust factors of standard deviations, and a robust adjustment.
+
+Where errors are huge, from what most observations agree on. Images under exchanged names are off by
+thousands of standard deviations. The adjustment of a block with them bends or diverges, and every test of it,
+robust or not, is of the bent block. Resections and intersections by consensus are not moved by a minority,
+however large its errors are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.messages import counted
+from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.snooping.choosing import Choice
+from photogram.statistics.snooping.log import Removal
+from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Tests, Trial
+from photogram.statistics.snooping.taking_out import Settings, TakingOut, log_probability, take_back
+from photogram.statistics.snooping.whole_photos import log_photo, take_photo
+
+MEDIAN = 0.6744897501960817
+"""Of the absolute value of a standard normal variable."""
+MEDIAN_OF_TWO = 1.1774100225154747
+"""Of the length of a vector of two of them."""
+OPTIMISTIC = 2.0
+"""Standard deviations that are too small by more than this are told from gross errors by the median."""
+ENOUGH = 20
+"""Test values that a median needs."""
+
+
+def scales(work: TakingOut) -> tuple[dict[str, float], Floats]:
+    """Return robust factors k by kind where standard deviations are too optimistic, and k^2 by group."""
+    suspects, tests = work.suspects, work.tests
+    squares = np.ones(len(suspects))
+    if not work.settings.known:
+        return {}, squares
+    everything = values(work, np.ones(len(suspects), dtype=bool))
+    overall = robust_factor(everything)
+    if len(everything) < ENOUGH or not overall > OPTIMISTIC:
+        return {}, squares
+    factors = {}
+    for kind, name in enumerate(suspects.kind_names):
+        own = np.asarray(suspects.kinds == kind)
+        if not (own & tests.active).any():
+            continue
+        sizes = values(work, own)
+        factor = max(robust_factor(sizes) if len(sizes) >= ENOUGH else overall, 1.0)
+        factors[name] = factor
+        squares[own] = factor**2
+    named = ", ".join(f"{name} {factor:.3g}" for name, factor in factors.items())
+    work.remarks.append(
+        "standard deviations are too small by about the robust factor"
+        f" {overall:.3g} (median of the test values): tested with them times {named}"
+    )
+    return factors, squares
+
+
+def values(work: TakingOut, groups: Bools) -> Floats:
+    """Return |w| of all rows of some groups that are testable."""
+    rows = np.repeat(groups, np.diff(work.suspects.row_starts))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        w = np.abs(work.tests.residual) / np.sqrt(work.tests.redundancy)
+        return np.asarray(w[rows & (work.tests.redundancy > TESTABLE) & np.isfinite(w)])
+
+
+def robust_factor(values: Floats) -> float:
+    """Return the robust standard deviation of test values whose sizes are given."""
+    return float(np.median(values)) / MEDIAN if values.size else 1.0
+
+
+MANY = 0.05
+"""Share of the images beyond `FAR` robust standard deviations from which on a robust start is needed."""
+FAR = 5.0
+CANDIDATE = 4.4
+"""Robust standard deviations from which on a residual is put aside: Cauchy's loss leaves it a quarter of its
+weight."""
+SCALES = 5
+"""Robust adjustments at the most until their scale stands."""
+
+
+def needs_robust_start(work: TakingOut) -> bool:
+    """Whether more disagrees than tests of single groups can sort out, or nothing converges."""
+    if work.settings.robust is not None:
+        return work.settings.robust
+    if work.standing.status != "converged":
+        return True
+    everything = values(work, np.ones(len(work.suspects), dtype=bool))
+    if len(everything) < ENOUGH:
+        return False
+    factor = max(robust_factor(everything), 1.0)
+    images = values(work, np.asarray(work.suspects.kinds == 0))
+    many = bool(images.size) and float(np.mean(images > FAR * factor)) > MANY
+    return many or (work.settings.known and factor > OPTIMISTIC)
+
+
+def start_robustly(work: TakingOut) -> None:
+    """Put points aside where robust weights nearly vanish, and test them against all others.
+
+    A robust adjustment tells that something is wrong with a point, but not which of its rays it is: of
+    two rays both lose their weight, and a good one beside a large error often does.
+    """
+    suspects = work.suspects
+    try:
+        robust = _robust_sizes(work)
+    except LostSupportError:
+        robust = None
+    if robust is None:
+        work.factors, work.scales = scales(work)
+        return
+    sizes, scale = robust
+    candidates = np.flatnonzero((sizes > CANDIDATE * scale) & suspects.removable & work.tests.active)
+    start_without(
+        work,
+        candidates,
+        work.tests,
+        work.standing,
+        "many observations disagree: a robust adjustment (Huber, then Cauchy)",
+    )
+
+
+def start_without(work: TakingOut, candidates: Indices, first: Tests, standing: Standing, what: str) -> None:
+    """Put the points of some groups aside, and let tests against all others decide about them.
+
+    Parameters
+    ----------
+    candidates
+        The groups.
+    first, standing
+        Tests, and how the network stood, with everything in it.
+    what
+        Names them.
+    """
+    suspects, start = work.suspects, work.out
+    points = np.unique(suspects.points[candidates])
+    points = points[points >= 0]
+    choices, judged = _on_points_aside(work, points.tolist(), candidates, first)
+    others = candidates[~np.isin(suspects.points[candidates], sorted(judged))]
+    entries = [work.as_it_was(group, first) for group in others.tolist()]
+    entries += work.entries(choices, 0)
+    work.out = start
+    removed = work.apply(entries, [])
+    if not removed:
+        work.adjust(work.out)
+    if not work.factors:
+        work.factors, work.scales = scales(work)
+    work.remarks.append(
+        f"{what} put {len(points)} points aside; tests against the photos of the others decided which of"
+        " their rays stay out"
+    )
+    returned = take_back(work, 0)
+    work.note_round(0, standing, removed, returned)
+
+
+def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
+    """Return the sizes of residuals in a robust adjustment, and the factor of its standard deviations.
+
+    None where no robust adjustment converges.
+
+    The median of all is lifted by many gross errors, whose effects spread: the factor is found anew from
+    residuals of the robust adjustment, until it stands.
+    """
+    active = work.tests.active & (work.suspects.kinds == 0)
+    rows = np.repeat(active, np.diff(work.suspects.row_starts))
+    redundancy = float(np.mean(work.tests.redundancy[rows])) if rows.any() else 0.0
+    if not redundancy > 0.0:
+        return None  # nothing is tested
+    expected = MEDIAN_OF_TWO * math.sqrt(redundancy)
+    scale = max(robust_factor(values(work, active)), 1.0)
+    sizes = work.trial.resist(scale)
+    for _ in range(SCALES):
+        if sizes is None:
+            return None
+        found = max(float(np.median(sizes[active])) / expected, 1.0)
+        if found > 0.8 * scale:
+            break
+        scale = found
+        sizes = work.trial.resist(scale)
+    return None if sizes is None else (sizes, scale)
+
+
+def _on_points_aside(
+    work: TakingOut, points: list[int], candidates: Indices, first: Tests
+) -> tuple[list[Choice], set[int]]:
+    """Adjust without some points and all candidates; choose on these points; tell which were judged."""
+    out = work.out.copy()
+    out.points |= set(points)
+    aside = np.isin(work.suspects.points, points)
+    aside[candidates] = True
+    out.rows[np.repeat(aside, np.diff(work.suspects.row_starts))] = True
+    try:
+        work.adjust(out)
+    except LostSupportError:
+        # Photos are not determined without them: what has lost its weight goes, and is tested alone.
+        return [], set()
+    work.factors, work.scales = scales(work)
+    choosing = work.choosing(np.asarray(work.suspects.removable), 0, ahead=False)
+    return replace(choosing, tests=first).on_gone_points(points)
+
+
+BENT = 10.0
+"""Standard deviations; a median of all test values beyond it is of a bent network, or of absurd weights."""
+
+
+def _runs_off(work: TakingOut) -> bool:
+    """Whether the adjustment does not converge, or leaves residuals that no standard deviation explains."""
+    if work.standing.status != "converged":
+        return True
+    everything = values(work, np.ones(len(work.suspects), dtype=bool))
+    return len(everything) >= ENOUGH and robust_factor(everything) > BENT
+
+
+def begun(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None] | None) -> TakingOut:
+    """Adjust a network for the first time, from a consensus where its adjustment runs off.
+
+    An image whose point has other rays is tested against its prediction. Where no two are left, the point is
+    aside with all of them, and each is tested as if it were in, so that both of two rays are named.
+
+    Parameters
+    ----------
+    afresh
+        Finds the consensus, and starts the trial at it; None where there is none, or nothing against it.
+
+    Raises
+    ------
+    LostSupportError
+        The network is not determined, or runs off and there is no consensus.
+    """
+    start = None if settings.robust is False else afresh
+    try:
+        work = TakingOut(trial, settings)
+    except LostSupportError:
+        aside = None if start is None else start()
+        if aside is None:
+            raise
+        work = TakingOut(trial, settings, _without(trial, aside))
+        _decide(work, aside, None)
+    else:
+        aside = start() if start is not None and _runs_off(work) else None
+        if aside is not None:
+            _decide(work, aside, work.standing)
+    return work
+
+
+def _without(trial: Trial, aside: Aside) -> Out:
+    """Return what is out with what a consensus does without, and points with too few rays then."""
+    suspects = trial.suspects
+    out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool))
+    groups = list(aside.images)
+    for photo in sorted(aside.photos):
+        out.photos.add(photo)
+        groups += suspects.on_photo(photo).tolist()
+    _put_aside(trial, out, groups)
+    return out
+
+
+def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
+    """Test what a consensus does without against the rest; what agrees takes part.
+
+    `before`: how everything together stood; None where it could not be adjusted.
+    """
+    first, tests, start = work.standing, work.tests, work.out
+    out, consequences = Out(np.zeros_like(start.rows)), {}
+    for photo in sorted(aside.photos):
+        consequences[photo] = take_photo(work, out, photo)
+    whole = out.copy()
+    starts = work.suspects.row_starts
+    images = np.array([group for group in aside.images if not out.rows[starts[group]]], dtype=np.int64)
+    points = _put_aside(work.trial, out, images.tolist())
+    try:
+        work.adjust(out)
+    except LostSupportError:
+        work.adjust(start)
+        return
+    predicted, agreeing = _predicted(work, images[~np.isin(work.suspects.points[images], points)])
+    choosing = replace(work.choosing(work.suspects.removable, 0, ahead=False), tests=tests)
+    choices, _ = choosing.on_gone_points(points)
+    work.out = whole
+    entries = predicted + work.entries(choices, 0)
+    removed = work.apply(entries, []) if entries else []
+    if not removed:
+        work.adjust(whole)
+    if _runs_off(work):
+        removed += _still_out(work, points, images, tests)
+    for photo, said in aside.photos.items():
+        removed.append(log_photo(work, photo, 0, before, (said, *consequences[photo])))
+    parts = [counted(len(images), "image")] if len(images) else []
+    parts += [work.suspects.photo_name(photo) for photo in aside.photos]
+    why = "runs off" if before is not None else "leads nowhere (before: without what follows)"
+    said = f"; {agreeing} of the images agree with it" if agreeing else ""
+    work.remarks.append(
+        f"the adjustment of everything {why}: it was started anew from {aside.found_by}, without"
+        f" {' and '.join(parts)}; tests against the rest decided about them{said}"
+    )
+    work.note_round(0, first, removed, [])
+
+
+def _still_out(work: TakingOut, points: list[int], images: Indices, tests: Tests) -> list[int]:
+    """Take out again what tests against the rest have let in, and with which the adjustment runs off.
+
+    Two rays that part before the cameras agree with any photos in a linear model, for they meet behind them.
+    """
+    suspects = work.suspects
+    back = [group for group in images.tolist() if not work.out.rows[suspects.rows(group)].any()]
+    one_of_each = {int(suspects.points[group]): group for group in reversed(back)}
+    entries = [
+        work.as_it_was(group, tests).with_(consequences=("its rays do not meet",))
+        for point, group in sorted(one_of_each.items())
+        if point in points
+    ]
+    return work.apply(entries, []) if entries else []
+
+
+def _put_aside(trial: Trial, out: Out, groups: list[int]) -> list[int]:
+    """Put groups out; return the points that have too few rays without them: they are out with all."""
+    suspects = trial.suspects
+    for group in groups:
+        out.rows[suspects.rows(group)] = True
+    points: set[int] = set()
+    for group in groups:
+        points |= trial.consequences(out, group)[0]
+    for point in points:
+        out.points.add(point)
+        for group in suspects.on_point(point).tolist():
+            out.rows[suspects.rows(group)] = True
+    return sorted(points)
+
+
+def _predicted(work: TakingOut, groups: Indices) -> tuple[list[Removal], int]:
+    """Return entries of images that contradict what the rest predicts, and how many agree with it."""
+    level = work.level.limit(0)
+    standing = work.standing
+    variance = standing.weighted_sum_of_squares / max(standing.degrees_of_freedom, 1)
+    entries = []
+    for group, own in zip(groups.tolist(), work.trial.predictions(groups.tolist()), strict=True):
+        if own is None:
+            continue
+        rows = np.array(own.rows)
+        log_p = log_probability(work, np.array([own.statistic]), np.array([len(rows)]), np.array([group]))
+        if log_p[0] < math.log(level):
+            entries.append(
+                work.entry(
+                    group,
+                    rows,
+                    0,
+                    first_statistic=own.statistic,
+                    statistic=own.statistic,
+                    dimension=len(rows),
+                    fisher=own.statistic / len(rows) / variance if variance > 0 else math.nan,
+                    log_probability=float(log_p[0]),
+                    error=np.array(own.error),
+                    error_sd=np.array(own.error_sd),
+                    limit=level,
+                )
+            )
+    return entries, len(groups) - len(entries)
