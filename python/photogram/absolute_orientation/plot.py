@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
-from photogram.plots.panels import Where, figure_of, labels, panels, scale_bars
+from photogram.show.axes import Where, figure_of, labels, panels, scale_bars
 from photogram.show.methods import axes_of
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import INK, PURPLE, VERMILION

@@ -13,13 +13,13 @@ from photogram.plots.distortion import distortion, distortion_sketch
 from photogram.plots.features import features, features_sketch
 from photogram.plots.films import films, films_sketch
 from photogram.plots.network import network, network_sketch
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where, figure_of
 from photogram.plots.redundancy import redundancy, redundancy_sketch
 from photogram.plots.residuals import residuals, residuals_sketch
 from photogram.plots.tests import tests, tests_sketch
 from photogram.plots.trajectories import trajectory
+from photogram.show.axes import Where, figure_of
 from photogram.show.sketch.declared import Sketch
+from photogram.show.sketch.on_axes import on_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,8 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where
 from photogram.plots.picture_data import Pictured, Plan, pictured
+from photogram.show.axes import Where
 from photogram.show.pictures import round_length
 from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
@@ -26,6 +25,7 @@ from photogram.show.sketch.marks import (
     Segments,
     Shades,
 )
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark]
     shown = outlines[chosen][:, :, list(seen[:2])]
     inside = float(np.clip(0.4 / len(shown), 0.003, 0.06))
     edge = float(np.clip(25.0 / len(shown), 0.5, 0.7))
-    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, "footprint of a photo")], said
+    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, label="footprint of a photo")], said
 
 
 def _photos(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
@@ -318,11 +318,11 @@ def _vectors(
     places, moved = plan.points[rows][:, pair], scale * np.nan_to_num(across)
     if (long := np.hypot(*moved.T) > 0).any():
         label = "difference in plan"
-        marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label, layer=6.0))
+        marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label=label, layer=6.0))
     if (high := np.isfinite(out) & (out != 0)).any():
         tops = places[high] + np.column_stack([np.zeros(high.sum()), scale * out[high]])
         label = "difference in height, + upwards"
-        marks.append(Segments(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label, layer=5.5))
+        marks.append(Segments(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label=label, layer=5.5))
     unit = f" {plan.unit}" if plan.unit else ""
     bar = round_length(0.12 * extent / scale)
     what = f"differences of control and check points, adjusted less given (× {scale:,g})"

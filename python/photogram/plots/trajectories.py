@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.panels import Where, handed_out, panels
+from photogram.show.axes import Where, handed_out, panels
 from photogram.show.style import INK
 
 TIMES = 160

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.plots.distortion import side_by_side
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where, panels, placed
+from photogram.plots.placed import placed
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.picture_data import curves_of
 from photogram.results.result import Result
+from photogram.show.axes import Where, panels
 from photogram.show.pictures import arrows, round_length
 from photogram.show.sketch.declared import Sketch
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import BLUE, INK
 
 if TYPE_CHECKING:

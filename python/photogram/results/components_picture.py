@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.plots.panels import Where, figure_of, panels, placed
+from photogram.plots.placed import placed
 from photogram.results.components import VarianceComponents
+from photogram.show.axes import Where, figure_of, panels
 from photogram.show.methods import axes_of
 from photogram.show.style import FAINT, INK, MARKED
 

@@ -12,9 +12,10 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
-from photogram.plots.panels import Where, panels, placed
+from photogram.plots.placed import placed
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
+from photogram.show.axes import Where, panels
 from photogram.show.methods import Shown, axes_of, columns_of, document_of, report_of
 from photogram.show.sections import composed, headline
 from photogram.show.style import FAINT, INK, MARKED

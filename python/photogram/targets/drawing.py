@@ -13,7 +13,8 @@ import numpy as np
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.plots.panels import Where, handed_out, note, panels, placed
+from photogram.plots.placed import placed
+from photogram.show.axes import Where, handed_out, note, panels
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, INK, ORDERED, VERMILION
 from photogram.targets.calibration_difference import CameraDifference

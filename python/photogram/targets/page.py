@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.plots.panels import figure_of
+from photogram.show.axes import figure_of
 from photogram.show.cells import page_table
 from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Remarks, Section

@@ -8,7 +8,8 @@ from typing import Any
 
 from photogram.arguments.annotations import check_arguments
 from photogram.network.hull import hull
-from photogram.plots.panels import Where, handed_out, panels, placed
+from photogram.plots.placed import placed
+from photogram.show.axes import Where, handed_out, panels
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.drawing import in_pixels
 from photogram.targets.view_plan_result import ViewPlan

@@ -10,7 +10,8 @@ import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
-from photogram.plots.panels import Where, handed_out, panels, placed, scale_bars
+from photogram.plots.placed import placed
+from photogram.show.axes import Where, handed_out, panels, scale_bars
 from photogram.show.pictures import arrows, round_length
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.calibration_result import Calibrated

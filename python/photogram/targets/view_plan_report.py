@@ -10,7 +10,7 @@ import numpy as np
 from photogram.io import json
 from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes
-from photogram.plots.panels import figure_of
+from photogram.show.axes import figure_of
 from photogram.show.cells import page_table
 from photogram.show.lines import field, table_lines
 from photogram.show.methods import document_of, page_of, report_of

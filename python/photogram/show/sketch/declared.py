@@ -37,6 +37,10 @@ class Panel:
         Whether names across are written upwards.
     bare
         Whether there are no lines of axes.
+    log_across, log_up
+        Whether equal ratios are equally long along an axis.
+    shades
+        What a bar of colours beside the panel shows.
     """
 
     limits: Floats
@@ -52,6 +56,14 @@ class Panel:
     up_names: Sequence[str] = ()
     turned: bool = False
     bare: bool = False
+    log_across: bool = False
+    log_up: bool = False
+    shades: Shades | None = None
+
+    def even(self, places: Floats) -> Floats:
+        """Return (..., 2) places as they are spaced: their logarithms along axes that have these."""
+        log = np.array([self.log_across, self.log_up])
+        return np.where(log, np.log10(np.where(log, places, 1.0)), places) if log.any() else places
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +76,12 @@ class Sketch:
         Inches, of which it takes no more than its panels need.
     columns
         Of panels.
-    shades, beside_all
-        What the bar of colours shows, and whether it stands beside all panels or belongs to the last.
+    shades
+        What a bar of colours beside all panels shows.
     shared
         Whether the panels of a column have their numbers across below the lowest only.
+    title
+        Of all panels.
     """
 
     width: float
@@ -75,8 +89,8 @@ class Sketch:
     panels: Sequence[Panel | None]
     columns: int = 1
     shades: Shades | None = None
-    beside_all: bool = False
     shared: bool = False
+    title: str = ""
 
     @property
     def rows(self) -> int:

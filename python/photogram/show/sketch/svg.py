@@ -11,6 +11,8 @@ from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import (
     BAR_LINE,
     GAP,
+    HEAD,
+    HEAD_LINE,
     LABEL,
     LEGEND,
     LEGEND_LINE,
@@ -24,6 +26,7 @@ from photogram.show.sketch.layout import (
     Placed,
     above,
     below,
+    heading,
     labelled,
     laid_out,
     legend_box,
@@ -31,9 +34,10 @@ from photogram.show.sketch.layout import (
     named_axis,
     right_end,
 )
-from photogram.show.sketch.letters import width
-from photogram.show.sketch.marks import Mark, Shades
+from photogram.show.sketch.letters import widest, width
+from photogram.show.sketch.marks import Labelled, Shades
 from photogram.show.sketch.names import Box
+from photogram.show.sketch.svg_contours import levels_written
 from photogram.show.sketch.svg_marks import Attributes, element, names, number, path, sample, svg, text
 from photogram.show.sketch.ticks import Ticks, ticks
 from photogram.show.style import FAINT, INK, SETTINGS
@@ -61,11 +65,13 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
     parts = [_panel(placed, f"{name}-{k}") for k, placed in enumerate(panels)]
     wide, high = max(map(right_end, panels)), max(map(low_end, panels))
     if sketch.shades is not None:
-        beside = panels if sketch.beside_all else panels[-1:]
-        top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
-        left = max(each.box[2] for each in beside) + GAP
-        parts.append(_colour_bar(sketch.shades, f"{name}-shades", (left, top, left + 9.0, low)))
-        wide = max(wide, left + OF_COLOURS)
+        parts.append(_colour_bar(sketch.shades, f"{name}-shades", panels))
+        wide = max(wide, max(each.box[2] for each in panels) + GAP + OF_COLOURS)
+    if head := heading(sketch):
+        x = min(each.box[0] for each in panels)
+        lines = "".join(text(x, HEAD_LINE * (k + 0.75), each) for k, each in enumerate(head))
+        parts.append(element("g", {"fill": INK, "font_size": HEAD}, lines))
+        wide = max(wide, x + widest(head, HEAD))
     look: Attributes = {"font_family": LETTERS, "font_size": NUMBER, "fill": "none"}
     size = f'viewBox="0 0 {wide + 2:.0f} {high + 2:.0f}" width="{96 / 72 * (wide + 2):.0f}"'
     head = element("svg", {"role": "img", "aria_label": title}).removesuffix("/>")
@@ -79,8 +85,10 @@ def _panel(placed: Placed, name: str) -> str:
     marks = "".join(svg(mark, placed) for mark in sorted(placed.panel.marks, key=lambda each: each.layer))
     legend, taken = _legend(placed)
     inside = element("g", {"clip_path": f"url(#{name}-clip)"}, marks) if marks else ""
-    words = [_axes(placed), _above(placed), legend, names(placed, taken), _notes(placed)]
-    return clip + inside + element("g", {"fill": INK}, "".join(words))
+    written = levels_written(placed, taken)
+    words = [_axes(placed), _above(placed), written, legend, names(placed, taken), _notes(placed)]
+    bar = _colour_bar(placed.panel.shades, f"{name}-shades", [placed]) if placed.panel.shades else ""
+    return clip + inside + element("g", {"fill": INK}, "".join(words)) + bar
 
 
 def _axes(placed: Placed) -> str:
@@ -110,7 +118,7 @@ def _axes(placed: Placed) -> str:
             text(0.5 * (left + right), down, named_axis(panel.across, placed.across.power), **middle)
         )
     if up := named_axis(panel.up, placed.up.power):
-        x = left - 12.0 - max(width(each, NUMBER) for each in placed.up.texts)
+        x = left - 12.0 - placed.beside
         y = 0.5 * (top + low)
         found.append(text(x, y, up, **middle, transform=f"rotate(-90 {number(x)} {number(y)})"))
     return "".join(found)
@@ -172,7 +180,7 @@ def _legend(placed: Placed) -> tuple[str, list[Box]]:
     return behind + "".join(entries), [box]
 
 
-def _entry(mark: Mark, x: float, y: float) -> str:
+def _entry(mark: Labelled, x: float, y: float) -> str:
     """Return a sample of a mark and its name, their middle at a height."""
     panel = Panel(np.array([[0.0, 0.0], [SWATCH, 8.0]]))
     none = Ticks(np.empty(0), [])
@@ -181,9 +189,11 @@ def _entry(mark: Mark, x: float, y: float) -> str:
     return element("g", {"fill": "none"}, svg(sample(mark), own)) + said
 
 
-def _colour_bar(shades: Shades, name: str, box: Box) -> str:
-    """Return a bar of colours with numbers beside it."""
-    left, top, right, low = box
+def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
+    """Return a bar of colours with numbers beside it, at the right of panels."""
+    top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
+    left = max(each.box[2] for each in beside) + GAP
+    right = left + 9.0
     places, colours = stops(shades.map)
     steps = (
         element("stop", {"offset": place, "stop_color": hexadecimal(colour.astype(np.int64))})
@@ -193,8 +203,9 @@ def _colour_bar(shades: Shades, name: str, box: Box) -> str:
     found = [element("linearGradient", upwards, "".join(steps))]
     ground: Attributes = {"x": left, "y": top, "width": right - left, "height": low - top}
     found.append(element("rect", {**ground, "fill": f"url(#{name})"}))
-    given = ticks(np.array([shades.low, shades.high]), low - top, NUMBER, across=False)
-    heights = low - (given.values - shades.low) / (shades.high - shades.low) * (low - top)
+    ends = np.array([shades.low, shades.high])
+    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log)
+    heights = low - shades.parts(given.values) * (low - top)
     for y, said in zip(heights.tolist(), given.texts, strict=True):
         found.append(path(f"M{number(right)} {number(y)}h{TICK}", stroke=FAINT, stroke_width=0.8))
         found.append(text(right + 6.0, y + 0.36 * NUMBER, said, fill=INK))
