@@ -61,7 +61,9 @@ def orientation_page(result: Orientation) -> Page:
 
 def _drawing(result: Orientation) -> Drawing:
     caption = "The control in plan with its residuals, given minus transformed, enlarged as the scale says."
-    return Drawing("picture-residuals", "Residuals of the control in plan", caption, lambda: figure(result))
+    return Drawing(
+        "picture-residuals", "Residuals of the control in plan", caption, figure=lambda: figure(result)
+    )
 
 
 def _tested(result: Orientation) -> str:

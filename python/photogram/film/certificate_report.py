@@ -257,7 +257,7 @@ def _lens_parts(certificate: Certificate) -> list[Part]:
         return []
     own = certificate.curve()
     return [
-        Drawing("picture-distortion", "Radial distortion", _CURVE, lambda: _drawn(certificate)),
+        Drawing("picture-distortion", "Radial distortion", _CURVE, figure=lambda: _drawn(certificate)),
         page_table("Table of radial distortion", distortion(certificate, own)),
         page_table("Odd terms beside k0", terms(certificate.curves(), own.terms)),
         page_table("Curve, the last radius beyond the table", curve(own)),

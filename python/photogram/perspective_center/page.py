@@ -51,7 +51,7 @@ def _name(result: PerspectiveCenter) -> str:
 
 def _drawing(run: Run) -> Drawing:
     caption = "Left the residuals of the grid, enlarged alike in all sets; right the radial distortion."
-    return Drawing("picture-grid", "Residuals and distortion", caption, lambda: figure(run.results))
+    return Drawing("picture-grid", "Residuals and distortion", caption, figure=lambda: figure(run.results))
 
 
 def _layers(

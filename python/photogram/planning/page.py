@@ -70,7 +70,9 @@ def _drawing(patterns: Sequence[Pattern]) -> Drawing:
         "The patterns in plan, on one scale of colours: the expected standard deviation of points in height."
         " Control points are marked by what they hold."
     )
-    return Drawing("picture-plan", "Expected standard deviation in height", caption, lambda: figure(patterns))
+    return Drawing(
+        "picture-plan", "Expected standard deviation in height", caption, figure=lambda: figure(patterns)
+    )
 
 
 def _judgement(patterns: Sequence[Pattern]) -> Judgement:

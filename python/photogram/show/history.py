@@ -119,7 +119,7 @@ def charts_section(histories: Mapping[str, History]) -> Section:
             f"charts-{k}",
             name,
             "",
-            lambda own=own, name=name: control_charts(own, name[:1].upper() + name[1:]),  # type: ignore[misc]
+            figure=lambda own=own, name=name: control_charts(own, name[:1].upper() + name[1:]),  # type: ignore[misc]
         )
         for k, (name, own) in enumerate(histories.items())
     ]

@@ -140,12 +140,12 @@ def inlined(drawing: Drawing) -> Picture | None:
 
     One that is no sketch needs matplotlib, of `photogram[report]`.
     """
-    if drawing.sketch is None:
+    if drawing.figure is not None:
         markup = _of_figure(drawing)
     else:
         from photogram.show.sketch.svg import svg_of
 
-        sketch = drawing.sketch()
+        sketch = drawing.sketch() if drawing.sketch is not None else None
         markup = svg_of(sketch, drawing.name, drawing.title) if sketch is not None else ""
     return Picture(drawing.name, drawing.title, drawing.caption, markup) if markup else None
 

@@ -157,18 +157,27 @@ class Drawing:
         Unique on the page; parts of the picture are named after it.
     title, caption
         A word for switching, and what is to be seen.
-    draw
-        Makes the matplotlib figure; None where there is nothing to draw.
     sketch
-        Declares the picture, which pages then draw without matplotlib; None: only `draw` knows it.
+        Declares the picture; None where there is nothing to draw.
+    figure
+        Makes a figure of matplotlib, in place of what is no sketch.
     """
 
     name: str
     title: str
     caption: str
-    draw: Callable[[], Figure | None]
     sketch: Callable[[], Sketch | None] | None = None
+    figure: Callable[[], Figure | None] | None = None
     kind: str = field(default="drawing", init=False)
+
+    def draw(self) -> Figure | None:
+        """Return the picture as a figure of matplotlib; None where there is nothing to draw."""
+        if self.figure is not None:
+            return self.figure()
+        from photogram.show.sketch.on_axes import figure
+
+        sketch = self.sketch() if self.sketch is not None else None
+        return figure(sketch) if sketch is not None else None
 
 
 @dataclass(frozen=True)

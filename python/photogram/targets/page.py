@@ -67,7 +67,8 @@ def _residuals(calibrated: Calibrated) -> list[Part]:
         ),
     }
     drawings = [
-        Drawing(name, title, caption, _figure(draw)) for name, (title, caption, draw) in figures.items()
+        Drawing(name, title, caption, figure=_figure(draw))
+        for name, (title, caption, draw) in figures.items()
     ]
     tables = [page_table(title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
     return [Layers("corner-residuals", drawings), *(each for each in tables if len(each.rows) > 1)]
@@ -118,7 +119,9 @@ def worth_section(worth: Worth | None) -> Section:
 def drawings(worth: Worth) -> list[Drawing]:
     """Return all pictures, still to be drawn."""
     found = [
-        Drawing(f"map-{map_name(each)}", _title(each), CAPTION, _figure(partial(draw_uncertainty, each)))
+        Drawing(
+            f"map-{map_name(each)}", _title(each), CAPTION, figure=_figure(partial(draw_uncertainty, each))
+        )
         for each in worth.maps
     ]
     for cross in worth.cross:
@@ -126,7 +129,7 @@ def drawings(worth: Worth) -> list[Drawing]:
             if own.camera in cross.cameras:
                 draw = partial(draw_cross_validation, cross, own)
                 name = f"cross-validation-{map_name(own)}"
-                found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, _figure(draw)))
+                found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, figure=_figure(draw)))
     return found + [_of_difference(each) for each in worth.differences]
 
 
@@ -142,7 +145,7 @@ def _tests(worth: Worth) -> list[Fact]:
 
 def _of_difference(found: CameraDifference) -> Drawing:
     name = f"difference-{found.cameras[0]}-{found.cameras[1]}".replace(" ", "-")
-    return Drawing(name, "Difference", APART, _figure(partial(draw_difference, found)))
+    return Drawing(name, "Difference", APART, figure=_figure(partial(draw_difference, found)))
 
 
 def _title(found: UncertaintyMap) -> str:

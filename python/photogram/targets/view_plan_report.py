@@ -105,7 +105,7 @@ def plan_drawings(plan: ViewPlan) -> list[Drawing]:
     worth = plan.calibrated.worth
     assert worth is not None
     draw = partial(figure_of, lambda ax: draw_planned_views(plan, ax=ax))
-    return [Drawing("planned-views", "Views", CAPTION, draw), *drawings(worth)]
+    return [Drawing("planned-views", "Views", CAPTION, figure=draw), *drawings(worth)]
 
 
 @document_of.register(ViewPlan)

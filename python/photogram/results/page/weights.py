@@ -49,7 +49,9 @@ def _parts(found: VarianceComponents) -> list[Part]:
     caption = "Factors of the standard deviations with their intervals (95 percent); 1 is what was given."
     parts: list[Part] = [
         Remarks(_sentences(statement(found))),
-        Drawing("picture-components", "Variance components", caption, lambda: figure_of_components(found)),
+        Drawing(
+            "picture-components", "Variance components", caption, figure=lambda: figure_of_components(found)
+        ),
         _table(found),
     ]
     if found.estimate.messages:

@@ -293,7 +293,7 @@ def _overlap(found: Statement) -> Drawing:
     labels = {name: texts(f"column.{name}") for name in ("east", "north", "photos")}
     labels |= {"unit": unit, "decimal": texts("number.decimal")}
     draw = partial(overlap, found.result, labels)
-    return Drawing("map-overlap", texts("page.overlap"), texts("page.overlap.caption"), draw)
+    return Drawing("map-overlap", texts("page.overlap"), texts("page.overlap.caption"), figure=draw)
 
 
 def _markers(found: Statement) -> list[Table]:

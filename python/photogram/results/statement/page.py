@@ -180,7 +180,7 @@ def _map(found: Statement) -> Drawing:
         "decimal": texts("number.decimal"),
     }
     draw = partial(differences, found.compared, control, labels)
-    return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), draw)
+    return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), figure=draw)
 
 
 def _features(texts: Texts, features: Features) -> Table:
@@ -227,7 +227,7 @@ def _metrology(found: Statement) -> list[Section]:
         labels |= {"unit": unit, "decimal": texts("number.decimal")}
         draw = partial(drawn_lengths, lengths, labels)
         title, caption = texts("picture.lengths"), texts("picture.lengths.caption")
-        tables.append(Drawing("lengths", title, caption, draw))
+        tables.append(Drawing("lengths", title, caption, figure=draw))
     if found.standards.iso_19157:
         measures = Table.of(
             texts("table.iso"),

@@ -106,3 +106,17 @@ def spread(*values: Floats | float) -> tuple[float, float]:
     # As wide as matplotlib has it: a twentieth on either side.
     room = 0.05 * (high - low) or 0.05 * (abs(low) or 1.0)
     return low - room, high + room
+
+
+def around(places: Floats, part: float = 0.08) -> Floats:
+    """Return (2, 2) limits around (n, 2) places with room on all sides, a part of their larger extent."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    room = part * (float((high - low).max()) or 1.0)
+    return np.array([low - room, high + room])
+
+
+def side_by_side(panels: Sequence[Panel], most: int, side: float, title: str = "") -> Sketch:
+    """Return a picture of panels about as high as wide, `side` inches, so many in a row at most."""
+    columns = min(len(panels), most)
+    height = side * -(-len(panels) // columns) + (0.3 if title else 0.0)
+    return Sketch(max(side * columns, 5.0), height, panels, columns, title=title)

@@ -10,7 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.layout import NUMBER, Placed
 from photogram.show.sketch.letters import width
-from photogram.show.sketch.marks import Contours
+from photogram.show.sketch.marks import Contours, Shades
 from photogram.show.sketch.names import Box, overlap
 from photogram.show.sketch.svg_marks import HALO, element, joined, path, svg, text
 
@@ -35,13 +35,14 @@ def _generator(mark: Contours) -> Any:
 @svg.register(Contours)
 def _contours(mark: Contours, placed: Placed) -> str:
     made, bounds, found = _generator(mark), mark.bounds, []
+    below, beyond = np.nanmin(mark.values) - 1.0, np.nanmax(mark.values) + 1.0
     middles = mark.shades.parts(bounds[:-1]) / 2 + mark.shades.parts(bounds[1:]) / 2
-    colours = rgb(type(mark.shades)(0.0, 1.0, "", mark.shades.map), middles)
+    colours = rgb(Shades(0.0, 1.0, "", mark.shades.map), middles)
     # What is below the first has its colour, too; no seams, for each lies over those before.
-    for low, colour in zip([-np.inf, *bounds[1:-1].tolist()], colours, strict=True):
+    for low, colour in zip([below, *bounds[1:-1].tolist()], colours, strict=True):
         rings = [
             placed.at(ring)
-            for outlines, ends in zip(*made.filled(low, np.inf), strict=True)
+            for outlines, ends in zip(*made.filled(low, beyond), strict=True)
             for ring in np.split(outlines, ends[1:-1])
         ]
         data = "".join(joined(ring, "z") for ring in rings)
