@@ -64,11 +64,12 @@ def bells(every: dict[str, Floats], unit: str) -> Sketch:
 
 def _bell(values: Floats, title: str, unit: str) -> Panel:
     found = histogram(values)
-    edges, none = found.edges, 0 * found.counts
-    bars = boxes(np.column_stack([edges[:-1], none]), np.column_stack([edges[1:], found.counts]))
+    edges, counts = found.edges, np.asarray(found.counts, float)
+    bars = boxes(np.column_stack([edges[:-1], 0 * counts]), np.column_stack([edges[1:], counts]))
     x = np.linspace(edges[0], edges[-1], 200)
     density = np.exp(-0.5 * ((x - found.mean) / found.sd) ** 2) / (found.sd * np.sqrt(2 * np.pi))
     curve = len(values) * (edges[1] - edges[0]) * density
     marks = [Polygons(bars, SKY, 0.6, "white", 1.0, 1.0), Line(np.column_stack([x, curve]), MARKED)]
-    limits = np.column_stack([spread(edges), (0.0, spread(0.0, found.counts, curve)[1])])
+    (left, right), (_, top) = spread(edges), spread(0.0, counts, curve)
+    limits = np.array([[left, 0.0], [right, top]])
     return Panel(limits, marks, f"{title}: sd {found.sd:.3g} {unit}", unit, "number")

@@ -54,7 +54,7 @@ def variance_bars(calibration: Calibration) -> Sketch:
     total = components["total"] ** 2
     names = [name for name in components if name != "total"][::-1]
     values = np.array([components[name] ** 2 for name in names])
-    right, places = 1.25 * (float(values.max()) or 1.0), np.arange(len(names))
+    right, places = 1.25 * (float(values.max()) or 1.0), np.arange(len(names), dtype=float)
     shares = 100 * values / total if total else 0 * values
     every = zip(names, shares.tolist(), strict=True)
     texts = [f"{components[name]:.3f} µm, {share:.0f} %" for name, share in every]

@@ -35,8 +35,8 @@ class Panel:
         Of 0, 1, 2 ... along the axes, in place of numbers.
     turned
         Whether names across are written upwards.
-    bare
-        Whether there are no lines of axes.
+    bare, unnumbered
+        Whether there are no lines of axes; whether these have no numbers.
     log_across, log_up
         Whether equal ratios are equally long along an axis.
     shades
@@ -56,6 +56,7 @@ class Panel:
     up_names: Sequence[str] = ()
     turned: bool = False
     bare: bool = False
+    unnumbered: bool = False
     log_across: bool = False
     log_up: bool = False
     shades: Shades | None = None

@@ -168,6 +168,8 @@ def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float, float]
 
 
 def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
+    if panel.unnumbered:
+        return Ticks(np.empty(0), []), Ticks(np.empty(0), [])
     found = []
     sides = ((panel.across_names, wide, panel.log_across), (panel.up_names, high, panel.log_up))
     for axis, (names, length, log) in enumerate(sides):

@@ -97,11 +97,12 @@ class Level(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Segments(Labelled):
-    """Straight lines between (n, 2, 2) ends."""
+    """Straight lines between (n, 2, 2) ends; `dash` as of a line."""
 
     ends: Floats
     colour: str
     width: float
+    dash: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,6 +119,8 @@ def _panel(axes: Axes, panel: Panel) -> None:
         axes.set_xticks(places, panel.across_names, rotation=90 if panel.turned else 0)
     if panel.up_names:
         axes.set_yticks(range(len(panel.up_names)), panel.up_names)
+    if panel.unnumbered:
+        axes.set(xticks=[], yticks=[])
     if panel.bare:
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)
@@ -226,7 +228,8 @@ def _segments(mark: Segments, axes: Axes) -> None:
 
     lines: Any = list(mark.ends)
     given: dict[str, Any] = {"label": mark.label or None, "zorder": mark.layer}
-    drawn = LineCollection(lines, colors=mark.colour, linewidths=mark.width, **given)
+    look: Any = {"colors": mark.colour, "linewidths": mark.width, "linestyles": mark.dash or "-"}
+    drawn = LineCollection(lines, **look, **given)
     axes.add_collection(drawn, autolim=False)
 
 

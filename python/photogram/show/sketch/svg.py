@@ -67,11 +67,11 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
     if sketch.shades is not None:
         parts.append(_colour_bar(sketch.shades, f"{name}-shades", panels))
         wide = max(wide, max(each.box[2] for each in panels) + GAP + OF_COLOURS)
-    if head := heading(sketch):
+    if said := heading(sketch):
         x = min(each.box[0] for each in panels)
-        lines = "".join(text(x, HEAD_LINE * (k + 0.75), each) for k, each in enumerate(head))
+        lines = "".join(text(x, HEAD_LINE * (k + 0.75), each) for k, each in enumerate(said))
         parts.append(element("g", {"fill": INK, "font_size": HEAD}, lines))
-        wide = max(wide, x + widest(head, HEAD))
+        wide = max(wide, x + widest(said, HEAD))
     look: Attributes = {"font_family": LETTERS, "font_size": NUMBER, "fill": "none"}
     size = f'viewBox="0 0 {wide + 2:.0f} {high + 2:.0f}" width="{96 / 72 * (wide + 2):.0f}"'
     head = element("svg", {"role": "img", "aria_label": title}).removesuffix("/>")

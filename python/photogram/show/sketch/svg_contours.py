@@ -35,7 +35,7 @@ def _generator(mark: Contours) -> Any:
 @svg.register(Contours)
 def _contours(mark: Contours, placed: Placed) -> str:
     made, bounds, found = _generator(mark), mark.bounds, []
-    below, beyond = np.nanmin(mark.values) - 1.0, np.nanmax(mark.values) + 1.0
+    below, beyond = np.nanmin(mark.values) - 1.0, max(np.nanmax(mark.values), bounds[-1]) + 1.0
     middles = mark.shades.parts(bounds[:-1]) / 2 + mark.shades.parts(bounds[1:]) / 2
     colours = rgb(Shades(0.0, 1.0, "", mark.shades.map), middles)
     # What is below the first has its colour, too; no seams, for each lies over those before.

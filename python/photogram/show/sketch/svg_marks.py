@@ -163,7 +163,7 @@ def _level(mark: Level, placed: Placed) -> str:
 @svg.register(Segments)
 def _segments(mark: Segments, placed: Placed) -> str:
     data = "".join(joined(ends) for ends in placed.at(mark.ends))
-    return path(data, **_stroke(mark.colour, mark.width))
+    return path(data, **_stroke(mark.colour, mark.width, mark.dash))
 
 
 @svg.register(Arrows)
