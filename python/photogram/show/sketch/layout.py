@@ -164,7 +164,7 @@ def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float, float]
     right = GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
     if panel.legend == "beside":
         right = GAP + legend_size(labelled(panel))[0] + GAP
-    return numbers, named, max(right, OF_COLOURS + GAP) if panel.shades else right
+    return numbers, named, right + OF_COLOURS if panel.shades else right
 
 
 def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
@@ -231,6 +231,11 @@ def _inside(curves: list[Floats], box: Box) -> int:
     return sum(int(((each > [x, y]) & (each < [x + wide, y + high])).all(axis=1).sum()) for each in curves)
 
 
+def right_side(placed: Placed) -> float:
+    """Return the right side of a panel, or of the legend beside it."""
+    return legend_box(placed)[2] if placed.panel.legend == "beside" else placed.box[2]
+
+
 def right_end(placed: Placed) -> float:
     """Return how far to the right anything of a panel reaches."""
     left, _, right, _ = placed.box
@@ -238,10 +243,7 @@ def right_end(placed: Placed) -> float:
     ends = [right + 0.5 * widest(placed.across.texts[-1:], NUMBER), left + widest(placed.title, TITLE)]
     ends.append(left + widest(placed.notes, NOTE))
     ends.append(0.5 * (left + right + width(named_axis(panel.across, placed.across.power), LABEL)))
-    if panel.legend == "beside":
-        ends.append(legend_box(placed)[2])
-    if panel.shades:
-        ends.append(right + GAP + OF_COLOURS)
+    ends.append(right_side(placed) + (GAP + OF_COLOURS if panel.shades else 0.0))
     scale = (right - left) / abs(panel.limits[1, 0] - panel.limits[0, 0])
     ends += [left + scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars]
     return max(ends)

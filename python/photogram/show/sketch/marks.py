@@ -60,7 +60,7 @@ class Markers(Labelled):
     edge
         Width of the outline.
     values, shades
-        (n,) values whose colours the markers have, the smallest on top.
+        (n,) values whose colours the markers have, the smallest on top, or the largest where `rising`.
     """
 
     places: Floats
@@ -72,6 +72,7 @@ class Markers(Labelled):
     opacity: float = 1.0
     values: Floats | None = None
     shades: Shades | None = None
+    rising: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -189,7 +189,8 @@ def _markers(mark: Markers, axes: Axes) -> None:
         "rasterized": len(mark.places) > DOTS,
     }
     if mark.values is not None and mark.shades is not None:
-        order, shades = np.argsort(-mark.values, kind="stable"), mark.shades
+        sign, shades = (1.0 if mark.rising else -1.0), mark.shades
+        order = np.argsort(sign * mark.values, kind="stable")
         given |= {"c": mark.values[order], "cmap": _map(shades), "norm": _norm(shades)}
         x, y = mark.places[order].T
         axes.scatter(x, y, mark.size**2, linewidths=0, **given)

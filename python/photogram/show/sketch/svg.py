@@ -33,6 +33,7 @@ from photogram.show.sketch.layout import (
     low_end,
     named_axis,
     right_end,
+    right_side,
 )
 from photogram.show.sketch.letters import widest, width
 from photogram.show.sketch.marks import Labelled, Shades
@@ -66,7 +67,7 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
     wide, high = max(map(right_end, panels)), max(map(low_end, panels))
     if sketch.shades is not None:
         parts.append(_colour_bar(sketch.shades, f"{name}-shades", panels))
-        wide = max(wide, max(each.box[2] for each in panels) + GAP + OF_COLOURS)
+        wide = max(wide, max(map(right_side, panels)) + GAP + OF_COLOURS)
     if said := heading(sketch):
         x = min(each.box[0] for each in panels)
         lines = "".join(text(x, HEAD_LINE * (k + 0.75), each) for k, each in enumerate(said))
@@ -192,7 +193,7 @@ def _entry(mark: Labelled, x: float, y: float) -> str:
 def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
     """Return a bar of colours with numbers beside it, at the right of panels."""
     top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
-    left = max(each.box[2] for each in beside) + GAP
+    left = max(map(right_side, beside)) + GAP
     right = left + 9.0
     places, colours = stops(shades.map)
     steps = (

@@ -99,11 +99,10 @@ def _markers(mark: Markers, placed: Placed) -> str:
     at = placed.at(mark.places[inside])
     if mark.values is None or mark.shades is None:
         return _signs(mark, at, mark.colour)
-    # By colours, the smallest on top.
     shades, values = mark.shades, mark.values[inside]
     levels = np.round((LEVELS - 1) * np.clip(shades.parts(values), 0.0, 1.0))
     found = []
-    for level in np.unique(levels[np.isfinite(levels)])[::-1].tolist():
+    for level in np.unique(levels[np.isfinite(levels)])[:: 1 if mark.rising else -1].tolist():
         colour = rgb(Shades(0.0, LEVELS - 1.0, "", shades.map), np.array(level))
         found.append(_signs(mark, at[levels == level], hexadecimal(colour)))
     return "".join(found)
