@@ -68,9 +68,9 @@ def residuals_sketch(result: Orientation) -> Sketch:
         f"Y, {unit}",
         equal=True,
         bars=[(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else [],
-        legend="beside",
+        legend="below",
     )
-    return Sketch(8.0, high + 1.4, [panel])
+    return Sketch(6.5, high + 1.8, [panel])
 
 
 def _stations(result: Orientation, rows: NDArray[np.intp], plan: Floats) -> list[Mark]:

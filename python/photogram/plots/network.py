@@ -24,6 +24,7 @@ from photogram.show.sketch.marks import (
     Polygons,
     Segments,
     Shades,
+    ellipse_axes,
 )
 from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
@@ -240,33 +241,32 @@ def _ellipses(
     covariances = drawn.covariances(rows)[:, pair][:, :, pair]
     good = np.isfinite(covariances).all(axis=(1, 2))
     rows, covariances = rows[good], covariances[good]
-    variances, turns = np.linalg.eigh(covariances)
-    axes_of = np.sqrt(np.maximum(variances, 0.0)) * np.sqrt(-2.0 * np.log(1.0 - CONFIDENCE))
-    if not len(rows) or not axes_of[:, 1].any():
+    axes_of, angles = ellipse_axes(covariances)
+    axes_of *= np.sqrt(-2.0 * np.log(1.0 - CONFIDENCE))
+    if not len(rows) or not axes_of[:, 0].any():
         return []
     extent = float((limits[1] - limits[0]).max())
     if len(rows) > ELLIPSES:
-        chosen = _of_cells(plan.points[rows][:, pair], axes_of[:, 1], extent / 12.0)
+        chosen = _of_cells(plan.points[rows][:, pair], axes_of[:, 0], extent / 12.0)
         said.append(f"error ellipses: of {len(rows):,} points, the median one of each of {len(chosen)} cells")
     else:
         chosen = np.arange(len(rows))
-    sizes = axes_of[chosen, 1]
+    sizes = axes_of[chosen, 0]
     typical = float(np.median(sizes[sizes > 0])) if (sizes > 0).any() else 0.0
     if typical == 0:
         return []
     # The semi-axis of a typical ellipse is a fifth of the distance to its neighbour.
     spacing = extent / np.sqrt(max(len(chosen), 9))
     scale = round_length(0.22 * spacing / typical)
-    shown = chosen[scale * axes_of[chosen, 1] < 0.2 * extent]
+    shown = chosen[scale * axes_of[chosen, 0] < 0.2 * extent]
     if len(shown) < len(chosen):
         said.append(f"{len(chosen) - len(shown)} ellipses are too large to be drawn at this scale")
-    angles = np.degrees(np.arctan2(turns[shown, 1, 1], turns[shown, 0, 1]))
-    semi_axes = scale * axes_of[shown][:, ::-1]
-    marks.append(Ellipses(plan.points[rows[shown]][:, pair], semi_axes, angles, BLUE, 0.8, layer=4.0))
-    worst = int(np.argmax(axes_of[:, 1]))
+    places = plan.points[rows[shown]][:, pair]
+    marks.append(Ellipses(places, scale * axes_of[shown], angles[shown], BLUE, 0.8, layer=4.0))
+    worst = int(np.argmax(axes_of[:, 0]))
     unit = f" {plan.unit}" if plan.unit else ""
     said.append(
-        f"largest semi-axis of an ellipse: {axes_of[worst, 1]:.3g}{unit}, point {plan.point_ids[rows[worst]]}"
+        f"largest semi-axis of an ellipse: {axes_of[worst, 0]:.3g}{unit}, point {plan.point_ids[rows[worst]]}"
     )
     bar = round_length(0.12 * extent / scale)
     return [

@@ -17,7 +17,7 @@ from photogram.results.result import Result
 from photogram.show.axes import Where
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, Sketch, around
-from photogram.show.sketch.marks import Arrows, Ellipses
+from photogram.show.sketch.marks import Arrows, Ellipses, ellipse_axes
 from photogram.show.style import BLUE, INK
 
 if TYPE_CHECKING:
@@ -90,9 +90,7 @@ def _lens_field(camera: AdjustedCamera, field: LensField) -> Sketch:
     spacing = float(np.ptp(field.positions[:, 0])) / 8
     scale = round_length(longest) / spacing if longest > 0 else 1.0
     ends = field.positions + field.vectors / scale
-    variances, turns = np.linalg.eigh(field.covariances / scale**2)
-    semi_axes = np.sqrt(np.maximum(variances, 0.0))
-    angles = np.degrees(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
+    semi_axes, angles = ellipse_axes(field.covariances / scale**2)
     marks = [
         Ellipses(ends, semi_axes, angles, BLUE, 0.0, 0.4, layer=1.0),
         Arrows(field.positions, field.vectors / scale, INK, 0.003),

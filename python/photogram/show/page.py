@@ -159,25 +159,20 @@ class Drawing:
         A word for switching, and what is to be seen.
     sketch
         Declares the picture; None where there is nothing to draw.
-    figure
-        Makes a figure of matplotlib, in place of what is no sketch.
     """
 
     name: str
     title: str
     caption: str
-    sketch: Callable[[], Sketch | None] | None = None
-    figure: Callable[[], Figure | None] | None = None
+    sketch: Callable[[], Sketch | None]
     kind: str = field(default="drawing", init=False)
 
     def draw(self) -> Figure | None:
         """Return the picture as a figure of matplotlib; None where there is nothing to draw."""
-        if self.figure is not None:
-            return self.figure()
         from photogram.show.sketch.on_axes import figure
 
-        sketch = self.sketch() if self.sketch is not None else None
-        return figure(sketch) if sketch is not None else None
+        sketch = self.sketch()
+        return None if sketch is None else figure(sketch)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ class Panel:
     bars
         Scales of what is enlarged, above, under the title.
     legend
-        Where: `beside`, `above`, `upper right`, `lower right`, `best` (the emptiest corner), or nowhere.
+        Where: `beside`, `above`, `below`, a corner (`upper right` ...), `best` (the emptiest), or nowhere.
     across_names, up_names
         Of 0, 1, 2 ... along the axes, in place of numbers.
     turned
@@ -41,6 +41,8 @@ class Panel:
         Whether equal ratios are equally long along an axis.
     shades
         What a bar of colours beside the panel shows.
+    decimal
+        Sign of the numbers along the axes, in the language of the picture.
     """
 
     limits: Floats
@@ -60,6 +62,7 @@ class Panel:
     log_across: bool = False
     log_up: bool = False
     shades: Shades | None = None
+    decimal: str = "."
 
     def even(self, places: Floats) -> Floats:
         """Return (..., 2) places as they are spaced: their logarithms along axes that have these."""

@@ -148,7 +148,13 @@ def above(panel: Panel, title: list[str]) -> float:
 
 
 def below(panel: Panel, numbered: bool) -> float:
-    """Return how high what stands below a box is, down to its notes: numbers and the name of the axis."""
+    """Return how high what stands below a box is, down to its notes: axis and legend."""
+    legend = LEGEND_LINE * len(labelled(panel)) + GAP / 2 if panel.legend == "below" else 0.0
+    return below_axis(panel, numbered) + legend
+
+
+def below_axis(panel: Panel, numbered: bool) -> float:
+    """Return how high numbers and the name of the axis below a box are."""
     numbers = 0.0
     if numbered:
         turned = widest(panel.across_names, NUMBER) if panel.turned else 0.0
@@ -176,7 +182,8 @@ def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
         if names:
             found.append(Ticks(np.arange(len(names), dtype=float), list(names)))
         else:
-            found.append(ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log))
+            own = ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log)
+            found.append(own.signed(panel.decimal))
     return found[0], found[1]
 
 
@@ -200,11 +207,12 @@ def legend_box(placed: Placed) -> Box:
         "lower left": (left + inner, low - high - inner),
         "lower right": (right - wide - inner, low - high - inner),
         "beside": (right + GAP, top),
+        "below": (left, low + below_axis(placed.panel, placed.numbered)),
     }
     where = placed.panel.legend
     if where == "best":
         curves = [placed.at(each) for each in _curves(placed.panel)]
-        del corners["beside"]
+        del corners["beside"], corners["below"]
         where = min(corners, key=lambda name: _inside(curves, (*corners[name], wide, high)))
     x, y = corners[where]
     return x, y, x + wide, y + high
@@ -242,6 +250,7 @@ def right_end(placed: Placed) -> float:
     panel = placed.panel
     ends = [right + 0.5 * widest(placed.across.texts[-1:], NUMBER), left + widest(placed.title, TITLE)]
     ends.append(left + widest(placed.notes, NOTE))
+    ends.append(left + legend_size(labelled(panel))[0] if panel.legend == "below" else 0.0)
     ends.append(0.5 * (left + right + width(named_axis(panel.across, placed.across.power), LABEL)))
     ends.append(right_side(placed) + (GAP + OF_COLOURS if panel.shades else 0.0))
     scale = (right - left) / abs(panel.limits[1, 0] - panel.limits[0, 0])

@@ -238,6 +238,13 @@ def boxes(low: Floats, high: Floats) -> Floats:
     return np.stack(corners, axis=1)
 
 
+def ellipse_axes(covariances: Floats) -> tuple[Floats, Floats]:
+    """Return (n, 2) semi-axes and (n,) degrees of the standard ellipses of (n, 2, 2) covariances."""
+    variances, turns = np.linalg.eigh(covariances)
+    angles = np.degrees(np.arctan2(turns[:, 1, 1], turns[:, 0, 1]))
+    return np.sqrt(np.maximum(variances[:, ::-1], 0.0)), angles
+
+
 def error_bars(places: Floats, low: Floats, high: Floats) -> Floats:
     """Return (n, 2, 2) upright ends of bars through (n, 2) places, from (n,) values to (n,) others."""
     return np.stack([np.column_stack([places[:, 0], each]) for each in (low, high)], axis=1)

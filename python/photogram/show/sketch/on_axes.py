@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.axes import Where, figure_of, handed_out, labels, note, panels, scale_bars
+from photogram.show.axes import Where, figure_of, handed_out, labels, note, panels, scale_bars, whole_figure
+from photogram.show.pictures import decimal_sign
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.marks import (
     Arrows,
@@ -38,6 +39,7 @@ DOTS = 500
 """Marks beyond which vectors become dots: files are smaller, and nothing is lost that could be seen."""
 LEGENDS: dict[str, dict[str, Any]] = {
     "beside": {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0},
+    "below": {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "borderaxespad": 4.5},
     "above": {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)},
     "lower right": {"loc": "lower right", "frameon": True, "framealpha": 1.0, "edgecolor": "white"},
 }
@@ -132,6 +134,8 @@ def _panel(axes: Axes, panel: Panel) -> None:
     note(axes, panel.notes)
     if panel.shades is not None:
         _colour_bar([axes], panel.shades)
+    if panel.decimal != ".":
+        decimal_sign(whole_figure(axes), panel.decimal)
 
 
 def _ratios(axis: Any) -> None:
@@ -193,7 +197,7 @@ def _markers(mark: Markers, axes: Axes) -> None:
         order = np.argsort(sign * mark.values, kind="stable")
         given |= {"c": mark.values[order], "cmap": _map(shades), "norm": _norm(shades)}
         x, y = mark.places[order].T
-        axes.scatter(x, y, mark.size**2, linewidths=0, **given)
+        axes.scatter(x, y, mark.size**2, marker=mark.shape, linewidths=0, **given)
     elif mark.shape == "o" and not mark.face:
         x, y = mark.places.T
         axes.scatter(x, y, mark.size**2, color=mark.colour, linewidths=0, **given)

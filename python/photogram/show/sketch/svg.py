@@ -26,6 +26,7 @@ from photogram.show.sketch.layout import (
     Placed,
     above,
     below,
+    below_axis,
     heading,
     labelled,
     laid_out,
@@ -114,7 +115,7 @@ def _axes(placed: Placed) -> str:
     found.append(element("g", {"text_anchor": "end"}, "".join(numbers)))
     middle: Attributes = {"text_anchor": "middle", "font_size": LABEL}
     if panel.across:
-        down = low + below(panel, placed.numbered) - 5.0
+        down = low + below_axis(panel, placed.numbered) - 5.0
         found.append(
             text(0.5 * (left + right), down, named_axis(panel.across, placed.across.power), **middle)
         )
@@ -175,7 +176,7 @@ def _legend(placed: Placed) -> tuple[str, list[Box]]:
     ground: Attributes = {"x": box[0], "y": box[1], "width": box[2] - box[0], "height": box[3] - box[1]}
     behind = (
         element("rect", {**ground, "fill": "white", "opacity": 0.85})
-        if placed.panel.legend != "beside"
+        if placed.panel.legend not in ("beside", "below")
         else ""
     )
     return behind + "".join(entries), [box]
@@ -205,7 +206,7 @@ def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
     ground: Attributes = {"x": left, "y": top, "width": right - left, "height": low - top}
     found.append(element("rect", {**ground, "fill": f"url(#{name})"}))
     ends = np.array([shades.low, shades.high])
-    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log)
+    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log).signed(beside[0].panel.decimal)
     heights = low - shades.parts(given.values) * (low - top)
     for y, said in zip(heights.tolist(), given.texts, strict=True):
         found.append(path(f"M{number(right)} {number(y)}h{TICK}", stroke=FAINT, stroke_width=0.8))

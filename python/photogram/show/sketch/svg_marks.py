@@ -114,8 +114,7 @@ def _signs(mark: Markers, at: Floats, colour: str) -> str:
     if mark.shape in "o." and not mark.face:
         # Half of the size and an outline: what matplotlib makes of a `.`.
         across = size if mark.shape == "o" else 0.5 * size + mark.edge
-        # As a style: figures of matplotlib on the same page have a rule for the ends of all lines.
-        look: Attributes = {"stroke": colour, "stroke_width": across, "style": "stroke-linecap:round"}
+        look: Attributes = {"stroke": colour, "stroke_width": across, "stroke_linecap": "round"}
         return path(_each(at, "h0"), **look, opacity=opacity)
     if mark.shape == "+":
         data = _each(at - [0.5 * size, 0.0], f"h{number(size)}m-{half}-{half}v{number(size)}")

@@ -23,6 +23,10 @@ class Ticks:
     texts: list[str]
     power: str = ""
 
+    def signed(self, decimal: str) -> Ticks:
+        """Return the same with the decimal sign of a language."""
+        return Ticks(self.values, [text.replace(".", decimal) for text in self.texts], self.power)
+
 
 def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool = False) -> Ticks:
     """Return the ticks of an axis.
