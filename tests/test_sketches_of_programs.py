@@ -19,7 +19,7 @@ COMMANDS = {
     "orientation": "absolute-orientation --example",
     "plan": "plan --strips 2 --photos-per-strip 4",
     "board": "calibrate --example",
-    "components": "adjust --example --components",
+    "components": "giant --example --components kind",
 }
 
 

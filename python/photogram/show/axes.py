@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.show.pictures import new_figure
 from photogram.show.sketch.marks import NOWHERE
 from photogram.show.sketch.names import Box, free_side
 from photogram.show.style import FAINT, INK, styled
@@ -80,13 +79,6 @@ def handed_out(axes: list[Axes]) -> Any:
     found = np.empty(len(axes), dtype=object)
     found[:] = axes
     return found
-
-
-def figure_of(draw: Callable[[Where], object]) -> Figure:
-    """Return what is drawn as a figure that belongs to no window; `draw` takes what :func:`panels` takes."""
-    figure = new_figure(1.0, 1.0)
-    draw(figure)
-    return figure
 
 
 def note(axes: Axes, lines: Sequence[str]) -> None:

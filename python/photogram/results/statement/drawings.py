@@ -98,10 +98,11 @@ def lengths(found: Lengths, labels: dict[str, str]) -> Sketch:
         Markers(places, "o", 3.0, BLUE),
         Level(0.0, SOFT, 0.6),
     ]
-    for sign in () if test.limits is None else (1.0, -1.0):
-        ends.append(sign * test.limits)
-        line = np.column_stack([found.calibrated, ends[-1]])[order]
-        marks.append(Line(line, VERMILION, 0.9, "--"))
+    if test.limits is not None:
+        for limit in (test.limits, -test.limits):
+            ends.append(limit)
+            line = np.column_stack([found.calibrated, limit])[order]
+            marks.append(Line(line, VERMILION, 0.9, "--"))
     limits = np.column_stack([spread(found.calibrated), spread(0.0, *ends)])
     across, up = (f"{labels[name]}, {labels['unit']}" for name in ("length", "error"))
     return Sketch(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=labels["decimal"])])

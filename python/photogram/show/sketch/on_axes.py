@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial, singledispatch
+from functools import singledispatch
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.axes import Where, figure_of, handed_out, labels, note, panels, scale_bars, whole_figure
-from photogram.show.pictures import decimal_sign
+from photogram.show.axes import Where, handed_out, labels, note, panels, scale_bars, whole_figure
+from photogram.show.pictures import decimal_sign, new_figure
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.marks import (
     Arrows,
@@ -52,7 +52,9 @@ ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 def figure(sketch: Sketch) -> Figure:
     """Return a picture as a figure that belongs to no window."""
-    return figure_of(partial(on_axes, sketch))
+    found = new_figure(sketch.width, sketch.height)
+    on_axes(sketch, found)
+    return found
 
 
 def on_axes(sketch: Sketch, ax: Where) -> Any:
