@@ -189,7 +189,7 @@ def labels(
     figure = whole_figure(axes)
     # Where legends and scales of equal axes go is known only when the layout was made twice.
     for _ in range(2):
-        _lay_out(figure)
+        lay_out(figure)
     room: Box = axes.get_window_extent().extents
     point = figure.dpi / 72.0
     own_boxes = (each.get_window_extent() for each in axes.texts if isinstance(each, Annotation))
@@ -216,7 +216,7 @@ def labels(
     return left_out
 
 
-def _lay_out(figure: Figure) -> None:
+def lay_out(figure: Figure) -> None:
     """Put axes and legends of a figure where they will be drawn."""
     engine = figure.get_layout_engine()
     if engine is None:

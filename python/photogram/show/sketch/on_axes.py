@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.axes import Where, handed_out, labels, note, panels, scale_bars, whole_figure
+from photogram.show.axes import Where, handed_out, labels, lay_out, note, panels, scale_bars, whole_figure
 from photogram.show.pictures import decimal_sign, new_figure
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.marks import (
@@ -54,6 +54,8 @@ def figure(sketch: Sketch) -> Figure:
     """Return a picture as a figure that belongs to no window."""
     found = new_figure(sketch.width, sketch.height)
     on_axes(sketch, found)
+    # Where panels of equal scales go is known only when their limits are.
+    lay_out(found)
     return found
 
 
@@ -316,7 +318,8 @@ def _contours(mark: Contours, axes: Axes) -> None:
     look: dict[str, Any] = {"cmap": _map(mark.shades), "norm": _norm(mark.shades), "zorder": mark.layer}
     filled = axes.contourf(mark.across, mark.up, values, mark.bounds, extend="min", **look)
     filled.set_edgecolor("face")  # no seams between colours
-    lines = axes.contour(mark.across, mark.up, values, mark.levels, colors=mark.colour, linewidths=mark.width)
+    look = {"colors": mark.colour, "linewidths": mark.width, "linestyles": "solid"}
+    lines = axes.contour(mark.across, mark.up, values, mark.levels, **look)
     written = axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0, inline=False)
     for text in _apart(axes, written):
         text.set_color(INK)
