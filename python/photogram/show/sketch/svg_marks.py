@@ -111,7 +111,7 @@ def _markers(mark: Markers, placed: Placed) -> str:
 def _signs(mark: Markers, at: Floats, colour: str) -> str:
     size, half = mark.size, number(0.5 * mark.size)
     opacity: str | float = mark.opacity if mark.opacity < 1 else ""
-    if mark.shape in "o." and not mark.face:
+    if mark.shape == "." or (mark.shape == "o" and not mark.face):
         # Half of the size and an outline: what matplotlib makes of a `.`.
         across = size if mark.shape == "o" else 0.5 * size + mark.edge
         look: Attributes = {"stroke": colour, "stroke_width": across, "stroke_linecap": "round"}
