@@ -7,14 +7,17 @@ The network is that of examples/free_network.py, adjusted once.
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from views import svg
 
-from photogram.show.pictures import ellipses, new_figure, round_length
+from photogram.arguments.types import Floats
+from photogram.show.pictures import new_figure, round_length
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 from free_network import in_three_datums
@@ -27,6 +30,18 @@ TITLES = (
 )
 WIDEST = 0.42
 """Of the largest semi-axis as it is drawn, metres of the plan."""
+
+
+def ellipses(axes: Axes, places: Floats, covariances: Floats, scale: float = 1.0, **style: object) -> None:
+    """Draw standard ellipses (39 percent) of (n, 2, 2) covariances about (n, 2) places, magnified."""
+    around = np.linspace(0.0, math.tau, 73)
+    circle = np.stack([np.cos(around), np.sin(around)])
+    variances, turned = np.linalg.eigh(covariances)
+    for place, variance, turn in zip(places, variances, turned, strict=True):
+        outline = place[:, np.newaxis] + scale * turn @ (
+            np.sqrt(np.maximum(variance, 0.0))[:, np.newaxis] * circle
+        )
+        axes.plot(*outline, **style)
 
 
 def draw() -> Figure:

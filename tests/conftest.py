@@ -11,9 +11,6 @@ from typer.testing import CliRunner
 import browser as browsers
 from photogram import Block, simulate
 from photogram.cli import app
-from photogram.show.html import inlined
-from photogram.show.page import Picture
-from photogram.show.style import styled
 from shared_data import SHARED
 
 STRASBOURG = SHARED / "strasbourg"
@@ -57,23 +54,6 @@ def run(monkeypatch, tmp_path):
     monkeypatch.setenv("NO_COLOR", "1")
     runner = CliRunner()
     return lambda *arguments: runner.invoke(app, [str(argument) for argument in arguments])
-
-
-@pytest.fixture
-def sketched(monkeypatch):
-    """Draw figures of reports, but leave out what matplotlib writes of them: half of a command's time.
-
-    For tests of what commands read, print and end with; in tests/reports all pages have their pictures.
-    """
-
-    def sketch(drawing):
-        if drawing.sketch is not None:
-            return inlined(drawing)
-        with styled():
-            figure = drawing.draw()
-        return figure and Picture(drawing.name, drawing.title, drawing.caption, "<svg></svg>")
-
-    monkeypatch.setattr("photogram.show.html.inlined", sketch)
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,6 @@ from photogram.results.check_points import check_points
 from photogram.show.methods import page_of
 from photogram.statistics.agreement import agreement
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 @cache
 def block(**options):

@@ -20,7 +20,6 @@ from photogram.cli.simulation_options import MotionOptions
 from photogram.giant import read_project
 from photogram.network.simulation import simulate as simulate_function
 
-pytestmark = pytest.mark.usefixtures("sketched")
 STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg" / "giant"
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
 OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.html", "report.txt"}

@@ -39,9 +39,9 @@ def see(result, document=True):
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
     """Leave the pictures out that pages draw at once: they have no sentences."""
-    monkeypatch.setattr("photogram.comparator.pictures.book.figures", lambda _: [])
-    monkeypatch.setattr("photogram.stellar.page.figures", lambda _: {})
-    monkeypatch.setattr("photogram.stellar.night_page.figures", lambda _: {})
+    monkeypatch.setattr("photogram.comparator.pictures.book.sketches", lambda _: {})
+    monkeypatch.setattr("photogram.stellar.page.sketches", lambda _: {})
+    monkeypatch.setattr("photogram.stellar.night_page.sketches", lambda _: {})
 
 
 @pytest.fixture(scope="module")

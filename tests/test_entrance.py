@@ -12,7 +12,6 @@ from files.test_guards import COMMANDS, RUNS
 from photogram.cli.commands import app
 from photogram.cli.job import Writes, roles
 
-pytestmark = pytest.mark.usefixtures("sketched")
 PACKAGE = str(files("photogram").joinpath("examples"))
 ELSE = {"plan": ["--strips", "2", "--photos-per-strip", "4"], "new": ["made"], "simulate": ["made"]} | {
     "convert-lens": ["camera.cameramodel", "--to", "opencv5"],

@@ -10,7 +10,6 @@ from photogram import InputError
 from photogram.cli import app
 from photogram.io.writing import check_outputs
 
-pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLES = Path(str(files("photogram") / "examples"))
 
 

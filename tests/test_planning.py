@@ -466,7 +466,7 @@ def test_the_picture_has_a_panel_for_each_pattern(two_patterns):
     for axes, pattern in zip(panels, two_patterns.patterns, strict=True):
         assert len(axes.collections[0].get_offsets()) == pattern.new_points.sum()
     assert bar.get_ylabel() == "expected standard deviation in height, m"
-    assert [text.get_text() for text in figure.legends[0].texts] == [
+    assert [text.get_text() for text in panels[1].get_legend().texts] == [
         "photo",
         "full control",
         "height control",

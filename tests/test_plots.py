@@ -16,8 +16,8 @@ from photogram.errors import InputError
 from photogram.giant import read_project
 from photogram.plots import PICTURES, figures, picture_files
 from photogram.plots.cells import cells
-from photogram.plots.panels import labels
 from photogram.plots.picture_data import pictured
+from photogram.show.axes import labels
 from photogram.show.pictures import drawn
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}

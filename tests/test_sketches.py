@@ -3,10 +3,7 @@
 import base64
 import io
 import re
-import subprocess
-import sys
 from importlib.resources import files
-from itertools import combinations
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,17 +12,18 @@ import pytest
 from example_scripts import load
 from photogram import adjust, collection, formats, simulate
 from photogram.giant import read_project
+from photogram.lazy_dataclasses import fields
 from photogram.plots import PICTURES, figures
 from photogram.plots.accessor import sketch_of
 from photogram.show.sketch.colours import rgb
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import laid_out
 from photogram.show.sketch.letters import width, wrapped
-from photogram.show.sketch.marks import Ellipses, Markers, Mesh, Shades
-from photogram.show.sketch.names import overlap
+from photogram.show.sketch.marks import Contours, Ellipses, Level, Markers, Mesh, Names, Shades, Texts
 from photogram.show.sketch.svg import svg_of
 from photogram.show.sketch.svg_marks import svg
 from photogram.show.sketch.ticks import ticks
+from svg_words import assert_readable, boxes, elements
 
 EXAMPLES = files("photogram") / "examples"
 
@@ -53,31 +51,6 @@ def sketches(request):
     return {name: found for name in PICTURES if (found := sketch_of(result, name)) is not None}
 
 
-def elements(sketch):
-    """Return the parts of a picture as they are read of its file."""
-    root = ElementTree.fromstring(svg_of(sketch, "name", "a <title>"))
-    assert root.get("aria-label") == "a <title>"
-    return root, list(root.iter())
-
-
-def boxes(root):
-    """Return the words of a picture that stand upright, and the boxes of these."""
-    found = []
-
-    def walk(node, size, anchor):
-        size, anchor = float(node.get("font-size", size)), node.get("text-anchor", anchor)
-        if node.tag.endswith("text") and "transform" not in node.attrib:
-            wide = width(node.text, size)
-            left = float(node.get("x")) - {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * wide
-            low = float(node.get("y"))
-            found.append((node.text, (left, low - 0.7 * size, left + wide, low)))
-        for child in node:
-            walk(child, size, anchor)
-
-    walk(root, 8.0, "start")
-    return found
-
-
 def test_pictures_are_whole_and_their_identifiers_begin_with_their_names(sketches):
     for sketch in sketches.values():
         _, every = elements(sketch)
@@ -90,16 +63,7 @@ def test_pictures_are_whole_and_their_identifiers_begin_with_their_names(sketche
 
 def test_no_word_lies_over_another_or_is_cut(sketches):
     for name, sketch in sketches.items():
-        root, _ = elements(sketch)
-        *_, wide, high = map(float, root.get("viewBox").split())
-        words = boxes(root)
-        assert len(words) > 10
-        for said, (left, top, right, low) in words:
-            assert min(left, top) >= 0, (name, said)
-            assert right <= wide, (name, said)
-            assert low <= high, (name, said)
-        over = [(a, b) for (a, one), (b, other) in combinations(words, 2) if overlap(one, other)]
-        assert over == [], name
+        assert len(assert_readable(sketch, name)) > 10
 
 
 def test_numbers_along_axes_lie_within_their_limits(sketches):
@@ -135,12 +99,13 @@ def placed_on(limits, marks=(), **more):
     return found
 
 
-@pytest.mark.parametrize("shape", ["o", ".", "+", "^", "s", "D"])
+@pytest.mark.parametrize("shape", ["o", ".", "+", "^", "s", "D", "*"])
+@pytest.mark.parametrize("face", ["", "white"])
 @pytest.mark.parametrize("limits", [[[0.0, 0.0], [10.0, 5.0]], [[0.0, 5.0], [10.0, 0.0]]])
-def test_markers_lie_where_their_places_are_and_none_beyond_the_panel(shape, limits):
+def test_markers_lie_where_their_places_are_and_none_beyond_the_panel(shape, face, limits):
     places = np.random.default_rng(1).uniform([-5.0, -5.0], [15.0, 10.0], (200, 2))
     placed = placed_on(limits, equal=True)
-    drawn = re.findall(r"M([-\d.]+) ([-\d.]+)", svg(Markers(places, shape, 4.0), placed))
+    drawn = re.findall(r"M([-\d.]+) ([-\d.]+)", svg(Markers(places, shape, 4.0, face=face), placed))
     inside = ((places >= 0) & (places <= [10.0, 5.0])).all(axis=1)
     assert len(drawn) == inside.sum()
     left, top, right, low = placed.box
@@ -257,21 +222,40 @@ def test_a_picture_without_panels_is_nothing():
     assert svg_of(Sketch(5.0, 4.0, [None]), "name", "") == ""
 
 
-def test_a_command_with_its_page_loads_no_matplotlib(tmp_path):
-    code = (
-        "import sys; from photogram.cli import app\n"
-        "try: app(['adjust', '--example', '--self-calibrate', 'f,k1', '--out', 'o', '--quiet'])\n"
-        "except SystemExit as end: assert end.code == 0, end.code\n"
-        "assert 'jinja2' in sys.modules and 'matplotlib' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
-    page = (tmp_path / "o" / "report.html").read_text(encoding="utf-8")
-    titles = ["Plan of the network", "Image residuals", "Test values", "Correlations", "Radial distortion"]
-    labels = re.findall(r'<svg role="img" aria-label="([^"]+)"', page)
-    assert all(any(label.startswith(title) for label in labels) for title in titles)
+def test_contours_have_the_colours_between_their_levels_and_say_these():
+    x, y = np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 21)
+    values = np.where(x < 0.5, np.nan, np.repeat(10.0 ** x[np.newaxis], 21, axis=0))
+    shades = Shades(1.0, 100.0, "", log=True)
+    mark = Contours(x, y, values, np.array([1.0, 10.0, 100.0]), shades, steps=2)
+    assert mark.bounds == pytest.approx(10.0 ** np.array([0.0, 0.5, 1.0, 1.5, 2.0]))
+    placed = placed_on([[0.0, 0.0], [2.0, 1.0]], [mark])
+    drawn = svg(mark, placed)
+    colours = re.findall(r'fill="(#\w+)"', drawn)
+    middles = rgb(shades, 10.0 ** np.array([0.25, 0.75, 1.25, 1.75]))
+    assert colours == ["#{:02x}{:02x}{:02x}".format(*each) for each in middles.tolist()]
+    left = [float(each) for each in re.findall(r"[ M]([\d.]+) [\d.]+", drawn)]
+    assert min(left) == pytest.approx(placed.at(np.array([0.5, 0.0]))[0], abs=0.01)
+    root, _ = elements(Sketch(5.0, 4.0, [placed.panel]))
+    assert "10" in [said for said, _ in boxes(root)]
 
 
-def test_pages_of_networks_have_their_pictures_without_matplotlib(run, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert run("giant", "--example", "--out", "o").exit_code == 0
-    assert (tmp_path / "o" / "report.html").read_text(encoding="utf-8").count("<svg ") == 4
+def test_equal_ratios_are_equally_long_along_logarithmic_axes():
+    placed = placed_on([[1.0, 0.1], [100.0, 10.0]], log_across=True, log_up=True)
+    at = placed.at(np.array([[1.0, 0.1], [10.0, 1.0], [100.0, 10.0]]))
+    assert at[1] == pytest.approx(at[[0, 2]].mean(axis=0))
+    assert placed.across.texts == ["1", "2", "5", "10", "20", "50", "100"]
+
+
+def test_names_of_panels_below_each_other_are_aligned():
+    panels = [
+        Panel(np.array([[0.0, 0.0], [1.0, top]]), [Level(0.0, "black")], up=f"up {top}")
+        for top in (1.0, 123456.0)
+    ]
+    drawn = svg_of(Sketch(5.0, 6.0, panels, 1), "name", "")
+    places = [float(re.search(rf'<text x="([\d.]+)"[^>]*>{each.up}', drawn)[1]) for each in panels]
+    assert places[0] == places[1]
+
+
+@pytest.mark.parametrize("mark", [Level, Ellipses, Mesh, Texts, Names, Contours])
+def test_marks_of_which_a_legend_shows_nothing_have_no_label(mark):
+    assert "label" not in {each.name for each in fields(mark)}

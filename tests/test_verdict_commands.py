@@ -13,8 +13,6 @@ from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
 from photogram.show.methods import page_of
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 @pytest.fixture
 def run(tmp_path, monkeypatch):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from orientation_golden import cards_of, cases, csv_of
 
-pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLE = files("photogram") / "examples" / "absolute_orientation"
 MEMBERS = {
     "scale",

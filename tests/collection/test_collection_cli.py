@@ -8,8 +8,6 @@ import pytest
 
 from photogram.collection import read, simulate, to_bytes
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 def test_the_example_converges_and_everything_is_written(run, tmp_path):
     done = run(

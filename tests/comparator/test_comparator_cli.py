@@ -13,7 +13,6 @@ from plates import case_2_session, noisy
 
 from photogram.comparator import Correction, read, read_grid, to_cards, to_csv
 
-pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "python" / "photogram" / "examples" / "comparator" / "comparator-3.txt"
 TEXTS = {"listing.txt", "correction.json", "correction-joint.json"}
@@ -110,8 +109,7 @@ def test_without_matplotlib_there_are_no_pictures(run, tables, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     result = run(*tables, "--out", "out")
     assert result.exit_code == 0
-    assert "pip install 'photogram[report]'" in result.stderr
-    assert "report.html" not in names("out")
+    assert "report.html" in names("out")
     result = run(*tables, "--out", "out", "--pdf")
     assert result.exit_code == 0
     assert "pip install 'photogram[plots]'" in result.stderr

@@ -24,6 +24,7 @@ from photogram.comparator.joint import Weights, adjust_jointly
 from photogram.comparator.listing.parameters import correction_table, table_nodes
 from photogram.comparator.variance import AxisSigma, _f_max_tail, compare_case_variances, difference
 from photogram.errors import AdjustmentError, InputError
+from photogram.show.sketch.marks import Ellipses
 
 
 @pytest.fixture(scope="module")
@@ -86,66 +87,68 @@ def test_feature_18_nodes_beyond_the_measurement_are_marked():
 
 
 def test_feature_18_the_net_is_drawn_at_fixed_nodes_and_10_000_times():
-    pytest.importorskip("matplotlib")
     from photogram.comparator.pictures.correction import distorted_grid
 
     calibration = calibrate(noisy(30, correction=bent()), QUICK)
     polynomial = calibration.nonlinear.polynomial
-    axes = distorted_grid(calibration, polynomial).axes[0]
-    *lines, nodes = [line for line in axes.lines if len(line.get_xdata()) > 2]
+    (panel,) = distorted_grid(calibration, polynomial).panels
+    nodes, *lines = panel.marks
     assert len(lines) == 10
     steps = np.array([75.0, 125.0, 175.0, 225.0, 25.0])
-    assert set(np.round(nodes.get_xdata(), 9)) == set(steps)
+    assert set(np.round(nodes.places[:, 0], 9)) == set(steps)
     corner = polynomial.evaluate(np.array([[25_000.0, 25_000.0]]))[0]
-    drawn = np.array([lines[0].get_xdata()[0], lines[0].get_ydata()[0]])
-    assert drawn == pytest.approx(25.0 + 10.0 * corner, abs=1e-9)
+    assert lines[0].places[0] == pytest.approx(25.0 + 10.0 * corner, abs=1e-9)
 
 
 def test_feature_18_every_case_has_its_table_and_pictures_where_they_are_wanted(full):
-    pytest.importorskip("matplotlib")
-    from photogram.comparator.pictures import figures
+    from photogram.comparator.pictures.book import sketches
 
     session = replace(noisy(30, correction=bent()), plot_each_case=True)
     calibration = calibrate(session, QUICK)
-    names = [name for name, _ in figures(calibration)]
+    names = sketches(calibration)
     for case in range(1, 5):
         assert {f"correction-case-{case}", f"distorted-grid-case-{case}"} <= set(names)
         assert f"NONLINEAR CORRECTIONS, CASE NUMBER {case} (MICRONS)" in listing(calibration)
     assert "NONLINEAR CORRECTIONS, CASE" not in listing(full)
 
 
+def _widths(panel):
+    """Return the major semi-axes of each of the groups of ellipses on a panel."""
+    return [mark.semi_axes[:, 0] for mark in panel.marks if isinstance(mark, Ellipses)]
+
+
 def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
-    pytest.importorskip("matplotlib")
-    from photogram.comparator.pictures import figures
+    from photogram.comparator.pictures.book import sketches
     from photogram.comparator.pictures.ellipses import total_ellipses
 
-    made = dict(figures(full))
+    made = sketches(full)
     operators = list(full.pointing.operators)
     assert len(operators) == 2
     assert all(f"pointing-ellipses-operator-{operator}" in made for operator in operators)
     levels = [1.00, 1.18, 2.45, 3.03]
-    collections = total_ellipses(full).axes[0].collections
-    widths = [2 * np.array(own._widths) for own in collections]
+    widths = _widths(total_ellipses(full).panels[0])
     assert [own[0] / widths[0][0] for own in widths] == pytest.approx(levels)
     points = list(full.pointing.points)
     expected = [full.pointing.points[point].ellipse.major_um for point in points]
     assert widths[0] / widths[0][0] == pytest.approx(np.array(expected) / expected[0])
-    panels = made["pooled-ellipses"].axes[: len(full.cases) + len(operators) + 1]
-    assert [panel.get_title(loc="left").split(":")[0] for panel in panels] == [
+    panels = made["pooled-ellipses"].panels
+    assert [panel.title.split(":")[0] for panel in panels] == [
         *(f"case {case.number}" for case in full.cases),
         *(f"operator {operator}" for operator in operators),
         "all",
     ]
     for panel in panels:
-        sizes = [float(own._widths[0]) for own in panel.collections]
+        sizes = [float(own[0]) for own in _widths(panel)]
         assert [size / sizes[0] for size in sizes] == pytest.approx(levels)
 
 
 def test_feature_18_pictures(full):
     pytest.importorskip("matplotlib")
     from photogram.comparator.pictures import figures, pdf_report
+    from photogram.comparator.pictures.book import sketches
 
-    made = dict(figures(full))
+    made = sketches(full)
+    assert [name for name, _ in figures(full)] == list(made)
     assert {
         "variance",
         "comparator-residuals",
@@ -161,13 +164,11 @@ def test_feature_18_pictures(full):
         "pooled-ellipses",
         "residual-histogram",
     } == set(made)
-    arrows = made["comparator-residuals"].axes[0].collections[0]
-    drawn = np.column_stack([arrows.U, arrows.V])
+    drawn = made["comparator-residuals"].panels[0].marks[1].vectors
     residuals = full.last_fits[0].residuals.comparator_um
     scale = drawn[0] / residuals[0]
     assert drawn == pytest.approx(residuals * scale[0], rel=1e-9)
-    ellipses = made["pointing-ellipses"].axes[0].collections[0]
-    widths = np.array(ellipses.get_widths()) if hasattr(ellipses, "get_widths") else 2 * ellipses._widths
+    widths = _widths(made["pointing-ellipses"].panels[0])[0]
     expected = [readings.precision.ellipse.major_um for readings in full.cases[0].placed.readings]
     assert widths / widths[0] == pytest.approx(np.array(expected) / expected[0])
     page = full.to_html().decode()

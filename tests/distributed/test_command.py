@@ -20,8 +20,6 @@ from photogram.cli.projects import Additions
 from photogram.distributed import Division
 from photogram.formats import read
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):

@@ -12,7 +12,6 @@ from faults import faulty
 
 from photogram.io.writing import OutputSet, write_whole
 
-pytestmark = pytest.mark.usefixtures("sketched")
 NAMES = ("a", "b", "made/new/c", "there/d")
 EXAMPLE = Path(str(files("photogram") / "examples" / "absolute_orientation"))
 MARK = "photogram-incomplete-*.txt"

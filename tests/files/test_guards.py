@@ -15,7 +15,6 @@ from typer.models import ArgumentInfo
 from photogram.cli.commands import app
 from photogram.cli.job import Job, Reads, Writes, roles, with_job
 
-pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLES = Path(str(files("photogram") / "examples"))
 PROJECT = ("COMMON", "CAMERAS", "IMAGES", "FRAMES", "GROUND")
 

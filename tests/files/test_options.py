@@ -15,7 +15,6 @@ from typer.models import ArgumentInfo, OptionInfo
 from photogram.cli.commands import app
 from photogram.cli.job import Writes
 
-pytestmark = pytest.mark.usefixtures("sketched")
 PROMPT = [
     sys.executable,
     "-c",

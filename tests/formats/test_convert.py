@@ -12,8 +12,6 @@ from photogram.formats.format_coordinates import in_topocentric, topocentric_rem
 from photogram.network.directions import image_directions
 from photogram.network.geometry import lengths_of_units
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 @pytest.mark.parametrize(
     ("out", "name", "files"),

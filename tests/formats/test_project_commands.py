@@ -12,8 +12,6 @@ import photogram
 from photogram import adjust, formats
 from photogram.stellar.night_file import inputs
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 @pytest.mark.parametrize("kind", ["metrology", "survey", "rolling", "archive", "night"])
 def test_new_begins_a_project_of_each_kind(run, tmp_path, kind):

@@ -12,7 +12,6 @@ from photogram.cli import app
 from photogram.giant import Common, Frame, Project, read_project, write_project
 from photogram.network.geometry import geographic_to_geocentric, project, rotation_angles, rotation_matrix
 
-pytestmark = pytest.mark.usefixtures("sketched")
 SIZE = {"strips": 2, "photos_per_strip": 4, "points_per_photo": 25, "check_points": 4}
 GEOGRAPHIC = {
     "spheroid": Spheroid.clarke_1866(),

@@ -23,7 +23,6 @@ from photogram.network.rays import Rays
 from photogram.network.strips import strips_of
 from photogram.network.subset import kept_images, of_photos
 
-pytestmark = pytest.mark.usefixtures("sketched")
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}
 
 

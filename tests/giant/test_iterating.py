@@ -12,7 +12,6 @@ from photogram import AsPublished, adjust, simulate
 from photogram.giant import Common, ImageFrame, Project, read_project, write_project
 from photogram.network import geometry
 
-pytestmark = pytest.mark.usefixtures("sketched")
 SPACES = pytest.mark.parametrize("space", [{}, GEOGRAPHIC], ids=["rectangular", "geographic"])
 
 

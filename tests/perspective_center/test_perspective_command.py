@@ -17,7 +17,6 @@ from photogram.perspective_center.listing import listing
 from photogram.perspective_center.plot import draw
 from photogram.perspective_center.report import to_json
 
-pytestmark = pytest.mark.usefixtures("sketched")
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = files("photogram") / "examples" / "perspective_center" / "grid.deck"
 SET = {

@@ -16,8 +16,6 @@ from photogram.stellar.night_file import read_night
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.sky_calibration import calibrate_exposures
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 @pytest.fixture(scope="module")
 def night(night):

@@ -19,7 +19,6 @@ from photogram.stellar.places import apparent_places, epoch, sidereal_time
 from photogram.stellar.plain import read_plain
 from photogram.stellar.sky import Site
 
-pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar"))
 
 

@@ -15,7 +15,6 @@ from photogram.stellar import calibrate
 from photogram.stellar.deck import read_deck
 from photogram.stellar.plain import read_plain
 
-pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))
 
 

@@ -9,7 +9,7 @@ from example_scripts import load
 from photogram import InputError, _photocore
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_plots import figures
+from photogram.stellar.night_plots import sketches
 from photogram.stellar.night_report import report
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.sky_calibration import partials, project_sky
@@ -165,10 +165,10 @@ def test_partials_of_every_lens_are_those_of_its_images(lens, common_scale):
 def test_pictures_of_a_fisheye(lens):
     """The curve over the angle, and what the terms change: nothing where there are none."""
     night, _ = allsky.night(lens, 7)
-    left, right = figures(calibrate_night(night))["distortion"].axes
-    (curve,), (terms,) = left.lines, right.lines
-    theta = np.radians(curve.get_xdata())
-    assert curve.get_ydata()[-1] > 900
+    left, right = sketches(calibrate_night(night))["distortion"].panels
+    (curve,), (_, terms) = left.marks, right.marks
+    theta = np.radians(curve.places[:, 0])
+    assert curve.places[-1, 1] > 900
     change = 950 * theta * (0.03 * theta**2 - 0.01 * theta**4 + 0.004 * theta**6 - 6e-4 * theta**8)
     expected = change if lens == "kannala_brandt" else 0 * theta
-    assert terms.get_ydata() == pytest.approx(expected, abs=0.5)
+    assert terms.places[:, 1] == pytest.approx(expected, abs=0.5)

@@ -25,7 +25,6 @@ from photogram.stellar.places import Earth, apparent_places, sidereal_time
 from photogram.stellar.pointing import attitude_of, axis_of, pole_matrix, terrestrial
 from photogram.stellar.sky_calibration import calibrate_exposures, project_sky, stars_near
 
-pytestmark = pytest.mark.usefixtures("sketched")
 TRUTH = MAKER["CAMERA"].values
 
 

@@ -21,7 +21,6 @@ from photogram.stellar.night_tables import exposure_table, image_table
 from photogram.stellar.odds import LOG_ODDS, binomial_tail, log_odds, star_probabilities
 from photogram.stellar.sky_calibration import Exposure
 
-pytestmark = pytest.mark.usefixtures("sketched")
 allsky = load("all_sky_camera")
 TRUTH = MAKER["CAMERA"].values
 

@@ -17,8 +17,6 @@ from photogram.stellar.night_file import AUTO, read_night
 from photogram.stellar.night_report import report
 from photogram.stellar.sky import Effects
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 def run(folder, *said):
     """Run the command on the example; return its report and its document."""

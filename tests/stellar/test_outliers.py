@@ -15,7 +15,6 @@ from photogram.stellar import calibrate
 from photogram.stellar.movement import combine
 from photogram.stellar.parameters import INDEX, NAMES
 
-pytestmark = pytest.mark.usefixtures("sketched")
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar"))
 
 

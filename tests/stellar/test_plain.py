@@ -18,7 +18,6 @@ from photogram.stellar import Options
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.plain import inputs, read_plain
 
-pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).parents[2]
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))
 

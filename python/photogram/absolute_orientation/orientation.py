@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from photogram.plots.panels import Where
+    from photogram.show.axes import Where
 
 __all__ = ["Orientation", "Trace"]
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
 from photogram.absolute_orientation.orientation import Orientation
-from photogram.absolute_orientation.plot import figure
+from photogram.absolute_orientation.plot import residuals_sketch
 from photogram.absolute_orientation.tables import (
     cycles,
     facts,
@@ -61,7 +62,8 @@ def orientation_page(result: Orientation) -> Page:
 
 def _drawing(result: Orientation) -> Drawing:
     caption = "The control in plan with its residuals, given minus transformed, enlarged as the scale says."
-    return Drawing("picture-residuals", "Residuals of the control in plan", caption, lambda: figure(result))
+    sketch = partial(residuals_sketch, result)
+    return Drawing("picture-residuals", "Residuals of the control in plan", caption, sketch)
 
 
 def _tested(result: Orientation) -> str:

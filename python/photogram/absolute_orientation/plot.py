@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,24 +9,19 @@ from numpy.typing import NDArray
 
 from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
-from photogram.plots.panels import Where, figure_of, labels, panels, scale_bars
+from photogram.show.axes import Where
 from photogram.show.methods import axes_of
-from photogram.show.pictures import arrows, round_length
+from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, Sketch, around
+from photogram.show.sketch.marks import Arrows, Mark, Markers, Names, Segments
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import INK, PURPLE, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
-WIDE = 4.0
-"""Inches of axes beyond which the legend has two columns."""
-
-
-def figure(result: Orientation) -> Figure:
-    """Return the plan of :func:`residuals` as a figure that belongs to no window."""
-    return figure_of(partial(residuals, result))
 
 
 @axes_of.register(Orientation)
@@ -50,6 +44,12 @@ def residuals(result: Orientation, ax: Where = None) -> Axes:
     ModuleNotFoundError
         matplotlib is absent (`pip install 'photogram[plots]'`).
     """
+    axes: Axes = on_axes(residuals_sketch(result), ax)
+    return axes
+
+
+def residuals_sketch(result: Orientation) -> Sketch:
+    """Return the plan of :func:`residuals` before it is drawn."""
     rows = np.flatnonzero(result.took_part)
     plan = result.adjusted_control[rows, :2]
     own, unit = result.residuals_ground[rows], result.stations.ground_unit
@@ -57,32 +57,23 @@ def residuals(result: Orientation, ax: Where = None) -> Axes:
     largest = float(np.nanmax(np.abs(own)))
     factor = LONGEST * size / largest if largest > 0 else 0.0
     high = float(np.clip(5.5 * np.ptp(plan[:, 1]) / (np.ptp(plan[:, 0]) or 1.0), 2.0, 8.0))
-    with panels(ax, 1, 1, 6.5, high + 1.8) as [axes]:
-        _stations(axes, result, rows, plan)
-        ends = _residuals(axes, plan, own * factor)
-        axes.set_aspect("equal")
-        axes.margins(0.1)
-        axes.autoscale_view()
-        axes.ticklabel_format(useOffset=False, style="plain")
-        axes.set_xlabel(f"X, {unit}")
-        axes.set_ylabel(f"Y, {unit}")
-        axes.locator_params(nbins=6)
-        # Below the labels of the axis: beside small axes there would be no room for names.
-        room = axes.get_window_extent().width / axes.figure.dpi
-        columns = 2 if room > WIDE else 1
-        axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), borderaxespad=4.5, ncols=columns)
-        axes.set_xlim(axes.get_xlim())
-        axes.set_ylim(axes.get_ylim())
-        rms = result.rms / result.similarity.scale
-        length = round_length(LONGEST * size / factor) if factor else 0.0
-        bars = [(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else []
-        scale_bars(axes, bars, f"Residuals of control, rms {rms:.3g} {unit}")
-        names = [result.stations.ids[row] for row in rows.tolist()]
-        labels(axes, plan, names, [INK] * len(names), ends, gap=6.0)
-    return axes
+    vectors, ends = _residuals(plan, own * factor)
+    names = [result.stations.ids[row] for row in rows.tolist()]
+    length = round_length(LONGEST * size / factor) if factor else 0.0
+    panel = Panel(
+        around(np.vstack([plan, ends]), 0.1),
+        [*_stations(result, rows, plan), *vectors, Names(plan, names, [INK] * len(names), ends)],
+        f"Residuals of control, rms {result.rms / result.similarity.scale:.3g} {unit}",
+        f"X, {unit}",
+        f"Y, {unit}",
+        equal=True,
+        bars=[(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else [],
+        legend="below",
+    )
+    return Sketch(6.5, high + 1.8, [panel])
 
 
-def _stations(axes: Axes, result: Orientation, rows: NDArray[np.intp], plan: Floats) -> None:
+def _stations(result: Orientation, rows: NDArray[np.intp], plan: Floats) -> list[Mark]:
     used = result.used[rows]
     full, plan_only = used.all(axis=1), ~used[:, 2]
     kinds = (
@@ -90,30 +81,22 @@ def _stations(axes: Axes, result: Orientation, rows: NDArray[np.intp], plan: Flo
         ("horizontal control", plan_only, "s"),
         ("height control", ~(full | plan_only), "o"),
     )
-    for name, chosen, marker in kinds:
-        if chosen.any():
-            axes.plot(*plan[chosen].T, marker, color=INK, markerfacecolor="none", label=name)
+    return [
+        Markers(plan[chosen], shape, 6.0, face="none", label=name)
+        for name, chosen, shape in kinds
+        if chosen.any()
+    ]
 
 
-def _residuals(axes: Axes, plan: Floats, enlarged: Floats) -> Floats:
-    """Draw residuals, already in the scale of the plan; return places along them, which names spare."""
-    flat = np.isfinite(enlarged[:, :2]).any(axis=1)
+def _residuals(plan: Floats, enlarged: Floats) -> tuple[list[Mark], Floats]:
+    """Return residuals, already in the scale of the plan, and places along them, which names spare."""
+    flat, high = np.isfinite(enlarged[:, :2]).any(axis=1), np.isfinite(enlarged[:, 2])
     steps = np.nan_to_num(enlarged)
-    if flat.any():
-        arrows(axes, plan[flat], steps[flat, :2], width=0.004, zorder=3, color=VERMILION)
-        axes.plot([], [], color=VERMILION, label="plan residual")
-    high = np.isfinite(enlarged[:, 2])
     up = np.column_stack([np.zeros(len(plan)), steps[:, 2]])
-    ends = plan[high] + up[high]
-    axes.vlines(
-        plan[high, 0],
-        plan[high, 1],
-        ends[:, 1],
-        color=PURPLE,
-        linewidth=3,
-        label="height residual (up: positive)",
-    )
-    # Bars do not widen the limits of the axes by themselves.
-    axes.update_datalim(ends)
+    marks: list[Mark] = []
+    if flat.any():
+        marks.append(Arrows(plan[flat], steps[flat, :2], VERMILION, 0.004, label="plan residual", layer=3.0))
+    bars = np.stack([plan[high], plan[high] + up[high]], axis=1)
+    marks.append(Segments(bars, PURPLE, 3.0, label="height residual (up: positive)"))
     parts = np.linspace(0.25, 1.0, 4)[:, np.newaxis, np.newaxis]
-    return np.concatenate([plan + parts * steps[:, :2], plan + parts * up]).reshape(-1, 2)
+    return marks, np.concatenate([plan + parts * steps[:, :2], plan + parts * up]).reshape(-1, 2)

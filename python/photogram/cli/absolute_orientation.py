@@ -347,10 +347,12 @@ def _small_files(
     if out:
         made[out / TEXT] = result.report().encode()
     if pictures:
-        from photogram.absolute_orientation.plot import figure
+        from photogram.absolute_orientation.plot import residuals_sketch
         from photogram.show.pictures import drawn
+        from photogram.show.sketch.on_axes import figure
 
-        made |= {path: drawn(figure(result), path) for path in pictures}
+        picture = figure(residuals_sketch(result))
+        made |= {path: drawn(picture, path) for path in pictures}
     if trace:
         from photogram.absolute_orientation.report import trace_text
 

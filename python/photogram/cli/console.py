@@ -27,6 +27,7 @@ ON_TOP = 2
 """Sections with which summaries of verdicts begin: the verdict, and what to do next."""
 
 EXTRAS = {
+    "contourpy": "report",
     "jinja2": "report",
     "matplotlib": "plots",
     "PIL": "photos",

@@ -154,11 +154,10 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
 
 def _files(found: Conversion, plots: bool) -> dict[str, bytes]:
     """Make what goes to the directory: the camera in each format that can hold it."""
-    import numpy as np
-
     from photogram.errors import InputError
     from photogram.show.pictures import drawn
-    from photogram.targets.drawing import draw_difference
+    from photogram.show.sketch.on_axes import figure
+    from photogram.targets.drawing import difference_sketch
     from photogram.targets.output.formats import CAMERA_FORMATS
 
     files = {"report.txt": found.report().encode(), "difference.csv": found.to_csv()}
@@ -168,6 +167,6 @@ def _files(found: Conversion, plots: bool) -> dict[str, bytes]:
         except InputError:
             continue
     if plots:
-        first = np.ravel(draw_difference(found.difference))[0]
-        files["difference.png"] = drawn(first.figure, Path("difference.png"))
+        picture = figure(difference_sketch(found.difference))
+        files["difference.png"] = drawn(picture, Path("difference.png"))
     return files

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 TEXT, HTML = "report.txt", "report.html"
 """The reports, in a directory of results."""
-NEEDED = ("jinja2", "matplotlib")
+NEEDED = ("jinja2", "contourpy")
 """What makes that for the browser: the extra `report`."""
 
 Crs = Annotated[
@@ -223,7 +223,7 @@ def html_files(
     Raises
     ------
     ModuleNotFoundError
-        jinja2, or matplotlib of a page that takes it, is absent, and the report was asked for.
+        jinja2, or contourpy of a page that takes it, is absent, and the report was asked for.
     """
     if place is None:
         return {}
@@ -235,7 +235,7 @@ def html_files(
             page = make()
             content = page_html(page.with_sections(reproducibility(job.run(command), page.phases)))
     except ModuleNotFoundError as error:
-        # Most pages have no picture that takes matplotlib: which do is known when they are drawn.
+        # Most pages have no picture that takes contourpy: which do is known when they are drawn.
         if asked or error.name not in NEEDED:
             raise
         if not job.quiet:

@@ -59,7 +59,7 @@ def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, byte
     files = {folder / name: content for name, content in files_of_statement(found).items()}
     files[folder / "statement.json"] = found.to_json()
     for name, needed, make in (
-        ("statement.html", ("jinja2", "matplotlib"), found.to_html),
+        ("statement.html", ("jinja2",), found.to_html),
         ("statement.pdf", ("reportlab", "matplotlib"), found.to_pdf),
     ):
         if all(map(find_spec, needed)):

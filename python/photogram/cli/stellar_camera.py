@@ -280,9 +280,11 @@ def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, by
         made[out / f"plate{mark}.txt"] = plate_list(result)
     if pictures:
         from photogram.show.pictures import files as drawn
-        from photogram.stellar.plots import figures
+        from photogram.show.sketch.on_axes import figure
+        from photogram.stellar.plots import sketches
 
-        made |= drawn({f"{name}{mark}": each for name, each in figures(result).items()}, out, pictures)
+        figures = {f"{name}{mark}": figure(each) for name, each in sketches(result).items()}
+        made |= drawn(figures, out, pictures)
     return made
 
 
@@ -304,7 +306,8 @@ def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path
     made |= _cameras(result, cameras)
     if pictures:
         from photogram.show.pictures import files as drawn
-        from photogram.stellar.night_plots import figures
+        from photogram.show.sketch.on_axes import figure
+        from photogram.stellar.night_plots import sketches
 
-        made |= drawn(figures(result), out, pictures)
+        made |= drawn({name: figure(each) for name, each in sketches(result).items()}, out, pictures)
     return made

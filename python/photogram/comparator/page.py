@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
@@ -153,12 +155,10 @@ def _joint(joint: JointFit) -> list[Part]:
 
 def _pictures(calibration: Calibration) -> list[Part]:
     """Return the pictures of the calibration, one shown at a time."""
-    from photogram.comparator.pictures.book import figures
+    from photogram.comparator.pictures.book import sketches
 
-    layers = [
-        Drawing(f"picture-{name}", _title(name), "", lambda figure=figure: figure)  # type: ignore[misc]
-        for name, figure in figures(calibration)
-    ]
+    made = sketches(calibration)
+    layers = [Drawing(f"picture-{name}", _title(name), "", partial(made.get, name)) for name in made]
     return [Layers("picture-layers", layers)]
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.types import Floats
 from photogram.film.certificate import Certificate
 from photogram.film.certificate_tables import (
     cameras,
@@ -27,15 +29,13 @@ from photogram.show.lines import fact_lines, field, table_lines
 from photogram.show.lines import marks as marked
 from photogram.show.methods import document_of, page_of, report_of
 from photogram.show.page import Drawing, Facts, Page, Part, Section
-from photogram.show.pictures import new_figure
 from photogram.show.quantity import Quantity, records
 from photogram.show.sections import Section as Lines
 from photogram.show.sections import composed, headline, verdict_sections
-from photogram.show.style import FAINT, INK, MARKED, in_style
+from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.marks import Band, Line, Mark, Markers, Segments, error_bars
+from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @report_of.register(Certificate)
@@ -257,7 +257,7 @@ def _lens_parts(certificate: Certificate) -> list[Part]:
         return []
     own = certificate.curve()
     return [
-        Drawing("picture-distortion", "Radial distortion", _CURVE, lambda: _drawn(certificate)),
+        Drawing("picture-distortion", "Radial distortion", _CURVE, partial(_sketch, certificate)),
         page_table("Table of radial distortion", distortion(certificate, own)),
         page_table("Odd terms beside k0", terms(certificate.curves(), own.terms)),
         page_table("Curve, the last radius beyond the table", curve(own)),
@@ -269,19 +269,18 @@ _CURVE = (
 )
 
 
-@in_style
-def _drawn(certificate: Certificate) -> Figure:
+def _sketch(certificate: Certificate) -> Sketch:
     assert certificate.radial is not None
-    own, um = certificate.curve(), 1e3
+    own, um, given = certificate.curve(), 1e3, certificate.radial
     edge = float(own.radius.max())
-    figure = new_figure(6.4, 3.6)
-    panel = figure.subplots()
-    for radius, line in ((np.linspace(0, edge, 200), "-"), (np.linspace(edge, 1.1 * edge, 40), "--")):
+    drawn, ends = list[Mark](), list[Floats]()
+    for radius, dash in ((np.linspace(0, edge, 200), ""), (np.linspace(edge, 1.1 * edge, 40), "--")):
         value, sd = um * own.at(radius), um * own.sd_at(radius)
-        panel.fill_between(radius, value - sd, value + sd, color=FAINT, alpha=0.4, linewidth=0)
-        panel.plot(radius, value, line, color=INK, linewidth=1.2)
-    given = certificate.radial
-    panel.errorbar(own.radius, um * given.distortion, um * given.sd, fmt="o", color=MARKED, markersize=4)
-    panel.set_xlabel("radius, mm")
-    panel.set_ylabel("distortion, µm")
-    return figure
+        drawn.append(Band(radius, value - sd, value + sd, FAINT, 0.4))
+        drawn.append(Line(np.column_stack([radius, value]), INK, 1.2, dash))
+        ends += [value - sd, value + sd]
+    places = np.column_stack([own.radius, um * given.distortion])
+    low, high = (um * (given.distortion + sign * given.sd) for sign in (-1, 1))
+    drawn += [Segments(error_bars(places, low, high), MARKED, 1.5), Markers(places, "o", 4.0, MARKED)]
+    limits = np.column_stack([spread(0.0, 1.1 * edge), spread(low, high, *ends)])
+    return Sketch(6.4, 3.6, [Panel(limits, drawn, "", "radius, mm", "distortion, µm")])

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 from photogram.perspective_center.batch import Run
-from photogram.perspective_center.plot import figure
+from photogram.perspective_center.plot import run_sketch
 from photogram.perspective_center.report import cycles, points, size_of, unknowns
 from photogram.perspective_center.solution import PerspectiveCenter
 from photogram.show.cells import page_table
@@ -51,7 +52,7 @@ def _name(result: PerspectiveCenter) -> str:
 
 def _drawing(run: Run) -> Drawing:
     caption = "Left the residuals of the grid, enlarged alike in all sets; right the radial distortion."
-    return Drawing("picture-grid", "Residuals and distortion", caption, lambda: figure(run.results))
+    return Drawing("picture-grid", "Residuals and distortion", caption, partial(run_sketch, run.results))
 
 
 def _layers(

@@ -1,7 +1,4 @@
-"""Plots of a run: residual vectors in the model and radial distortion on the plate, a row for each set.
-
-matplotlib is an extra (`pip install 'photogram[plots]'`) and is imported only here.
-"""
+"""Plots of a run: residual vectors in the model and radial distortion on the plate, a row for each set."""
 
 from __future__ import annotations
 
@@ -11,18 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.show.pictures import arrows, drawn, new_figure, round_length
-from photogram.show.style import INK, MARKED, in_style
+from photogram.show.pictures import drawn, round_length
+from photogram.show.sketch.declared import Panel, Sketch, around
+from photogram.show.sketch.marks import Arrows, Band, Level, Line, Mark, Markers
+from photogram.show.sketch.on_axes import figure
+from photogram.show.style import INK, MARKED
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from photogram.arguments.types import Floats
     from photogram.perspective_center.solution import PerspectiveCenter
 
 WIDTH, ROW = 11.0, 5.0
-"""Inches of a figure, and of one set in it."""
+"""Inches of a picture, and of one set in it."""
 LONGEST = 0.12
 """The longest residual vector, as part of the extent of the grid."""
 ACCENT, BAND = MARKED, "#e4e4e4"
@@ -41,76 +38,66 @@ def draw(results: list[PerspectiveCenter], path: Path) -> bytes:
     """
     if not results:
         raise InputError("no set was solved: there is nothing to draw", file=path)
-    return drawn(figure(results), path)
+    return drawn(figure(run_sketch(results)), path)
 
 
-@in_style
-def figure(results: list[PerspectiveCenter]) -> Figure:
-    """Return a figure with a row for each set: residual vectors, radial distortion."""
-    drawing = new_figure(WIDTH, ROW * len(results))
-    axes = drawing.subplots(len(results), 2, squeeze=False, width_ratios=(1.0, 1.15))
+def run_sketch(results: list[PerspectiveCenter]) -> Sketch:
+    """Return a picture with a row for each set: residual vectors, radial distortion."""
     # One scale for all sets, so that they can be compared.
     longest = max(float(np.hypot(*result.residual.T).max()) for result in results)
     largest = max(
         1000.0 * max(float(np.abs(result.radial_distortion).max()), result.sigma0_plate or 0.0)
         for result in results
     )
-    for (left, right), result in zip(axes, results, strict=True):
-        residual_vectors(left, result, longest)
-        distortion_curve(right, result, largest)
-    return drawing
+    panels = [
+        panel
+        for result in results
+        for panel in (residual_vectors(result, longest), distortion_curve(result, largest))
+    ]
+    return Sketch(WIDTH, ROW * len(results), panels, 2)
 
 
-def residual_vectors(axes: Axes, result: PerspectiveCenter, longest: float) -> None:
-    """Draw measured minus projected at every point, greatly enlarged, with a vector of known length beside.
+def residual_vectors(result: PerspectiveCenter, longest: float) -> Panel:
+    """Return measured minus projected at every point, greatly enlarged, with a vector of known length above.
 
     `longest` is the residual, in the unit of the model, that gets the longest vector.
     """
-    x, y = result.projected.T
     extent = float(np.ptp(result.projected, axis=0).max()) or 1.0
     enlargement = LONGEST * extent / longest if longest > 0 else 1.0
-    axes.plot(x, y, "o", color=INK, markersize=2.5)
-    arrows(axes, result.projected, result.residual * enlargement, width=0.004, color=ACCENT)
+    marks: list[Mark] = [
+        Markers(result.projected, "o", 2.5),
+        Arrows(result.projected, result.residual * enlargement, ACCENT, 0.004),
+    ]
     known = round_length(longest)
-    margin = 0.12 * extent
-    corner = np.array([x.min(), y.min() - 1.35 * margin])
-    arrows(axes, corner[None], np.array([[known * enlargement, 0.0]]), width=0.004, color=ACCENT)
-    axes.annotate(
-        f"{known:g} model units (x {enlargement:,.0f})",
-        (corner[0] + known * enlargement, corner[1]),
-        xytext=(6, 0), textcoords="offset points", va="center", fontsize=8, color=ACCENT,
-    )  # fmt: skip
-    axes.set_xlim(x.min() - margin, x.max() + margin)
-    axes.set_ylim(y.min() - 2 * margin, y.max() + margin)
-    axes.set_aspect("equal")
-    axes.set(xlabel="X, model units", ylabel="Y, model units", title=f"{_name(result)}: measured − projected")
+    bar = known * enlargement, ACCENT, f"{known:g} model units (x {enlargement:,.0f})"
+    title = f"{_name(result)}: measured − projected"
+    axes = "X, model units", "Y, model units"
+    return Panel(around(result.projected, LONGEST), marks, title, *axes, equal=True, bars=[bar])
 
 
-def distortion_curve(axes: Axes, result: PerspectiveCenter, largest: float) -> None:
-    """Draw radial distortion against radius: every point, the mean of equal radii, and the standard error.
+def distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:
+    """Return radial distortion against radius: every point, the mean of equal radii, and the standard error.
 
     `largest` is the distortion in micrometres that the axis has room for. A point at the principal point has
     no direction outward: what the report calls its distortion is its distance, and the curve leaves it out.
     """
     radius, micrometres = result.fixed_radius, 1000.0 * result.radial_distortion
     off_centre = radius > 0
+    reach, right = 1.4 * largest or 1.0, 1.05 * (float(radius.max()) or 1.0)
+    marks: list[Mark] = []
     if result.sigma0_plate is not None:
         sigma = 1000.0 * result.sigma0_plate
-        axes.axhspan(-sigma, sigma, color=BAND, label=f"± standard error of unit weight, {sigma:.1f} µm")
-    axes.axhline(0.0, color=INK, linewidth=0.8)
-    axes.plot(radius, micrometres, "o", color=INK, markersize=3.5, alpha=0.75, label="points", clip_on=False)
+        across, up = np.array([0.0, right]), np.full(2, sigma)
+        label = f"± standard error of unit weight, {sigma:.1f} µm"
+        marks.append(Band(across, -up, up, BAND, 1.0, label=label))
+    places = np.column_stack([radius, micrometres])
+    marks += [Level(0.0, INK, 0.8), Markers(places, "o", 3.5, opacity=0.75, label="points")]
     if off_centre.any():
         means = _means(radius[off_centre], micrometres[off_centre])
-        axes.plot(*means, "-", color=ACCENT, linewidth=1.8, label="mean of equal radii")
-    reach = 1.4 * largest or 1.0
-    axes.set_ylim(-reach, reach)
-    axes.set_xlim(left=0.0)
-    axes.set(
-        xlabel="radius on the plate, mm",
-        ylabel="distortion, µm, positive outward",
-        title="Radial distortion on the plate",
-    )
-    axes.legend(loc="lower left", ncols=3, columnspacing=1.2)
+        marks.append(Line(np.column_stack(means), ACCENT, 1.8, label="mean of equal radii"))
+    limits = np.array([[0.0, -reach], [right, reach]])
+    axes = "radius on the plate, mm", "distortion, µm, positive outward"
+    return Panel(limits, marks, "Radial distortion on the plate", *axes, legend="best")
 
 
 def _means(radius: Floats, values: Floats) -> tuple[Floats, Floats]:

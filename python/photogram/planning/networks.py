@@ -81,9 +81,13 @@ class Plan(Paged):
         PhotogramError
             There are no new points to be shown.
         """
-        from photogram.planning import plot  # matplotlib takes long to import
+        from photogram.planning.plot import plan_sketch
+        from photogram.show.pictures import new_figure
+        from photogram.show.sketch.on_axes import on_axes
 
-        return plot.figure(self.patterns, figure)
+        made = new_figure(1.0, 1.0) if figure is None else figure
+        on_axes(plan_sketch(self.patterns), made)
+        return made
 
     def to_json(self) -> bytes:
         """Return the figures of the plan as a JSON document (UTF-8); what is not a number is null."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from photogram.planning.networks import Plan
 from photogram.planning.pattern import Pattern
-from photogram.planning.plot import figure
+from photogram.planning.plot import plan_sketch
 from photogram.planning.text import axis_figures, counts, motion_shown, on_the_ground, remarks, what_next
 from photogram.show.angles import ARCSEC
 from photogram.show.judgement import remarks_section
@@ -70,7 +71,8 @@ def _drawing(patterns: Sequence[Pattern]) -> Drawing:
         "The patterns in plan, on one scale of colours: the expected standard deviation of points in height."
         " Control points are marked by what they hold."
     )
-    return Drawing("picture-plan", "Expected standard deviation in height", caption, lambda: figure(patterns))
+    title = "Expected standard deviation in height"
+    return Drawing("picture-plan", title, caption, partial(plan_sketch, patterns))
 
 
 def _judgement(patterns: Sequence[Pattern]) -> Judgement:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +12,13 @@ from photogram.plots.distortion import distortion, distortion_sketch
 from photogram.plots.features import features, features_sketch
 from photogram.plots.films import films, films_sketch
 from photogram.plots.network import network, network_sketch
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where, figure_of
 from photogram.plots.redundancy import redundancy, redundancy_sketch
 from photogram.plots.residuals import residuals, residuals_sketch
 from photogram.plots.tests import tests, tests_sketch
 from photogram.plots.trajectories import trajectory
+from photogram.show.axes import Where
 from photogram.show.sketch.declared import Sketch
+from photogram.show.sketch.on_axes import figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -147,7 +146,7 @@ def figures(result: object, names: Sequence[str] = tuple(PICTURES)) -> dict[str,
     if unknown := [name for name in names if name not in PICTURES]:
         raise InputError(f"there is no picture {', '.join(unknown)}, but {', '.join(PICTURES)}")
     found = {name: sketch for name in names if (sketch := sketch_of(result, name)) is not None}
-    return {name: figure_of(partial(on_axes, sketch)) for name, sketch in found.items()}
+    return {name: figure(sketch) for name, sketch in found.items()}
 
 
 def picture_files(result: object, folder: Path, ending: str = "png") -> dict[Path, bytes]:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where
 from photogram.plots.picture_data import Correlated, pictured
+from photogram.show.axes import Where
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.marks import Mark, Mesh, Shades, Texts
+from photogram.show.sketch.on_axes import on_axes
 
 CAMERAS = 4
 """That have a panel at most."""
@@ -58,7 +58,7 @@ def correlations_sketch(result: object) -> Sketch:
     left_out = len(cameras) > len(shown)
     said = f"the first {len(shown)} of {len(cameras)} cameras are drawn" if left_out else ""
     found = [_matrix(each, said if each is shown[-1] else "") for each in shown]
-    return Sketch(columns * side + 0.9, rows * (side + 0.2), found, columns, SHADES, beside_all=True)
+    return Sketch(columns * side + 0.9, rows * (side + 0.2), found, columns, SHADES)
 
 
 def _matrix(each: Correlated, said: str) -> Panel:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where
 from photogram.plots.picture_data import Deviations, pictured
+from photogram.show.axes import Where
 from photogram.show.sketch.declared import Panel, Sketch, spread
 from photogram.show.sketch.marks import Level, Mark, Markers, Segments
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import COLOURS, FAINT
 
 SHOWN = 4

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where
 from photogram.plots.picture_data import VectorField, pictured
+from photogram.show.axes import Where
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Names
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import FAINT, INK
 
 SHOWN = 6

@@ -9,9 +9,8 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where
 from photogram.plots.picture_data import Pictured, Plan, pictured
+from photogram.show.axes import Where
 from photogram.show.pictures import round_length
 from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
@@ -25,7 +24,9 @@ from photogram.show.sketch.marks import (
     Polygons,
     Segments,
     Shades,
+    ellipse_axes,
 )
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
 
 if TYPE_CHECKING:
@@ -193,7 +194,7 @@ def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark]
     shown = outlines[chosen][:, :, list(seen[:2])]
     inside = float(np.clip(0.4 / len(shown), 0.003, 0.06))
     edge = float(np.clip(25.0 / len(shown), 0.5, 0.7))
-    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, "footprint of a photo")], said
+    return [Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, label="footprint of a photo")], said
 
 
 def _photos(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
@@ -240,33 +241,32 @@ def _ellipses(
     covariances = drawn.covariances(rows)[:, pair][:, :, pair]
     good = np.isfinite(covariances).all(axis=(1, 2))
     rows, covariances = rows[good], covariances[good]
-    variances, turns = np.linalg.eigh(covariances)
-    axes_of = np.sqrt(np.maximum(variances, 0.0)) * np.sqrt(-2.0 * np.log(1.0 - CONFIDENCE))
-    if not len(rows) or not axes_of[:, 1].any():
+    axes_of, angles = ellipse_axes(covariances)
+    axes_of *= np.sqrt(-2.0 * np.log(1.0 - CONFIDENCE))
+    if not len(rows) or not axes_of[:, 0].any():
         return []
     extent = float((limits[1] - limits[0]).max())
     if len(rows) > ELLIPSES:
-        chosen = _of_cells(plan.points[rows][:, pair], axes_of[:, 1], extent / 12.0)
+        chosen = _of_cells(plan.points[rows][:, pair], axes_of[:, 0], extent / 12.0)
         said.append(f"error ellipses: of {len(rows):,} points, the median one of each of {len(chosen)} cells")
     else:
         chosen = np.arange(len(rows))
-    sizes = axes_of[chosen, 1]
+    sizes = axes_of[chosen, 0]
     typical = float(np.median(sizes[sizes > 0])) if (sizes > 0).any() else 0.0
     if typical == 0:
         return []
     # The semi-axis of a typical ellipse is a fifth of the distance to its neighbour.
     spacing = extent / np.sqrt(max(len(chosen), 9))
     scale = round_length(0.22 * spacing / typical)
-    shown = chosen[scale * axes_of[chosen, 1] < 0.2 * extent]
+    shown = chosen[scale * axes_of[chosen, 0] < 0.2 * extent]
     if len(shown) < len(chosen):
         said.append(f"{len(chosen) - len(shown)} ellipses are too large to be drawn at this scale")
-    angles = np.degrees(np.arctan2(turns[shown, 1, 1], turns[shown, 0, 1]))
-    semi_axes = scale * axes_of[shown][:, ::-1]
-    marks.append(Ellipses(plan.points[rows[shown]][:, pair], semi_axes, angles, BLUE, 0.8, layer=4.0))
-    worst = int(np.argmax(axes_of[:, 1]))
+    places = plan.points[rows[shown]][:, pair]
+    marks.append(Ellipses(places, scale * axes_of[shown], angles[shown], BLUE, 0.8, layer=4.0))
+    worst = int(np.argmax(axes_of[:, 0]))
     unit = f" {plan.unit}" if plan.unit else ""
     said.append(
-        f"largest semi-axis of an ellipse: {axes_of[worst, 1]:.3g}{unit}, point {plan.point_ids[rows[worst]]}"
+        f"largest semi-axis of an ellipse: {axes_of[worst, 0]:.3g}{unit}, point {plan.point_ids[rows[worst]]}"
     )
     bar = round_length(0.12 * extent / scale)
     return [
@@ -318,11 +318,11 @@ def _vectors(
     places, moved = plan.points[rows][:, pair], scale * np.nan_to_num(across)
     if (long := np.hypot(*moved.T) > 0).any():
         label = "difference in plan"
-        marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label, layer=6.0))
+        marks.append(Arrows(places[long], moved[long], VERMILION, 0.0035, label=label, layer=6.0))
     if (high := np.isfinite(out) & (out != 0)).any():
         tops = places[high] + np.column_stack([np.zeros(high.sum()), scale * out[high]])
         label = "difference in height, + upwards"
-        marks.append(Segments(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label, layer=5.5))
+        marks.append(Segments(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label=label, layer=5.5))
     unit = f" {plan.unit}" if plan.unit else ""
     bar = round_length(0.12 * extent / scale)
     what = f"differences of control and check points, adjusted less given (× {scale:,g})"

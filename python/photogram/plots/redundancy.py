@@ -11,12 +11,12 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
 from photogram.plots.network import thinned, view_of_plan
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where
 from photogram.plots.picture_data import Images, Pictured, pictured
 from photogram.plots.residuals import frame
+from photogram.show.axes import Where
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.marks import Mark, Markers, Mesh, Shades
+from photogram.show.sketch.on_axes import on_axes
 
 SINGLE = 600
 """Image points that are drawn one by one at most."""
@@ -67,8 +67,8 @@ def redundancy_sketch(result: object) -> Sketch:
     values = images.redundancy.mean(axis=1)
     if not np.isfinite(values).any():
         raise InputError("there are no redundancy numbers: adjust with covariance=True")
-    found = [_over_frame(images, values), _over_network(drawn, values)]
-    return Sketch(10.5, 4.9, found, 2, SHADES)
+    network = replace(_over_network(drawn, values), shades=SHADES)
+    return Sketch(10.5, 4.9, [_over_frame(images, values), network], 2)
 
 
 def _over_frame(images: Images, values: Floats) -> Panel:

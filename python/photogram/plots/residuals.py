@@ -9,12 +9,12 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where
 from photogram.plots.picture_data import Images, pictured
+from photogram.show.axes import Where
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
 from photogram.show.sketch.marks import Arrows, Mark, Markers
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import FAINT, INK, MARKED
 
 SINGLE = 900

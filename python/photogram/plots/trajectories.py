@@ -6,13 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.plots.panels import Where, handed_out, panels
-from photogram.show.style import INK
+from photogram.lazy_dataclasses import replace
+from photogram.show.axes import Where
+from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.marks import Band, Line, Mark, Segments, error_bars
+from photogram.show.sketch.on_axes import on_axes
+from photogram.show.style import BLUE, GREEN, INK, VERMILION
 
 TIMES = 160
 """At which corrections and their bands are computed."""
-COLOURS = ("#0072b2", "#d55e00", "#009e73")
+COLOURS = (BLUE, VERMILION, GREEN)
+TALL = 0.03
+"""Marks of the times of observations, of the height of a panel."""
 
 
 def trajectory(result: Any, ax: Where = None, *, name: str | None = None) -> Any:
@@ -58,15 +65,24 @@ def trajectory(result: Any, ax: Where = None, *, name: str | None = None) -> Any
         if each.moment is not None and each.moment.trajectory is own.given
     ]
     unit = result.block.linear_unit
-    with panels(ax, 1, 2, 9.0, 3.4) as axes:
-        for part, (axis, head) in enumerate(zip(axes, (f"position, {unit}", "rotation, rad"), strict=True)):
-            for k, colour in enumerate(COLOURS):
-                value, own_sd = corrections[part][:, k], sd[:, 3 * part + k]
-                axis.fill_between(times, value - own_sd, value + own_sd, color=colour, alpha=0.2, linewidth=0)
-                axis.plot(times, value, color=colour, linewidth=1.2, label="xyz"[k])
-            low = axis.get_ylim()[0]
-            axis.plot(records, np.full(len(records), low), "|", color=INK, markersize=5, clip_on=False)
-            axis.set(xlabel="time, s", ylabel=head)
-        axes[0].legend(loc="best", frameon=False, ncols=3)
-        axes[0].set_title(name, loc="left", fontsize=10)
-    return handed_out(axes)
+    heads = f"position, {unit}", "rotation, rad"
+    panels = [
+        _panel(times, corrections[part], sd[:, 3 * part : 3 * part + 3], records, head)
+        for part, head in enumerate(heads)
+    ]
+    panels[0] = replace(panels[0], title=name, legend="best")
+    return on_axes(Sketch(9.0, 3.4, panels, 2), ax)
+
+
+def _panel(times: Floats, values: Floats, sd: Floats, records: list[float], head: str) -> Panel:
+    """Return (t, 3) corrections with their bands, and the times of observations."""
+    low, high = spread(values - sd, values + sd)
+    marks = list[Mark]()
+    for k, colour in enumerate(COLOURS):
+        own, band = values[:, k], sd[:, k]
+        marks.append(Band(times, own - band, own + band, colour, 0.2))
+        marks.append(Line(np.column_stack([times, own]), colour, 1.2, label="xyz"[k]))
+    if records:
+        feet = np.column_stack([records, np.full(len(records), low)])
+        marks.append(Segments(error_bars(feet, feet[:, 1], feet[:, 1] + TALL * (high - low)), INK, 1.0))
+    return Panel(np.column_stack([spread(times), (low, high)]), marks, "", "time, s", head)

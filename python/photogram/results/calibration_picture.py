@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram.plots.distortion import side_by_side
-from photogram.plots.on_axes import on_axes
-from photogram.plots.panels import Where, panels, placed
+from photogram.plots.placed import placed
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.picture_data import curves_of
 from photogram.results.result import Result
-from photogram.show.pictures import arrows, round_length
-from photogram.show.sketch.declared import Sketch
+from photogram.show.axes import Where
+from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, Sketch, around
+from photogram.show.sketch.marks import Arrows, Ellipses, ellipse_axes
 from photogram.show.style import BLUE, INK
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def draw_distortion(
     curve = distortion_curve(result, camera)
     if curve is None:
         raise ValueError(f"{camera.name} has no radial distortion to draw")
-    return placed(partial(_distortion, camera, curve), path, ax)
+    return np.atleast_1d(placed(_distortion(camera, curve), path, ax))
 
 
 def draw_lens_field(
@@ -79,39 +79,30 @@ def draw_lens_field(
     field = lens_field(result, camera)
     if field is None:
         raise ValueError(f"{camera.name} has no terms beside the radial ones to draw")
-    return placed(partial(_lens_field, camera, field), path, ax)
-
-
-def _lens_field(camera: AdjustedCamera, field: LensField, ax: Where) -> Axes:
-    from matplotlib.patches import Ellipse  # takes long to import
-
-    unit = str(camera.camera.unit)
-    factor, written = (1000.0, "µm") if unit == "mm" else (1.0, "px")
-    with panels(ax, 1, 1, 7.0, 6.0) as [axes]:
-        longest = float(np.hypot(*field.vectors.T).max())
-        spacing = float(np.ptp(field.positions[:, 0])) / 8
-        scale = round_length(longest) / spacing if longest > 0 else 1.0
-        arrows(axes, field.positions, field.vectors, scale, color=INK, width=0.003)
-        for end, covariance in zip(
-            field.positions + field.vectors / scale, field.covariances / scale**2, strict=True
-        ):
-            variances, axis = np.linalg.eigh(covariance)
-            width, height = 2 * np.sqrt(np.maximum(variances, 0.0))
-            angle = np.degrees(np.arctan2(axis[1, 0], axis[0, 0]))
-            axes.add_patch(
-                Ellipse(tuple(end), width, height, angle=angle, alpha=0.4, linewidth=0, color=BLUE)
-            )
-        axes.set_aspect("equal")
-        axes.set_title(
-            f"{', '.join(field.names)} of {camera.name}: a width of the grid is"
-            f" {factor * scale * spacing:.3g} {written}"
-        )
-        axes.set_xlabel(f"x, {unit}")
-        axes.set_ylabel(f"y, {unit}")
+    axes: Axes = placed(_lens_field(camera, field), path, ax)
     return axes
 
 
-def _distortion(camera: AdjustedCamera, curve: DistortionCurve, ax: Where) -> NDArray[Any]:
-    curves = curves_of(camera, curve)
-    sketch = Sketch(6.4, 7.5, side_by_side([curves]), shared=True)
-    return np.atleast_1d(on_axes(sketch, ax))
+def _lens_field(camera: AdjustedCamera, field: LensField) -> Sketch:
+    unit = str(camera.camera.unit)
+    factor, written = (1000.0, "µm") if unit == "mm" else (1.0, "px")
+    longest = float(np.hypot(*field.vectors.T).max())
+    spacing = float(np.ptp(field.positions[:, 0])) / 8
+    scale = round_length(longest) / spacing if longest > 0 else 1.0
+    ends = field.positions + field.vectors / scale
+    semi_axes, angles = ellipse_axes(field.covariances / scale**2)
+    marks = [
+        Ellipses(ends, semi_axes, angles, BLUE, 0.0, 0.4, layer=1.0),
+        Arrows(field.positions, field.vectors / scale, INK, 0.003),
+    ]
+    reach = float(semi_axes.max(initial=0.0))
+    limits = around(np.vstack([field.positions, ends - reach, ends + reach]), 0.05)
+    title = (
+        f"{', '.join(field.names)} of {camera.name}: a width of the grid is"
+        f" {factor * scale * spacing:.3g} {written}"
+    )
+    return Sketch(7.0, 6.0, [Panel(limits, marks, title, f"x, {unit}", f"y, {unit}", equal=True)])
+
+
+def _distortion(camera: AdjustedCamera, curve: DistortionCurve) -> Sketch:
+    return Sketch(6.4, 7.5, side_by_side([curves_of(camera, curve)]), shared=True)

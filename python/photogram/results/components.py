@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from photogram.plots.panels import Where
+    from photogram.show.axes import Where
 
 __all__ = ["VarianceComponents", "component_lines", "component_sections", "statement", "statement_lines"]
 

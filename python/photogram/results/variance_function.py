@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -12,11 +11,15 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
-from photogram.plots.panels import Where, panels, placed
+from photogram.plots.placed import placed
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
+from photogram.show.axes import Where
 from photogram.show.methods import Shown, axes_of, columns_of, document_of, report_of
 from photogram.show.sections import composed, headline
+from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.marks import Line, Markers, Segments, error_bars
+from photogram.show.sketch.on_axes import on_axes
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.show.summary import Brief
 from photogram.statistics.variance_function import FunctionEstimate
@@ -199,22 +202,29 @@ def draw_variance_function(found: VarianceFunction, path: Path | None = None, ax
     InputError, ModuleNotFoundError
         As of :func:`photogram.results.components_picture.draw_components`.
     """
-    return placed(partial(_drawn, found), path, ax)
+    axes: Axes = placed(_sketch(found), path, ax)
+    return axes
 
 
 @axes_of.register(VarianceFunction)
 def _drawn(found: VarianceFunction, ax: Where = None) -> Axes:
-    with panels(ax, 1, 1, 6.4, 4.0) as [axes]:
-        x = np.array([each.value for each in found.bins])
-        y = np.array([each.factor for each in found.bins])
-        ends = np.array([each.interval for each in found.bins]).T
-        axes.errorbar(x, y, np.abs(ends - y), fmt="o", color=INK, capsize=3, label="residuals, 95 percent")
-        line = np.linspace(0.0, found.largest, 100)
-        axes.plot(line, [found.factor(value) for value in line], color=MARKED, label="function")
-        axes.axhline(1.0, color=FAINT, linewidth=0.8, label="given variance")
-        unit = f", {getattr(found.network, 'image_unit', 'px')}" if found.name == "radius" else ""
-        axes.set_xlabel(f"{found.name}{unit}")
-        axes.set_ylabel("factor of the given variance")
-        axes.set_ylim(bottom=0.0)
-        axes.legend()
+    axes: Axes = on_axes(_sketch(found), ax)
     return axes
+
+
+def _sketch(found: VarianceFunction) -> Sketch:
+    places = np.array([[each.value, each.factor] for each in found.bins])
+    low, high = np.array([each.interval for each in found.bins]).T
+    x = np.linspace(0.0, found.largest, 100)
+    curve = np.array([found.factor(value) for value in x.tolist()])
+    across = spread(x, places[:, 0])
+    marks = [
+        Segments(error_bars(places, low, high), INK, 1.5),
+        Markers(places, "o", 6.0, label="residuals, 95 percent"),
+        Line(np.column_stack([x, curve]), MARKED, label="function"),
+        Line(np.column_stack([across, [1.0, 1.0]]), FAINT, 0.8, label="given variance"),
+    ]
+    unit = f", {getattr(found.network, 'image_unit', 'px')}" if found.name == "radius" else ""
+    limits = np.column_stack([across, (0.0, spread(0.0, 1.0, curve, places[:, 1], high)[1])])
+    panel = Panel(limits, marks, "", f"{found.name}{unit}", "factor of the given variance", legend="best")
+    return Sketch(6.4, 4.0, [panel])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,16 +12,15 @@ from photogram.show.cells import page_table, unit_written
 from photogram.show.judgement import judged, tests_section
 from photogram.show.lines import Field, field, table_lines
 from photogram.show.page import Drawing, Fact, Page, Part, Section, Table, decimals_of
-from photogram.show.pictures import new_figure
 from photogram.show.quantity import Axis, Quantity, component, members, of_each, records
 from photogram.show.quantity import Table as Quantities
-from photogram.show.style import FAINT, INK, MARKED, in_style
+from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.marks import Level, Line, Mark, Markers, Segments, error_bars
+from photogram.show.style import FAINT, INK, MARKED
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from photogram.arguments.types import Floats
-    from photogram.statistics.history import History
+    from photogram.statistics.history import History, Series
     from photogram.statistics.verdict import Verdict
 
 ACROSS = 3
@@ -115,12 +115,7 @@ def history_page(
 def charts_section(histories: Mapping[str, History]) -> Section:
     """Return the control charts of some things, by their names, as a section of a page."""
     charts: list[Part] = [
-        Drawing(
-            f"charts-{k}",
-            name,
-            "",
-            lambda own=own, name=name: control_charts(own, name[:1].upper() + name[1:]),  # type: ignore[misc]
-        )
+        Drawing(f"charts-{k}", name, "", partial(control_charts, own, name[:1].upper() + name[1:]))
         for k, (name, own) in enumerate(histories.items())
     ]
     return Section("charts", "Control charts", charts, _CHARTS)
@@ -156,36 +151,37 @@ def _deviations(history: History) -> Floats:
     return np.array([each.sd for each in history.series]).T
 
 
-@in_style
-def control_charts(history: History, title: str) -> Figure:
-    """Draw every quantity over time: values with their standard deviations, mean, limits, what changed.
+def control_charts(history: History, title: str) -> Sketch:
+    """Return every quantity over time: values with their standard deviations, mean, limits, what changed.
 
     Dashed lines are where |t| of a value against the others reaches the limit of all tests. Marked is what is
-    beyond. Needs matplotlib (`pip install 'photogram[plots]'`).
+    beyond.
     """
-    count = len(history.series)
-    across = min(ACROSS, count)
-    figure = new_figure(3.6 * across, 2.2 * -(-count // across) + 0.5)
-    panels = figure.subplots(-(-count // across), across, squeeze=False, sharex=True).ravel().tolist()
-    for panel in panels[count:]:
-        panel.set_visible(False)
-    t = history.times
-    for panel, own in zip(panels, history.series, strict=False):
-        panel.errorbar(t, own.values, own.sd, fmt="o", color=INK, markersize=3.5, linewidth=1.0)
-        expected = own.values - own.off
-        for sign in (-1, 1):
-            panel.plot(t, expected + sign * history.limit * own.off_sd, "--", color=FAINT, linewidth=0.8)
-        panel.axhline(own.mean, color=FAINT, linewidth=0.8)
-        if own.changes:
-            panel.plot(t, own.model, color=MARKED, linewidth=1.2)
-        else:
-            beyond = abs(own.off) > history.limit * own.off_sd
-            panel.plot(t[beyond], own.values[beyond], "o", color=MARKED, markersize=6, fillstyle="none")
-        panel.set_title(own.name, fontsize=9)
-        panel.set_ylabel(unit_written(own.unit))
-        panel.ticklabel_format(useOffset=False)
-    figure.suptitle(title, fontsize=11)
-    return figure
+    across = min(ACROSS, len(history.series))
+    rows = -(-len(history.series) // across)
+    panels = [_chart(history, own) for own in history.series]
+    return Sketch(3.6 * across, 2.2 * rows + 0.5, panels, across, shared=True, title=title)
+
+
+def _chart(history: History, own: Series) -> Panel:
+    t, beyond = history.times, abs(own.off) > history.limit * own.off_sd
+    places, expected, room = (
+        np.column_stack([t, own.values]),
+        own.values - own.off,
+        history.limit * own.off_sd,
+    )
+    marks: list[Mark] = [
+        Segments(error_bars(places, own.values - own.sd, own.values + own.sd), INK, 1.0),
+        Markers(places, "o", 3.5),
+        *(Line(np.column_stack([t, expected + sign * room]), FAINT, 0.8, "--") for sign in (-1, 1)),
+        Level(own.mean, FAINT, 0.8),
+    ]
+    if own.changes:
+        marks.append(Line(np.column_stack([t, own.model]), MARKED, 1.2))
+    else:
+        marks.append(Markers(places[beyond], "o", 6.0, MARKED, "none"))
+    up = spread(own.values - own.sd, own.values + own.sd, expected - room, expected + room)
+    return Panel(np.column_stack([spread(t), up]), marks, own.name, "", unit_written(own.unit))
 
 
 def history_document(history: History) -> dict[str, object]:

@@ -1,18 +1,13 @@
-"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`.
-
-Pictures of few things stand in it as vectors, those of many as dots.
-"""
+"""A page as one HTML file that needs nothing else; what makes it is the extra `photogram[report]`."""
 
 from __future__ import annotations
 
-import base64
-import io
 import math
 import re
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photogram import _photocore
 from photogram.show.page import Cell, Column, Drawing, Layers, Page, Part, Picture, Section, Table
@@ -28,7 +23,7 @@ LONG = 16
 def page_html(page: Page) -> bytes:
     """Return a page as an HTML file (UTF-8) that needs no network and no other file.
 
-    It takes jinja2, and matplotlib for drawings that are no sketches (`pip install 'photogram[report]'`).
+    It takes jinja2 (`pip install 'photogram[report]'`).
     """
     environment = _environment()
     sections = [drawn for section in page.sections if (drawn := _drawn(section)).parts]
@@ -129,69 +124,10 @@ def _drawn(section: Section) -> Section:
     return replace(section, parts=parts)
 
 
-LARGEST = 600_000
-"""Bytes of a picture of vectors at most: one that has more after all becomes dots."""
-DPI = 170
-"""Dots an inch of the others: sharp on paper and on fine screens."""
-
-
 def inlined(drawing: Drawing) -> Picture | None:
-    """Draw a picture; None where it has nothing to show.
+    """Draw a picture; None where it has nothing to show."""
+    from photogram.show.sketch.svg import svg_of
 
-    One that is no sketch needs matplotlib, of `photogram[report]`.
-    """
-    if drawing.sketch is None:
-        markup = _of_figure(drawing)
-    else:
-        from photogram.show.sketch.svg import svg_of
-
-        sketch = drawing.sketch()
-        markup = svg_of(sketch, drawing.name, drawing.title) if sketch is not None else ""
+    sketch = drawing.sketch()
+    markup = svg_of(sketch, drawing.name, drawing.title) if sketch is not None else ""
     return Picture(drawing.name, drawing.title, drawing.caption, markup) if markup else None
-
-
-def _of_figure(drawing: Drawing) -> str:
-    """Return a figure of matplotlib as an element of a page; nothing where it has nothing to show."""
-    from photogram.show.style import styled
-
-    # Ticks are made when a figure is saved; identifiers are the same in every run.
-    with styled({"svg.hashsalt": drawing.name}):
-        from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-        figure = drawing.draw()
-        if figure is None:
-            return ""
-        width, height = figure.get_size_inches()
-        content = io.StringIO()
-        canvas: Any = FigureCanvasSVG(figure)  # without types; savefig would draw all of it twice
-        canvas.print_svg(content, metadata={"Date": None, "Creator": None})
-        markup = _embedded(content.getvalue(), drawing, width)
-        if len(markup) > LARGEST:
-            dots = io.BytesIO()
-            figure.savefig(dots, format="png", dpi=DPI, metadata={"Software": None})
-            data = base64.b64encode(dots.getvalue()).decode()
-            markup = (
-                f'<img src="data:image/png;base64,{data}" alt="{_quoted(drawing.title)}"'
-                f' width="{96 * width:.0f}" height="{96 * height:.0f}">'
-            )
-    return markup
-
-
-def _embedded(text: str, drawing: Drawing, width: float) -> str:
-    """Return an SVG file as an element of a page: without prologue, with identifiers of its own."""
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
-    head, body = text.split(">", 1)
-    [box] = re.findall(r'viewBox="[^"]*"', head)
-    prefix = f"{drawing.name}-"
-    body = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}\1"', body)
-    body = re.sub(r'((?:xlink:)?href=")#', rf"\1#{prefix}", body)
-    body = re.sub(r"url\(#", f"url(#{prefix}", body)
-    label = f'role="img" aria-label="{_quoted(drawing.title)}"'
-    return f'<svg {box} {label} xmlns:xlink="http://www.w3.org/1999/xlink" width="{96 * width:.0f}">{body}'
-
-
-def _quoted(text: str) -> str:
-    from markupsafe import escape
-
-    return str(escape(text))

@@ -136,7 +136,7 @@ class Paged:
     def to_html(self) -> bytes:
         """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
 
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        Needs jinja2 (`pip install 'photogram[report]'`).
         """
         from photogram.show.html import page_html
         from photogram.show.run import reproducibility

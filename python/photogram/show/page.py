@@ -157,18 +157,22 @@ class Drawing:
         Unique on the page; parts of the picture are named after it.
     title, caption
         A word for switching, and what is to be seen.
-    draw
-        Makes the matplotlib figure; None where there is nothing to draw.
     sketch
-        Declares the picture, which pages then draw without matplotlib; None: only `draw` knows it.
+        Declares the picture; None where there is nothing to draw.
     """
 
     name: str
     title: str
     caption: str
-    draw: Callable[[], Figure | None]
-    sketch: Callable[[], Sketch | None] | None = None
+    sketch: Callable[[], Sketch | None]
     kind: str = field(default="drawing", init=False)
+
+    def draw(self) -> Figure | None:
+        """Return the picture as a figure of matplotlib; None where there is nothing to draw."""
+        from photogram.show.sketch.on_axes import figure
+
+        sketch = self.sketch()
+        return None if sketch is None else figure(sketch)
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.show.style import need_matplotlib, styled
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.quiver import Quiver
 
 DPI = 120
 """Dots an inch of pictures that are made of dots."""
@@ -63,28 +58,6 @@ def files(figures: Mapping[str, Figure], folder: Path, ending: str) -> dict[Path
     """Return figures as files of a folder, in the format of their common ending (`png`, `pdf`, `svg`)."""
     places = {folder / f"{name}.{ending}": figure for name, figure in figures.items()}
     return {place: drawn(figure, place) for place, figure in places.items()}
-
-
-def arrows(axes: Axes, places: Floats, vectors: Floats, scale: float = 1.0, **style: Any) -> Quiver:
-    """Draw vectors from places, `scale` units of the vectors for one of the axes; the limits make room."""
-    ends = places + vectors / scale
-    drawn = axes.quiver(*places.T, *vectors.T, angles="xy", scale_units="xy", scale=scale, **style)
-    # Quiver does not count its heads when limits are set.
-    axes.update_datalim(ends)
-    axes.autoscale_view()
-    return drawn
-
-
-def ellipses(axes: Axes, places: Floats, covariances: Floats, scale: float = 1.0, **style: Any) -> None:
-    """Draw standard ellipses (39 percent) of (n, 2, 2) covariances about (n, 2) places, magnified."""
-    around = np.linspace(0.0, math.tau, 73)
-    circle = np.stack([np.cos(around), np.sin(around)])
-    variances, turned = np.linalg.eigh(covariances)
-    for place, variance, turn in zip(places, variances, turned, strict=True):
-        outline = place[:, np.newaxis] + scale * turn @ (
-            np.sqrt(np.maximum(variance, 0.0))[:, np.newaxis] * circle
-        )
-        axes.plot(*outline, **style)
 
 
 def decimal_sign(figure: Figure, sign: str) -> None:

@@ -6,16 +6,12 @@ The colours of kinds are those of Okabe and Ito (2008, "Color Universal Design")
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from functools import wraps
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
-
-P = ParamSpec("P")
-T = TypeVar("T")
 
 BLUE = "#0072b2"
 VERMILION = "#d55e00"
@@ -76,17 +72,6 @@ def styled(further: Mapping[str, Any] | None = None) -> AbstractContextManager[N
 
     settings: Any = {**SETTINGS, **(further or {})}
     return mpl.rc_context(settings)
-
-
-def in_style(draws: Callable[P, T]) -> Callable[P, T]:
-    """Give a function that draws the style of the house while it does."""
-
-    @wraps(draws)
-    def with_style(*args: P.args, **options: P.kwargs) -> T:
-        with styled():
-            return draws(*args, **options)
-
-    return with_style
 
 
 def signed() -> Colormap:

@@ -1,44 +1,43 @@
-"""What the pictures of plates and of digital exposures have alike (extra `plots`)."""
+"""What the pictures of plates and of digital exposures have alike."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.pictures import arrows, new_figure
+from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, spread
+from photogram.show.sketch.marks import Arrows, Band, Line, Mark, Polygons, boxes
 from photogram.show.style import COLOURS, INK, MARKED, SKY
 from photogram.stellar.curves import histogram
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _LENGTH = 0.05
 """Length of a residual of the mean size, of the extent of the picture."""
 
 
-def panels(width: float, height: float, columns: int = 1) -> tuple[Figure, Any]:
-    """Return a figure (inches) with its axes, one beside the other."""
-    figure = new_figure(width, height)
-    return figure, figure.subplots(1, columns)
+def band(x: Floats, y: Floats, error: Floats, colour: str, label: str) -> list[Mark]:
+    """Return a curve with its mean error."""
+    return [Band(x, y - error, y + error, colour, 0.2), Line(np.column_stack([x, y]), colour, label=label)]
 
 
-def band(axes: Any, x: Floats, y: Floats, error: Floats, colour: str, label: str) -> None:
-    """Draw a curve with its mean error."""
-    axes.plot(x, y, color=colour, label=label)
-    axes.fill_between(x, y - error, y + error, color=colour, alpha=0.2, linewidth=0)
+def curves(marks: Sequence[Mark], across: str, up: str, title: str = "", legend: str = "best") -> Panel:
+    """Return a panel with room for all lines and bands on it."""
+    lines = [mark.places for mark in marks if isinstance(mark, Line)]
+    x, y = np.concatenate(lines).T
+    bands = [each for mark in marks if isinstance(mark, Band) for each in (mark.low, mark.high)]
+    limits = np.column_stack([spread(x), spread(y, *bands)])
+    return Panel(limits, marks, title, across, up, legend=legend)
 
 
 def vectors(
-    figure: Figure, axes: Any, places: Floats, residuals: Floats, groups: list[tuple[str, Any]], unit: str
-) -> None:
-    """Draw residual vectors and their scale.
+    places: Floats, residuals: Floats, groups: list[tuple[str, Any]], unit: str
+) -> tuple[list[Arrows], ScaleBar]:
+    """Return residual vectors, and their scale.
 
     Parameters
     ----------
-    figure, axes
-        Where to.
     places, residuals
         (m, 2) in the unit of the axes, and in `unit`.
     groups
@@ -48,24 +47,29 @@ def vectors(
     """
     extent = float(np.ptp(places, axis=0).max()) or 1.0
     size = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) or 1.0
-    scale = size / (_LENGTH * extent)
-    for k, (label, chosen) in enumerate(groups):
-        style = {"color": COLOURS[k % len(COLOURS)], "width": 0.0022, "label": label}
-        arrows(axes, places[chosen], residuals[chosen], scale, **style)
+    scale = _LENGTH * extent / size
+    marks = [
+        Arrows(places[chosen], scale * residuals[chosen], COLOURS[k % len(COLOURS)], 0.0022, label=label)
+        for k, (label, chosen) in enumerate(groups)
+    ]
     bar = float(f"{2 * size:.0e}")
-    axes.margins(0.08)
-    axes.autoscale_view()
-    key = axes.quiver([], [], [], [], angles="xy", scale_units="xy", scale=scale, width=0.0035, color=INK)
-    axes.quiverkey(key, 0.86, 1.02, bar, f"{bar:g} {unit}", labelpos="E", coordinates="axes")
-    figure.legend(loc="outside lower center", ncols=6)
+    return marks, (scale * bar, INK, f"{bar:g} {unit}")
 
 
-def bell(axes: Any, values: Floats, title: str, unit: str) -> None:
-    """Draw the histogram of residuals with the normal curve."""
+def bells(every: dict[str, Floats], unit: str) -> Sketch:
+    """Return histograms of residuals with their normal curves, by names of the residuals."""
+    panels = [_bell(values, f"residuals in {name}", unit) for name, values in every.items()]
+    return Sketch(11.0, 3.8, panels, len(panels))
+
+
+def _bell(values: Floats, title: str, unit: str) -> Panel:
     found = histogram(values)
-    middle, width = 0.5 * (found.edges[1:] + found.edges[:-1]), np.diff(found.edges)
-    axes.bar(middle, found.counts, width=width, color=SKY, alpha=0.6, edgecolor="white")
-    curve = np.linspace(found.edges[0], found.edges[-1], 200)
-    density = np.exp(-0.5 * ((curve - found.mean) / found.sd) ** 2) / (found.sd * np.sqrt(2 * np.pi))
-    axes.plot(curve, len(values) * width[0] * density, color=MARKED)
-    axes.set(title=f"{title}: sd {found.sd:.3g} {unit}", xlabel=unit, ylabel="number")
+    edges, counts = found.edges, np.asarray(found.counts, float)
+    bars = boxes(np.column_stack([edges[:-1], 0 * counts]), np.column_stack([edges[1:], counts]))
+    x = np.linspace(edges[0], edges[-1], 200)
+    density = np.exp(-0.5 * ((x - found.mean) / found.sd) ** 2) / (found.sd * np.sqrt(2 * np.pi))
+    curve = len(values) * (edges[1] - edges[0]) * density
+    marks = [Polygons(bars, SKY, 0.6, "white", 1.0, 1.0), Line(np.column_stack([x, curve]), MARKED)]
+    (left, right), (_, top) = spread(edges), spread(0.0, counts, curve)
+    limits = np.array([[left, 0.0], [right, top]])
+    return Panel(limits, marks, f"{title}: sd {found.sd:.3g} {unit}", unit, "number")

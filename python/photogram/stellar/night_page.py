@@ -25,7 +25,7 @@ from photogram.show.page import (
     significant,
 )
 from photogram.show.quantity import chosen
-from photogram.stellar.night_plots import figures
+from photogram.stellar.night_plots import sketches
 from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.night_tables import (
     attitudes,
@@ -50,7 +50,7 @@ def night_page(result: CalibratedNight) -> Page:
     much, good = facts(result)
     sections = [
         Section(
-            "pictures", "Stars and residuals", [Layers("picture-layers", plate_pictures(figures(result)))]
+            "pictures", "Stars and residuals", [Layers("picture-layers", plate_pictures(sketches(result)))]
         ),
         Section("size", "How much, how good", [Facts("How much", much), Facts("How good", good)]),
         Section("camera", "Camera", _camera(result)),

@@ -1,44 +1,46 @@
-"""Pictures of a calibrated night (extra `plots`): stars, residuals, histogram, distortion."""
+"""Pictures of a calibrated night: stars, residuals, histogram, distortion."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from photogram.show.style import COLOURS, FAINT, INK, in_style
-from photogram.stellar.drawing import band, bell, panels, vectors
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from photogram.stellar.night_result import CalibratedNight
+from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, around
+from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers
+from photogram.show.style import COLOURS, FAINT
+from photogram.stellar.drawing import band, bells, curves, vectors
+from photogram.stellar.night_result import CalibratedNight
 
 _NAMED = len(COLOURS)
 """Exposures that have a colour of their own; more are drawn alike."""
 
 
-@in_style
-def figures(result: CalibratedNight) -> dict[str, Figure]:
+def sketches(result: CalibratedNight) -> dict[str, Sketch]:
     """Return all pictures by name."""
+    x, y = result.calibration.residuals.T
     return {
         "stars": _stars(result),
         "residuals": _residuals(result),
-        "histogram": _histogram(result),
-        "distortion": _distortion(result),
+        "histogram": bells({"x": x, "y": y, "x and y": np.concatenate([x, y])}, "px"),
+        "distortion": _of_brown(result) if result.camera.lens == "brown" else _of_angle(result),
     }
 
 
-def _frame(result: CalibratedNight, title: str) -> tuple[Figure, Any]:
-    """Draw the frame as the picture is seen: y downward."""
+def _frame(
+    result: CalibratedNight, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()
+) -> Sketch:
+    """Return marks on the frame as the picture is seen: y downward."""
     width, height = result.night.frame
-    figure, axes = panels(7.5, 1.8 + 6.5 * height / width)
-    axes.set(xlabel="x, px", ylabel="y, px", aspect="equal")
-    axes.set_title(title)
-    axes.plot([0, width, width, 0, 0], [0, 0, height, height, 0], color=FAINT, linewidth=0.8)
-    axes.plot(*result.camera.values[2:4], marker="+", color=INK, markersize=12)
-    return figure, axes
+    outline = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]], float)
+    ends = [each.places + each.vectors for each in marks if isinstance(each, Arrows)]
+    (left, top), (right, low) = around(np.vstack([outline, *ends]), 0.05)
+    every = [Line(outline, FAINT, 0.8), Markers(result.camera.values[None, 2:4], "+", 12.0), *marks]
+    limits = np.array([[left, low], [right, top]])
+    panel = Panel(limits, every, title, "x, px", "y, px", equal=True, legend="beside", bars=bars)
+    return Sketch(8.7, 1.8 + 6.5 * height / width, [panel])
 
 
 def _groups(result: CalibratedNight) -> list[tuple[str, Any]]:
@@ -48,41 +50,28 @@ def _groups(result: CalibratedNight) -> list[tuple[str, Any]]:
     return [(f"exposure {name}", of == k) for k, name in enumerate(result.names)]
 
 
-def _stars(result: CalibratedNight) -> Figure:
-    figure, axes = _frame(result, "Stars in the frame, and the principal point")
-    for k, (label, chosen) in enumerate(_groups(result)):
-        places = result.calibration.xy[chosen].T
-        text = f"{label} ({int(chosen.sum())})"
-        axes.scatter(*places, marker="*", s=20, color=COLOURS[k], label=text, linewidths=0)
-    axes.invert_yaxis()
-    figure.legend(loc="outside lower center", ncols=3)
-    return figure
+def _stars(result: CalibratedNight) -> Sketch:
+    marks: list[Mark] = [
+        Markers(
+            result.calibration.xy[chosen],
+            "*",
+            4.5,
+            COLOURS[k],
+            edge=0.0,
+            label=f"{label} ({int(chosen.sum())})",
+        )
+        for k, (label, chosen) in enumerate(_groups(result))
+    ]
+    return _frame(result, "Stars in the frame, and the principal point", marks)
 
 
-def _residuals(result: CalibratedNight) -> Figure:
-    figure, axes = _frame(result, "Residuals (measured minus computed)")
+def _residuals(result: CalibratedNight) -> Sketch:
     found = result.calibration
-    vectors(figure, axes, found.xy, found.residuals, _groups(result), "px")
-    axes.invert_yaxis()
-    return figure
+    arrows, bar = vectors(found.xy, found.residuals, _groups(result), "px")
+    return _frame(result, "Residuals (measured minus computed)", arrows, [bar])
 
 
-def _histogram(result: CalibratedNight) -> Figure:
-    figure, every = panels(11.0, 3.8, 3)
-    x, y = result.calibration.residuals.T
-    for axes, (name, values) in zip(
-        every, {"x": x, "y": y, "x and y": np.concatenate([x, y])}.items(), strict=True
-    ):
-        bell(axes, values, f"residuals in {name}", "px")
-    return figure
-
-
-def _distortion(result: CalibratedNight) -> Figure:
-    """Draw what the terms of the lens do."""
-    return _of_brown(result) if result.camera.lens == "brown" else _of_angle(result)
-
-
-def _of_angle(result: CalibratedNight) -> Figure:
+def _of_angle(result: CalibratedNight) -> Sketch:
     """Draw the distance from the principal point over the angle, and what the terms change in it."""
     camera, frame = result.camera, result.night.frame
     theta = np.linspace(0, min(camera.largest_angle(frame), np.radians(110)), 200)
@@ -91,18 +80,17 @@ def _of_angle(result: CalibratedNight) -> Figure:
     seen, straight = (each.images(along)[:, 0] - camera.values[2] for each in (camera, free))
     partials = camera.partials(along)[:, 0, 4:]
     variance = np.einsum("ni,ij,nj->n", partials, camera.covariance[4:, 4:], partials)
-    figure, (axes, errors) = panels(11.0, 4.4, 2)
-    axes.plot(np.degrees(theta), seen, color=COLOURS[0], label=camera.lens)
-    band(errors, np.degrees(theta), seen - straight, np.sqrt(np.maximum(variance, 0)), COLOURS[0], "terms")
-    axes.set(ylabel="distance from the principal point, px")
-    errors.set(ylabel="change by the terms of the lens, px")
-    for panel in (axes, errors):
-        panel.set_xlabel("angle from the axis, degrees")
-        panel.legend()
-    return figure
+    angle, across = np.degrees(theta), "angle from the axis, degrees"
+    line = Line(np.column_stack([angle, seen]), COLOURS[0], label=camera.lens)
+    terms = band(angle, seen - straight, np.sqrt(np.maximum(variance, 0)), COLOURS[0], "terms")
+    panels = [
+        curves([line], across, "distance from the principal point, px"),
+        curves(terms, across, "change by the terms of the lens, px"),
+    ]
+    return Sketch(11.0, 4.4, panels, 2)
 
 
-def _of_brown(result: CalibratedNight) -> Figure:
+def _of_brown(result: CalibratedNight) -> Sketch:
     """Draw radial distortion and the profile of the decentering one, to the corners of the frame."""
     camera = result.camera
     f = float(np.mean(camera.values[:2]))
@@ -115,20 +103,24 @@ def _of_brown(result: CalibratedNight) -> Figure:
     size = float(np.hypot(*p))
     along = p / size if size else np.array([1.0, 0.0])
     size_error = float(np.sqrt(along @ camera.covariance[7:9, 7:9] @ along))
-    figure, (axes, errors) = panels(11.0, 4.4, 2)
-    used = np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max()
-    for panel in (axes, errors):
-        panel.axvline(used, color=FAINT, linestyle=":", linewidth=1, label="outermost star")
-        panel.set_xlabel("distance from the principal point, px")
-    axes.axhline(0, color=FAINT, linewidth=0.8)
-    curves = (
+    found = (
         ("radial", radial @ camera.values[4:7], error),
         ("decentering", f * r**2 * size, f * r**2 * size_error),
     )
-    for colour, (label, value, own) in zip(COLOURS, curves, strict=False):
-        band(axes, f * r, value, own, colour, label)
-        errors.plot(f * r, own, color=colour, label=label)
-    axes.set(ylabel="px", title="Distortion, with its mean error")
-    errors.set(ylabel="px", title="Its mean error")
-    axes.legend()
-    return figure
+    distortion, errors = list[Mark](), list[Mark]()
+    for colour, (label, value, own) in zip(COLOURS, found, strict=False):
+        distortion += band(f * r, value, own, colour, label)
+        errors.append(Line(np.column_stack([f * r, own]), colour, label=label))
+    across = "distance from the principal point, px"
+    panels = [
+        curves([*distortion, Level(0.0, FAINT, 0.8)], across, "px", "Distortion, with its mean error"),
+        curves(errors, across, "px", "Its mean error"),
+    ]
+    used = float(np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max())
+    outermost = [replace(panel, marks=[_outermost(used, panel), *panel.marks]) for panel in panels]
+    return Sketch(11.0, 4.4, outermost, 2)
+
+
+def _outermost(used: float, panel: Panel) -> Line:
+    places = np.column_stack([np.full(2, used), panel.limits[:, 1]])
+    return Line(places, FAINT, 1.0, ":", label="outermost star")

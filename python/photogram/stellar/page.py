@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -25,11 +26,12 @@ from photogram.show.page import (
     fixed,
     significant,
 )
+from photogram.show.sketch.declared import Sketch
 from photogram.stellar import tables
 from photogram.stellar.curves import distortion_curves
 from photogram.stellar.outliers import studentized
 from photogram.stellar.parameters import GRAD, INDEX, NAMES, UNITS
-from photogram.stellar.plots import figures
+from photogram.stellar.plots import sketches
 from photogram.stellar.result import Ellipse, Result
 
 WORST = 25
@@ -41,7 +43,7 @@ def plate_page(result: Result) -> Page:
     """Return the report of a plate for the browser."""
     sections = [
         Section(
-            "pictures", "Stars and residuals", [Layers("picture-layers", plate_pictures(figures(result)))]
+            "pictures", "Stars and residuals", [Layers("picture-layers", plate_pictures(sketches(result)))]
         ),
         Section(
             "size", "How much, how good", [Facts("How much", _much(result)), Facts("How good", _good(result))]
@@ -71,11 +73,11 @@ _PARAMETERS = (
 )
 
 
-def plate_pictures(drawn: dict) -> list[Drawing]:  # type: ignore[type-arg]
+def plate_pictures(drawn: dict[str, Sketch]) -> list[Drawing]:
     """Return pictures by their names, as they stand on a page."""
     return [
-        Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", lambda figure=figure: figure)  # type: ignore[misc]
-        for name, figure in drawn.items()
+        Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", partial(drawn.get, name))
+        for name in drawn
     ]
 
 

@@ -1,30 +1,29 @@
-"""Pictures of a calibration (extra `plots`): stars, residuals, histogram, distortion, refraction."""
+"""Pictures of a calibration: stars, residuals, histogram, distortion, refraction."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.style import COLOURS, FAINT, in_style
+from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, around, spread
+from photogram.show.sketch.marks import Level, Line, Mark, Markers
+from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
-from photogram.stellar.drawing import band, bell, panels, vectors
+from photogram.stellar.drawing import band, bells, curves, vectors
 from photogram.stellar.parameters import GROUPS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from photogram.stellar.result import Result
+from photogram.stellar.result import Result
 
 
-@in_style
-def figures(result: Result) -> dict[str, Figure]:
+def sketches(result: Result) -> dict[str, Sketch]:
     """Return all pictures that the options ask for by name; stars and residuals always."""
     made = {"stars": _stars(result), "residuals": _residuals(result)}
     if result.problem.options.histogram:
-        made["histogram"] = _histogram(result)
+        every = {name: 1e6 * values for name, values in residual_classes(result).items()}
+        made["histogram"] = bells(every, "µm")
     if result.problem.options.curves:
         made["distortion"] = _distortion(result)
     if result.problem.options.refraction:
@@ -32,89 +31,84 @@ def figures(result: Result) -> dict[str, Figure]:
     return made
 
 
-def _plate(title: str) -> tuple[Figure, Any]:
-    figure, axes = panels(7.0, 6.6)
-    axes.set(xlabel="x, mm", ylabel="y, mm", aspect="equal")
-    axes.set_title(title)
-    axes.axhline(0, color=FAINT, linewidth=0.5, alpha=0.5, zorder=0)
-    axes.axvline(0, color=FAINT, linewidth=0.5, alpha=0.5, zorder=0)
-    return figure, axes
+def _plate(places: Floats, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()) -> Sketch:
+    """Return a plate with marks, and lines through its origin."""
+    limits = around(places)
+    lines = [
+        Line(np.where(axis, limits, 0.0), FAINT, 0.5, opacity=0.5, layer=0.0)
+        for axis in ([True, False], [False, True])
+    ]
+    panel = Panel(limits, [*lines, *marks], title, "x, mm", "y, mm", equal=True, legend="beside", bars=bars)
+    return Sketch(8.2, 6.6, [panel])
 
 
-def _stars(result: Result) -> Figure:
+def _stars(result: Result) -> Sketch:
     """Draw every star at its mean place on the plate."""
     problem = result.problem
-    figure, axes = _plate("Stars on the plate")
     count = np.bincount(problem.image_stars, minlength=len(problem.star_ids))
     sums = np.zeros((len(problem.star_ids), 2))
     np.add.at(sums, problem.image_stars, problem.image_xy)
     means = 1e3 * sums / np.maximum(count, 1)[:, None]
-    for known, marker, label in ((True, "*", "known"), (False, "o", "unknown")):
-        chosen = problem.known == known
-        if chosen.any():
-            style = {"color": COLOURS[0]} if known else {"facecolors": "none", "edgecolors": COLOURS[1]}
+    marks: list[Mark] = []
+    for known, shape, label in ((True, "*", "known"), (False, "o", "unknown")):
+        if (chosen := problem.known == known).any():
             text = f"{label} ({int(chosen.sum())})"
-            axes.scatter(*means[chosen].T, marker=marker, s=46, label=text, **style)
-    figure.legend(loc="outside lower center", ncols=2)
-    return figure
+            face = "" if known else "none"
+            marks.append(Markers(means[chosen], shape, 6.8, COLOURS[0 if known else 1], face, label=text))
+    return _plate(means, "Stars on the plate", marks)
 
 
-def _residuals(result: Result) -> Figure:
+def _residuals(result: Result) -> Sketch:
     problem = result.problem
-    figure, axes = _plate("Residuals (computed minus measured)")
     groups = [(name, problem.image_groups == group) for group, name in enumerate(GROUPS)]
     shown = [(name, chosen) for name, chosen in groups if chosen.any()]
-    vectors(figure, axes, 1e3 * problem.image_xy, 1e6 * result.solved.residuals, shown, "µm")
-    return figure
+    places = 1e3 * problem.image_xy
+    arrows, bar = vectors(places, 1e6 * result.solved.residuals, shown, "µm")
+    ends = [each.places + each.vectors for each in arrows]
+    return _plate(np.vstack([places, *ends]), "Residuals (computed minus measured)", arrows, [bar])
 
 
-def _histogram(result: Result) -> Figure:
-    figure, every = panels(11.0, 3.8, 3)
-    for axes, (name, values) in zip(every, residual_classes(result).items(), strict=True):
-        bell(axes, 1e6 * values, f"residuals in {name}", "µm")
-    return figure
-
-
-def _distortion(result: Result) -> Figure:
+def _distortion(result: Result) -> Sketch:
     # Finer than the table, so that the curves are smooth.
     problem = result.problem
     fine = replace(problem.options, interval=(problem.options.extent or 0.1) / 200)
-    curves = distortion_curves(replace(result, problem=replace(problem, options=fine)))
-    figure, axes = panels(7.5, 4.8)
-    d = 1e3 * curves.distance
-    band(axes, d, 1e6 * curves.radial, 1e6 * curves.radial_error, COLOURS[0], "radial")
-    band(axes, d, 1e6 * curves.transformed, 1e6 * curves.transformed_error, COLOURS[1], "radial, transformed")
-    band(axes, d, 1e6 * curves.decentering, 1e6 * curves.decentering_error, COLOURS[2], "decentering")
-    axes.axhline(0, color=FAINT, linewidth=0.8)
-    axes.set(
-        xlabel="distance from the centre of distortion, mm",
-        ylabel="distortion with its mean error, µm",
-        title=f"Distortion; calibrated principal distance {1e3 * curves.calibrated:.4f} mm",
+    found = distortion_curves(replace(result, problem=replace(problem, options=fine)))
+    d = 1e3 * found.distance
+    marks = [
+        Level(0.0, FAINT, 0.8),
+        *band(d, 1e6 * found.radial, 1e6 * found.radial_error, COLOURS[0], "radial"),
+        *band(d, 1e6 * found.transformed, 1e6 * found.transformed_error, COLOURS[1], "radial, transformed"),
+        *band(d, 1e6 * found.decentering, 1e6 * found.decentering_error, COLOURS[2], "decentering"),
+    ]
+    panel = curves(
+        marks,
+        "distance from the centre of distortion, mm",
+        "distortion with its mean error, µm",
+        f"Distortion; calibrated principal distance {1e3 * found.calibrated:.4f} mm",
     )
-    axes.legend()
-    return figure
+    return Sketch(7.5, 4.8, [panel])
 
 
-def _refraction(result: Result) -> Figure:
+def _refraction(result: Result) -> Sketch:
     """Draw one curve, for all attitudes look through the same air, and where each of them looks."""
-    figure, axes = panels(7.5, 4.8)
     groups = [group for group in range(3) if result.solved.free[3 * group]]
     every = {group: refraction_curves(result, group) for group in groups}
-    z = np.concatenate([curves.zenith_distance for curves in every.values()])
-    change = np.concatenate([curves.corrected - curves.given for curves in every.values()]) / ARCSEC
-    error = np.concatenate([curves.error for curves in every.values()]) / ARCSEC
+    z = np.concatenate([found.zenith_distance for found in every.values()])
+    change = np.concatenate([found.corrected - found.given for found in every.values()]) / ARCSEC
+    error = np.concatenate([found.error for found in every.values()]) / ARCSEC
     order = np.argsort(z)
-    band(axes, np.degrees(z[order]), change[order], error[order], COLOURS[3], "change and its mean error")
-    low, high = axes.get_ylim()
-    for k, (group, curves) in enumerate(every.items()):
-        ends = np.degrees(curves.zenith_distance[[0, -1]])
-        level = low - 0.06 * (k + 1) * (high - low)
-        axes.plot(ends, [level, level], color=COLOURS[group], linewidth=5, label=f"field of {GROUPS[group]}")
-    axes.axhline(0, color=FAINT, linewidth=0.8)
-    axes.set(
-        xlabel="observed zenith distance, degrees",
-        ylabel="corrected minus given refraction, arcsec",
-        title="Refraction",
+    marks = band(np.degrees(z[order]), change[order], error[order], COLOURS[3], "change and its mean error")
+    low, high = spread(change - error, change + error)
+    for k, (group, found) in enumerate(every.items()):
+        ends = np.degrees(found.zenith_distance[[0, -1]])
+        level = np.full(2, low - 0.06 * (k + 1) * (high - low))
+        line = np.column_stack([ends, level])
+        marks.append(Line(line, COLOURS[group], 5.0, label=f"field of {GROUPS[group]}"))
+    panel = curves(
+        [*marks, Level(0.0, FAINT, 0.8)],
+        "observed zenith distance, degrees",
+        "corrected minus given refraction, arcsec",
+        "Refraction",
+        "upper left",
     )
-    axes.legend(loc="upper left")
-    return figure
+    return Sketch(7.5, 4.8, [panel])

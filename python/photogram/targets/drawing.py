@@ -1,35 +1,32 @@
-"""Pictures of what calibrations are worth (needs `pip install 'photogram[plots]'`)."""
+"""Pictures of what calibrations are worth; to draw them needs `pip install 'photogram[plots]'`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
-from photogram.lazy_dataclasses import dataclass
-from photogram.plots.panels import Where, handed_out, note, panels, placed
-from photogram.show.pictures import arrows, round_length
-from photogram.show.style import BLUE, INK, ORDERED, VERMILION
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.plots.placed import placed
+from photogram.show.axes import Where
+from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.marks import Arrows, Contours, Line, Mark, Markers, Segments, Shades
+from photogram.show.style import BLUE, INK, VERMILION
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.text import Text
 
 __all__ = [
     "draw_cross_validation",
     "draw_difference",
     "draw_uncertainty",
     "draw_uncertainty_curve",
-    "in_pixels",
     "steps_of_125",
 ]
 
@@ -39,9 +36,7 @@ ARROWS = 24
 """Vectors along the longer side of a picture."""
 WIDTH = 7.6
 """Inches."""
-ROOM = 20.0
-"""Points from the middle of a label of a contour to that of the next one."""
-SHADES = 4
+STEPS = 4
 """Of colour from one contour to the next."""
 
 
@@ -68,7 +63,7 @@ def draw_uncertainty(found: UncertaintyMap, path: Path | None = None, ax: Where 
     ModuleNotFoundError
         matplotlib is absent.
     """
-    return placed(partial(_uncertainty, found), path, ax)
+    return placed(uncertainty_sketch(found), path, ax)
 
 
 def draw_uncertainty_curve(found: UncertaintyCurve, path: Path | None = None, ax: Where = None) -> Any:
@@ -90,7 +85,7 @@ def draw_uncertainty_curve(found: UncertaintyCurve, path: Path | None = None, ax
     InputError, ModuleNotFoundError
         As of :func:`draw_uncertainty`.
     """
-    return placed(partial(_curve, found), path, ax)
+    return placed(_curve(found), path, ax)
 
 
 def draw_difference(found: CameraDifference, path: Path | None = None, ax: Where = None) -> Any:
@@ -113,7 +108,7 @@ def draw_difference(found: CameraDifference, path: Path | None = None, ax: Where
     InputError, ModuleNotFoundError
         As of :func:`draw_uncertainty`.
     """
-    return placed(partial(_difference, found), path, ax)
+    return placed(difference_sketch(found), path, ax)
 
 
 def draw_cross_validation(
@@ -139,7 +134,7 @@ def draw_cross_validation(
     InputError, ModuleNotFoundError
         As of :func:`draw_uncertainty`.
     """
-    return placed(partial(_cross_validation, cross, over), path, ax)
+    return placed(cross_validation_sketch(cross, over), path, ax)
 
 
 def steps_of_125(low: float, high: float) -> Floats:
@@ -151,87 +146,70 @@ def steps_of_125(low: float, high: float) -> Floats:
     return np.asarray(steps[(steps >= start * (1 - 1e-9)) & (np.arange(len(steps)) <= above[0])])
 
 
-def _uncertainty(found: UncertaintyMap, ax: Where) -> Any:
-    with panels(ax, 1, 1, WIDTH, _height(found.size)) as (axes,):
-        in_pixels(axes, found.size)
-        _contours(axes, found.columns, found.rows, found.sd, "px")
-        _known(axes, found)
-        _seen(axes, found.corners, found.coverage)
-        said = found.model.replace("; ", "\n")
-        axes.set_title(f"{found.title}\n{said}", fontsize=9.0)
-    return handed_out([axes])
+def uncertainty_sketch(found: UncertaintyMap) -> Sketch:
+    """Return the picture of a map; see :func:`draw_uncertainty`."""
+    marks = [*_known(found), *_seen(found.corners, found.coverage)]
+    panel = _map(found.size, found.columns, found.rows, found.sd, "px", marks)
+    title = found.title + "\n" + found.model.replace("; ", "\n")
+    return Sketch(WIDTH, _height(found.size), [replace(panel, title=title)])
 
 
-def _curve(found: UncertaintyCurve, ax: Where) -> Any:
-    from matplotlib.ticker import LogLocator
-
+def _curve(found: UncertaintyCurve) -> Sketch:
     away = np.isfinite(found.distances)
     order = np.argsort(found.distances[away])
     distance, sd = found.minimum
-    with panels(ax, 1, 1, WIDTH, 0.6 * WIDTH) as (axes,):
-        axes.loglog(found.distances[away][order], found.sd[away][order], color=BLUE)
-        for each in found.sd[~away]:
-            axes.axhline(
-                each, color=INK, linewidth=0.9, linestyle="dashed", label=f"at infinity {each:.2g} px"
-            )
-        if math.isfinite(distance):
-            least = f"least {sd:.2g} px {distance_text(float(f'{distance:.3g}'), found.unit)}"
-            axes.plot(distance, sd, "o", color=VERMILION, label=least)
-        axes.set(xlabel=f"distance from the camera, {found.unit}", ylabel="px")
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-            axis.set_major_formatter("{x:g}")
-            axis.set_minor_formatter("{x:g}")
-        axes.legend(fontsize=8.0)
-        column, row = found.pixel
-        axes.set_title(
-            f"{found.camera}: standard deviation of projection at column {column:g}, row {row:g}"
-            f" (datum {found.datum})",
-            fontsize=9.0,
-        )
-    return handed_out([axes])
+    places = np.column_stack([found.distances[away][order], found.sd[away][order]])
+    across = np.array([places[:, 0].min() / 1.1, places[:, 0].max() * 1.1])
+    up = np.array([found.sd.min() / 1.1, found.sd.max() * 1.1])
+    marks: list[Mark] = [Line(places, BLUE)]
+    for each in found.sd[~away].tolist():
+        line = np.column_stack([across, np.full(2, each)])
+        marks.append(Line(line, INK, 0.9, "--", label=f"at infinity {each:.2g} px"))
+    if math.isfinite(distance):
+        least = f"least {sd:.2g} px {distance_text(float(f'{distance:.3g}'), found.unit)}"
+        marks.append(Markers(np.array([[distance, sd]]), "o", 6.0, VERMILION, VERMILION, label=least))
+    column, row = found.pixel
+    title = (
+        f"{found.camera}: standard deviation of projection at column {column:g}, row {row:g}"
+        f" (datum {found.datum})"
+    )
+    panel = Panel(
+        np.column_stack([across, up]),
+        marks,
+        title,
+        f"distance from the camera, {found.unit}",
+        "px",
+        legend="best",
+        log_across=True,
+        log_up=True,
+    )
+    return Sketch(WIDTH, 0.6 * WIDTH, [panel])
 
 
-def _known(axes: Axes, found: UncertaintyMap) -> None:
-    """Draw where what is known of the lens ends, such as the knots of splines."""
-    known = np.isfinite(found.sd)
-    if known.any() and not known.all():
-        axes.contour(
-            found.columns,
-            found.rows,
-            known.astype(float),
-            [0.5],
-            colors=INK,
-            linewidths=0.9,
-            linestyles="dashed",
-        )
-
-
-def _difference(found: CameraDifference, ax: Where) -> Any:
-    chi2 = found.chi2
-    rows = len(found.distances)
-    columns = 1 if chi2 is None else 2
+def difference_sketch(found: CameraDifference) -> Sketch:
+    """Return the picture of a difference; see :func:`draw_difference`."""
     names = f"{found.cameras[1]} less {found.cameras[0]}"
-    with panels(ax, rows, columns, WIDTH * columns, rows * _height(found.size)) as axes:
-        for number, distance in enumerate(found.distances):
-            own = _Apart(found.size, found.columns, found.rows, found.vectors[number], found.inside)
-            own.draw(axes[number * columns], f"{names} {distance_text(distance, found.unit)}, px")
-            if chi2 is not None:
-                own.beside(axes[number * columns + 1], chi2[number])
-        note(axes[-columns], found.remarks)
-    return handed_out(axes)
+    panels = list[Panel]()
+    for number, distance in enumerate(found.distances):
+        own = _Apart(found.size, found.columns, found.rows, found.vectors[number], found.inside)
+        panels.append(own.panel(f"{names} {distance_text(distance, found.unit)}, px"))
+        if found.chi2 is not None:
+            panels.append(own.beside(found.chi2[number]))
+    rows = len(found.distances)
+    columns = len(panels) // rows
+    panels[-columns] = replace(panels[-columns], notes=found.remarks)
+    return Sketch(WIDTH * columns, rows * _height(found.size), panels, columns)
 
 
-def _cross_validation(cross: CrossValidation, over: UncertaintyMap, ax: Where) -> Any:
+def cross_validation_sketch(cross: CrossValidation, over: UncertaintyMap) -> Sketch:
+    """Return the picture of a cross-validation; see :func:`draw_cross_validation`."""
     found = cross.map(cross.cameras.index(over.camera), over.pixels.reshape(-1, 2), over.distance)
     shape = over.sd.shape
     own = _Apart(over.size, over.columns, over.rows, found.differences.reshape(*shape, 2), over.inside)
-    with panels(ax, 1, 2, 2 * WIDTH, _height(over.size)) as (left, right):
-        away = distance_text(over.distance, over.unit)
-        own.draw(left, f"{over.camera}: second part of the views less the first, {away}, px")
-        own.beside(right, found.chi2.reshape(shape) / 2)
-        note(left, [cross.verdict])
-    return handed_out([left, right])
+    away = distance_text(over.distance, over.unit)
+    left = own.panel(f"{over.camera}: second part of the views less the first, {away}, px")
+    panels = [replace(left, notes=[cross.verdict]), own.beside(found.chi2.reshape(shape) / 2)]
+    return Sketch(2 * WIDTH, _height(over.size), panels, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,88 +222,81 @@ class _Apart:
     vectors: Floats
     inside: Bools
 
-    @property
-    def lengths(self) -> Floats:
-        return np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
-
-    def draw(self, axes: Axes, title: str) -> None:
-        """Draw lengths as contours, and some of the vectors, the longest as long as they are apart."""
-        in_pixels(axes, self.size)
-        _contours(axes, self.columns, self.rows, self.lengths, "px")
+    def panel(self, title: str) -> Panel:
+        """Return lengths as contours, and some of the vectors, the longest as long as they are apart."""
+        lengths = np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
         step = max(1, round(len(self.columns) / ARROWS))
         every = (slice(None, None, step), slice(None, None, step))
         places = np.stack(np.meshgrid(self.columns, self.rows), axis=-1)[every].reshape(-1, 2)
         vectors = self.vectors[every].reshape(-1, 2)
-        largest = float(np.fmax.reduce(self.lengths[self.inside], initial=0.0)) or 1.0
+        largest = float(np.fmax.reduce(lengths[self.inside], initial=0.0)) or 1.0
         known = np.hypot(*vectors.T) <= 2 * largest
-        spacing = step * (self.columns[1] - self.columns[0])
-        arrows(axes, places[known], vectors[known], scale=largest / spacing, color=BLUE, width=0.002)
-        axes.set_title(title, fontsize=9.0)
+        scale = step * (self.columns[1] - self.columns[0]) / largest
+        arrows = Arrows(places[known], scale * vectors[known], BLUE, 0.002)
+        panel = _map(self.size, self.columns, self.rows, lengths, "px", [arrows])
+        return replace(panel, title=title)
 
-    def beside(self, axes: Axes, chi2: Floats) -> None:
-        """Draw what they are beside their covariances."""
-        in_pixels(axes, self.size)
-        _contours(axes, self.columns, self.rows, chi2, "", lowest=0.1)
-        axes.set_title("beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it", fontsize=9.0)
+    def beside(self, chi2: Floats) -> Panel:
+        """Return what they are beside their covariances."""
+        panel = _map(self.size, self.columns, self.rows, chi2, "", lowest=0.1)
+        return replace(panel, title="beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it")
 
 
 def _height(size: tuple[int, int]) -> float:
     return 1.1 + 0.82 * WIDTH * size[1] / size[0]
 
 
-def _contours(
-    axes: Axes, columns: Floats, rows: Floats, values: Floats, unit: str, lowest: float = 0.01
-) -> None:
-    """Draw filled contours at 1, 2, 5 steps with their values on the lines, from a share of the largest."""
-    from matplotlib.colors import LogNorm
-    from matplotlib.patheffects import withStroke
-
+def _map(
+    size: tuple[int, int],
+    columns: Floats,
+    rows: Floats,
+    values: Floats,
+    unit: str,
+    marks: Sequence[Mark] = (),
+    lowest: float = 0.01,
+) -> Panel:
+    """Return filled contours at 1, 2, 5 steps, from a share of the largest value, under other marks."""
+    panel = in_pixels(size)
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
-        return
+        return replace(panel, marks=marks)
     high = float(positive.max())
     levels = steps_of_125(max(float(positive.min()), lowest * high), high)
-    norm = LogNorm(levels[0], levels[-1])
-    shown = np.ma.masked_invalid(np.where(values > 0, values, np.nan))
-    places = np.arange(SHADES * (len(levels) - 1) + 1) / SHADES
-    shades = np.exp(np.interp(places, np.arange(len(levels)), np.log(levels)))
-    filled = axes.contourf(columns, rows, shown, shades, cmap=ORDERED, norm=norm, extend="min")
-    filled.set_edgecolor("face")  # no seams between colours
-    lines = axes.contour(columns, rows, shown, levels, colors="white", linewidths=0.9)
-    for text in _apart(axes, axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0, inline=False)):
-        text.set_color(INK)
-        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
-    bar = axes.figure.colorbar(filled, ax=axes, shrink=0.85, ticks=levels, format="%g")
-    bar.ax.minorticks_off()
-    bar.set_label(unit)
+    shades = Shades(float(levels[0]), float(levels[-1]), unit, log=True)
+    shown = np.where(values > 0, values, np.nan)
+    contours = Contours(columns, rows, shown, levels, shades, steps=STEPS)
+    return replace(panel, marks=[contours, *marks], shades=shades)
 
 
-def _apart(axes: Axes, texts: Sequence[Text]) -> list[Text]:
-    """Return labels that do not lie on each other, those of the lowest contours; take the others away."""
-    kept: list[Text] = []
-    places: list[Floats] = []
-    for each in texts:
-        place = np.asarray(axes.transData.transform(each.get_position())) * 72 / axes.figure.dpi
-        if all(np.hypot(*(place - other)) > ROOM for other in places):
-            kept.append(each)
-            places.append(place)
-        else:
-            each.remove()
-    return kept
+def _known(found: UncertaintyMap) -> list[Mark]:
+    """Return where what is known of the lens ends, such as the knots of splines."""
+    known = np.isfinite(found.sd)
+    if known.all() or not known.any():
+        return []
+    half = np.array([found.columns[1] - found.columns[0], found.rows[1] - found.rows[0]]) / 2
+    ends = []
+    for right, up in ((1, 0), (0, 1)):
+        at = np.argwhere(known[up:, right:] != known[: -up or None, : -right or None])[:, ::-1]
+        middle = np.column_stack([found.columns[at[:, 0]], found.rows[at[:, 1]]]) + half * [right, up]
+        along = half * [1 - right, 1 - up]
+        ends.append(np.stack([middle - along, middle + along], axis=1))
+    return [Segments(np.concatenate(ends), INK, 0.9, "--")]
 
 
-def _seen(axes: Axes, corners: Floats, coverage: Floats) -> None:
+def _seen(corners: Floats, coverage: Floats) -> list[Mark]:
     if not len(corners):
-        return
+        return []
     step = -(-len(corners) // DOTS)
-    axes.plot(*corners[::step].T, ".", color="white", markersize=2.5, alpha=0.6, markeredgewidth=0.0)
-    axes.plot(*np.vstack([coverage, coverage[:1]]).T, color=VERMILION, linewidth=1.2)
+    return [
+        Markers(corners[::step], ".", 2.5, "white", edge=0.0, opacity=0.6),
+        Line(np.vstack([coverage, coverage[:1]]), VERMILION, 1.2),
+    ]
 
 
-def in_pixels(axes: Axes, size: tuple[int, int]) -> None:
-    """Give axes the columns and rows of a picture."""
-    axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
-    axes.set(xlabel="column, px", ylabel="row, px")
+def in_pixels(size: tuple[int, int]) -> Panel:
+    """Return a panel with the columns and rows of a picture."""
+    limits = np.array([[-0.5, size[1] - 0.5], [size[0] - 0.5, -0.5]])
+    return Panel(limits, across="column, px", up="row, px", equal=True)
 
 
 check_arguments(globals(), [name for name in __all__ if name.startswith("draw")])

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.plots.panels import figure_of
 from photogram.show.cells import page_table
 from photogram.show.methods import page_of
 from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Remarks, Section
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.calibration_result import Calibrated, Worth
-from photogram.targets.drawing import draw_cross_validation, draw_difference, draw_uncertainty
+from photogram.targets.drawing import cross_validation_sketch, difference_sketch, uncertainty_sketch
 from photogram.targets.grouping import Groups, residual_groups
 from photogram.targets.maps import UncertaintyMap, distance_text, map_name
-from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
+from photogram.targets.residual_drawing import board_sketch, poorest_sketch
 from photogram.targets.tables import board_facts, prior_shift, spline_lines, views, worst_points
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @page_of.register(Calibrated)
@@ -54,20 +49,19 @@ def calibration_page(calibrated: Calibrated) -> Page:
 
 def _residuals(calibrated: Calibrated) -> list[Part]:
     """Return tables of residuals by groups, and pictures of them over the board and in the poorest views."""
-    figures: dict[str, tuple[str, str, partial[object]]] = {
-        "board-residuals": (
+    drawings = [
+        Drawing(
+            "board-residuals",
             "On the board",
             "Mean residuals over all views: errors of the print.",
-            partial(draw_board_residuals, calibrated),
+            partial(board_sketch, calibrated),
         ),
-        "poorest-views": (
+        Drawing(
+            "poorest-views",
             "Poorest views",
             "Residuals of the pictures that fit worst.",
-            partial(draw_poorest_views, calibrated),
+            partial(poorest_sketch, calibrated),
         ),
-    }
-    drawings = [
-        Drawing(name, title, caption, _figure(draw)) for name, (title, caption, draw) in figures.items()
     ]
     tables = [page_table(title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
     return [Layers("corner-residuals", drawings), *(each for each in tables if len(each.rows) > 1)]
@@ -118,15 +112,15 @@ def worth_section(worth: Worth | None) -> Section:
 def drawings(worth: Worth) -> list[Drawing]:
     """Return all pictures, still to be drawn."""
     found = [
-        Drawing(f"map-{map_name(each)}", _title(each), CAPTION, _figure(partial(draw_uncertainty, each)))
+        Drawing(f"map-{map_name(each)}", _title(each), CAPTION, partial(uncertainty_sketch, each))
         for each in worth.maps
     ]
     for cross in worth.cross:
         for own in worth.maps:
             if own.camera in cross.cameras:
-                draw = partial(draw_cross_validation, cross, own)
+                sketch = partial(cross_validation_sketch, cross, own)
                 name = f"cross-validation-{map_name(own)}"
-                found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, _figure(draw)))
+                found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, sketch))
     return found + [_of_difference(each) for each in worth.differences]
 
 
@@ -142,13 +136,8 @@ def _tests(worth: Worth) -> list[Fact]:
 
 def _of_difference(found: CameraDifference) -> Drawing:
     name = f"difference-{found.cameras[0]}-{found.cameras[1]}".replace(" ", "-")
-    return Drawing(name, "Difference", APART, _figure(partial(draw_difference, found)))
+    return Drawing(name, "Difference", APART, partial(difference_sketch, found))
 
 
 def _title(found: UncertaintyMap) -> str:
     return f"{found.camera} {distance_text(found.distance, found.unit)}"
-
-
-def _figure(draw: partial[object]) -> partial[Figure]:
-    """Return what draws into a figure of its own."""
-    return partial(figure_of, lambda ax: draw(ax=ax))

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from photogram.arguments.annotations import check_arguments
+from photogram.lazy_dataclasses import replace
 from photogram.network.hull import hull
-from photogram.plots.panels import Where, handed_out, panels, placed
+from photogram.plots.placed import placed
+from photogram.show.axes import Where
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.marks import Mark, Markers, Polygons
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.drawing import in_pixels
 from photogram.targets.view_plan_result import ViewPlan
@@ -38,27 +43,29 @@ def draw_planned_views(plan: ViewPlan, path: Path | None = None, ax: Where = Non
     InputError, ModuleNotFoundError
         As of :func:`photogram.targets.draw_uncertainty`.
     """
-    return placed(partial(_views, plan), path, ax)
+    return placed(views_sketch(plan), path, ax)
 
 
-def _views(plan: ViewPlan, ax: Where) -> Any:
-    corners = plan.calibrated.calibration.corners
-    (size,) = corners.sizes
+def views_sketch(plan: ViewPlan) -> Sketch:
+    """Return the picture of views; see :func:`draw_planned_views`."""
+    (size,) = plan.calibrated.calibration.corners.sizes
     assert size is not None
     rows = -(-len(plan.views) // ACROSS)
-    with panels(ax, rows, ACROSS, PANEL * ACROSS, rows * (0.3 + PANEL * size[1] / size[0])) as found:
-        for number, axes in enumerate(found):
-            if number >= len(plan.views):
-                axes.set_axis_off()
-                continue
-            own = corners.xy[corners.picture == number]
-            in_pixels(axes, size)
-            axes.set(xlabel="", ylabel="", xticks=[], yticks=[], title=f"{number + 1}")
-            axes.fill(*hull(own).T, facecolor=FAINT, edgecolor=BLUE, linewidth=1.0, alpha=0.5)
-            axes.plot(*own.T, ".", color=BLUE, markersize=2.5)
-            if corners.point[corners.picture == number][0] == 0:
-                axes.plot(*own[0], "o", color=VERMILION, markersize=5.0)
-    return handed_out(found)
+    panels = [_view(plan, number, size) for number in range(len(plan.views))]
+    every = [*panels, *[None] * (rows * ACROSS - len(panels))]
+    return Sketch(PANEL * ACROSS, rows * (0.3 + PANEL * size[1] / size[0]), every, ACROSS)
+
+
+def _view(plan: ViewPlan, number: int, size: tuple[int, int]) -> Panel:
+    corners = plan.calibrated.calibration.corners
+    own = corners.xy[corners.picture == number]
+    marks: list[Mark] = [
+        Polygons(hull(own)[np.newaxis], FAINT, 0.5, BLUE, 0.5, 1.0),
+        Markers(own, ".", 2.5, BLUE),
+    ]
+    if corners.point[corners.picture == number][0] == 0:
+        marks.append(Markers(own[:1], "o", 5.0, VERMILION))
+    return replace(in_pixels(size), marks=marks, title=f"{number + 1}", across="", up="", unnumbered=True)
 
 
 check_arguments(globals(), __all__)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
-from photogram.plots.panels import Where, handed_out, panels, placed, scale_bars
-from photogram.show.pictures import arrows, round_length
+from photogram.lazy_dataclasses import replace
+from photogram.plots.placed import placed
+from photogram.show.axes import Where
+from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.marks import Arrows, Mark, Markers
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.calibration_result import Calibrated
+from photogram.targets.drawing import in_pixels
 from photogram.targets.grouping import NOTABLE, mean_residuals
 from photogram.targets.tables import view_rms
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 __all__ = ["draw_board_residuals", "draw_poorest_views"]
 
@@ -47,7 +48,7 @@ def draw_board_residuals(calibrated: Calibrated, path: Path | None = None, ax: W
     InputError, ModuleNotFoundError
         As of :func:`photogram.targets.draw_uncertainty`.
     """
-    return placed(partial(_board, calibrated), path, ax)
+    return placed(board_sketch(calibrated), path, ax)
 
 
 def draw_poorest_views(calibrated: Calibrated, path: Path | None = None, ax: Where = None) -> Any:
@@ -67,61 +68,58 @@ def draw_poorest_views(calibrated: Calibrated, path: Path | None = None, ax: Whe
     InputError, ModuleNotFoundError
         As of :func:`draw_board_residuals`.
     """
-    return placed(partial(_poorest, calibrated), path, ax)
+    return placed(poorest_sketch(calibrated), path, ax)
 
 
-def _board(calibrated: Calibrated, ax: Where) -> Any:
+def board_sketch(calibrated: Calibrated) -> Sketch:
+    """Return the picture of a board; see :func:`draw_board_residuals`."""
     corners, places = calibrated.calibration.corners, calibrated.points
     mean, tests = mean_residuals(calibrated, corners.point[corners.use], len(places))
     seen = np.isfinite(mean).all(axis=1)
     marked = np.asarray((np.abs(tests) > NOTABLE).any(axis=1))
     unit = calibrated.calibration.board.unit
-    low, high = places[seen].min(axis=0), places[seen].max(axis=0)
+    low, high = places[seen, :2].min(axis=0), places[seen, :2].max(axis=0)
     extent = np.maximum(high - low, 1e-12)
-    with panels(ax, 1, 1, 6.4, 1.4 + 5.2 * float(np.clip(extent[1] / extent[0], 0.4, 1.4))) as (axes,):
-        axes.plot(*places[seen, :2].T, ".", color=FAINT, markersize=3.0)
-        room = LONGEST * float(np.sqrt(extent[0] * extent[1] / seen.sum()))
-        axes.set(xlim=(low[0] - room, high[0] + room), ylim=(high[1] + room, low[1] - room), aspect="equal")
-        axes.set(xlabel=f"x of the board, {unit}", ylabel=f"y of the board, {unit}")
-        title = "Mean residual of each point of the board; red: hardly by chance"
-        _with_scale(axes, places[seen, :2], mean[seen], marked[seen], room, title)
-    return handed_out([axes])
+    room = LONGEST * float(np.sqrt(extent[0] * extent[1] / seen.sum()))
+    limits = np.array([[low[0] - room, high[1] + room], [high[0] + room, low[1] - room]])
+    title = "Mean residual of each point of the board; red: hardly by chance"
+    plan = Panel(limits, (), title, f"x of the board, {unit}", f"y of the board, {unit}", equal=True)
+    height = 1.4 + 5.2 * float(np.clip(extent[1] / extent[0], 0.4, 1.4))
+    return Sketch(6.4, height, [_with_vectors(plan, places[seen, :2], mean[seen], marked[seen], room)])
 
 
-def _poorest(calibrated: Calibrated, ax: Where) -> Any:
+def poorest_sketch(calibrated: Calibrated) -> Sketch:
+    """Return the picture of views; see :func:`draw_poorest_views`."""
     corners, result = calibrated.calibration.corners, calibrated.result
     picture = corners.picture[corners.use]
     rms = view_rms(picture, result.residuals, len(corners.pictures))
     worst = np.argsort(-np.nan_to_num(rms), kind="stable")[:POOREST].tolist()
-    with panels(ax, 1, len(worst), 4.4 * len(worst), 4.2) as found:
-        for axes, each in zip(found, worst, strict=True):
-            own = picture == each
-            xy, residuals = result.block.image_xy[own], result.residuals[own]
-            size = corners.sizes[corners.cameras[each]] or tuple((xy.max(axis=0) + 1).tolist())
-            axes.plot(*xy.T, ".", color=FAINT, markersize=3.0)
-            axes.set(xlim=(-0.5, size[0] - 0.5), ylim=(size[1] - 0.5, -0.5), aspect="equal")
-            axes.set(xlabel="column, px", ylabel="row, px")
-            room = LONGEST * float(np.sqrt(np.prod(np.ptp(xy, axis=0)) / len(xy)))
-            tests = np.nan_to_num(result.standardized[own]) / np.sqrt(result.covariance_scale)
-            large = (np.abs(tests) > NOTABLE).any(axis=1)
-            title = f"{corners.pictures[each]}, rms {rms[each]:.2g} px"
-            _with_scale(axes, xy, residuals, large, room, title)
-    return handed_out(found)
+    panels = []
+    for each in worst:
+        own = picture == each
+        xy, residuals = result.block.image_xy[own], result.residuals[own]
+        size = corners.sizes[corners.cameras[each]] or tuple((xy.max(axis=0) + 1).tolist())
+        room = LONGEST * float(np.sqrt(np.prod(np.ptp(xy, axis=0)) / len(xy)))
+        tests = np.nan_to_num(result.standardized[own]) / np.sqrt(result.covariance_scale)
+        large = (np.abs(tests) > NOTABLE).any(axis=1)
+        view = replace(in_pixels(size), title=f"{corners.pictures[each]}, rms {rms[each]:.2g} px")
+        panels.append(_with_vectors(view, xy, residuals, large, room))
+    return Sketch(4.4 * len(worst), 4.2, panels, len(worst))
 
 
-def _with_scale(axes: Axes, places: Floats, vectors: Floats, marked: Bools, room: float, title: str) -> None:
-    """Draw vectors whose longest takes some room, those that are marked in colour, and their scale."""
-    limits = axes.get_xlim(), axes.get_ylim()
+def _with_vectors(panel: Panel, places: Floats, vectors: Floats, marked: Bools, room: float) -> Panel:
+    """Return a panel with vectors whose longest takes some room, in colour where marked, and their scale."""
     lengths = np.hypot(*vectors.T)
     # One that is far longer than the others is not to hide them.
     longest = float(max(lengths.max() / OUTLIER, min(lengths.max(), 4 * np.quantile(lengths, 0.9)))) or 1.0
-    scale = longest / room
-    for which, colour in ((~marked, BLUE), (marked, VERMILION)):
-        if which.any():
-            arrows(axes, places[which], vectors[which], scale=scale, color=colour, width=0.004)
-    axes.set(xlim=limits[0], ylim=limits[1])
-    length = round_length(longest)
-    scale_bars(axes, [(length / scale, BLUE, f"{length:g} px")], title)
+    scale, length = room / longest, round_length(longest)
+    arrows: list[Mark] = [
+        Arrows(places[which], scale * vectors[which], colour, 0.004)
+        for which, colour in ((~marked, BLUE), (marked, VERMILION))
+        if which.any()
+    ]
+    dots = Markers(places, ".", 3.0, FAINT)
+    return replace(panel, marks=[dots, *arrows], bars=[(scale * length, BLUE, f"{length:g} px")])
 
 
 check_arguments(globals(), __all__)

@@ -10,7 +10,6 @@ import numpy as np
 from photogram.io import json
 from photogram.io.csv_text import csv_text
 from photogram.network.attitudes import Attitudes
-from photogram.plots.panels import figure_of
 from photogram.show.cells import page_table
 from photogram.show.lines import field, table_lines
 from photogram.show.methods import document_of, page_of, report_of
@@ -21,7 +20,7 @@ from photogram.show.sections import composed, headline
 from photogram.targets.document import worth_files, worth_members
 from photogram.targets.maps import distance_text
 from photogram.targets.page import drawings, worth_facts
-from photogram.targets.plan_drawing import draw_planned_views
+from photogram.targets.plan_drawing import views_sketch
 from photogram.targets.view_plan_result import ViewPlan
 
 CAPTION = "Where the corners of the board are in each picture; red: its point 0."
@@ -104,8 +103,7 @@ def plan_drawings(plan: ViewPlan) -> list[Drawing]:
     """Return all pictures, still to be drawn: the views, and maps of the uncertainty that they promise."""
     worth = plan.calibrated.worth
     assert worth is not None
-    draw = partial(figure_of, lambda ax: draw_planned_views(plan, ax=ax))
-    return [Drawing("planned-views", "Views", CAPTION, draw), *drawings(worth)]
+    return [Drawing("planned-views", "Views", CAPTION, partial(views_sketch, plan)), *drawings(worth)]
 
 
 @document_of.register(ViewPlan)

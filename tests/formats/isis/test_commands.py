@@ -7,8 +7,6 @@ from typer.testing import CliRunner
 from example_scripts import load
 from photogram.cli import app
 
-pytestmark = pytest.mark.usefixtures("sketched")
-
 
 def run(*words):
     return CliRunner().invoke(app, [str(each) for each in words])

@@ -17,7 +17,6 @@ from photogram.formats.isis.reading import read_network
 from photogram.formats.isis.rejection import flagged, rejection_limit
 from photogram.formats.isis.writing import network_text
 
-pytestmark = pytest.mark.usefixtures("sketched")
 WORDS = "CAMSOLVE=angles OVEREXISTING=yes CAMERA_ANGLES_SIGMA=1 OUTLIER_REJECTION=yes"
 BAD = (4, 31)
 """Measures, of two points."""

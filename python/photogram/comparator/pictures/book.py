@@ -23,6 +23,8 @@ from photogram.comparator.pictures.vectors import (
     joint_grid,
 )
 from photogram.show.pictures import new_figure
+from photogram.show.sketch.declared import Sketch
+from photogram.show.sketch.on_axes import figure
 from photogram.show.style import styled
 
 if TYPE_CHECKING:
@@ -31,51 +33,49 @@ if TYPE_CHECKING:
     from photogram.comparator.calibration import Calibration
 
 
+def sketches(calibration: Calibration) -> dict[str, Sketch]:
+    """Return the pictures with short names."""
+    made = {
+        "variance": variance_bars(calibration),
+        "comparator-residuals": comparator_vectors(calibration),
+        "grid-residuals": grid_vectors(calibration),
+    }
+    for plate in calibration.plates:
+        made[f"average-residuals-{plate}"] = average_vectors(calibration, plate)
+        if calibration.joint and calibration.joint.plates[plate].sigma_um > 0:
+            made[f"grid-corrections-{plate}"] = joint_grid(calibration, plate)
+    made |= _corrections(calibration)
+    made["pointing-ellipses"] = pointing_ellipses(calibration)
+    for operator, sketch in operator_ellipses(calibration):
+        made[f"pointing-ellipses-operator-{operator}"] = sketch
+    made["pointing-ellipses-total"] = total_ellipses(calibration)
+    made["pooled-ellipses"] = pooled_ellipses(calibration)
+    made["residual-histogram"] = residual_histogram(calibration)
+    return made
+
+
 def figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
-    """Make the pictures one after the other, with short names.
+    """Make the pictures one after the other, with short names, as figures that belong to no window.
 
     Needs matplotlib (`pip install 'photogram[plots]'`).
     """
-    made = _figures(calibration)
-    while True:
-        # Who takes the figures has a style of their own in between.
-        with styled():
-            found = next(made, None)
-            if found is None:
-                return
-            # Panels of equal scales are laid out well only when their limits are known.
-            found[1].draw_without_rendering()
-        yield found
+    for name, sketch in sketches(calibration).items():
+        yield name, figure(sketch)
 
 
-def _figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
-    yield "variance", variance_bars(calibration)
-    yield "comparator-residuals", comparator_vectors(calibration)
-    yield "grid-residuals", grid_vectors(calibration)
-    for plate in calibration.plates:
-        yield f"average-residuals-{plate}", average_vectors(calibration, plate)
-        if calibration.joint and calibration.joint.plates[plate].sigma_um > 0:
-            yield f"grid-corrections-{plate}", joint_grid(calibration, plate)
-    yield from _corrections(calibration)
-    yield "pointing-ellipses", pointing_ellipses(calibration)
-    for operator, figure in operator_ellipses(calibration):
-        yield f"pointing-ellipses-operator-{operator}", figure
-    yield "pointing-ellipses-total", total_ellipses(calibration)
-    yield "pooled-ellipses", pooled_ellipses(calibration)
-    yield "residual-histogram", residual_histogram(calibration)
-
-
-def _corrections(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
-    """Draw the combined polynomials and, where they are wanted, those of every case."""
+def _corrections(calibration: Calibration) -> dict[str, Sketch]:
+    """Return the combined polynomials and, where they are wanted, those of every case."""
+    made = {}
     if calibration.nonlinear:
         polynomial = calibration.nonlinear.polynomial
-        yield "correction", correction_surface(calibration, polynomial)
-        yield "distorted-grid", distorted_grid(calibration, polynomial)
+        made["correction"] = correction_surface(calibration, polynomial)
+        made["distorted-grid"] = distorted_grid(calibration, polynomial)
     for case in calibration.cases if calibration.session.plot_each_case else ():
         if case.polynomial:
             polynomial, whose = case.polynomial.polynomial, f", case {case.number} alone"
-            yield f"correction-case-{case.number}", correction_surface(calibration, polynomial, whose)
-            yield f"distorted-grid-case-{case.number}", distorted_grid(calibration, polynomial, whose)
+            made[f"correction-case-{case.number}"] = correction_surface(calibration, polynomial, whose)
+            made[f"distorted-grid-case-{case.number}"] = distorted_grid(calibration, polynomial, whose)
+    return made
 
 
 def _title(calibration: Calibration) -> str:
@@ -100,8 +100,9 @@ def pdf_report(calibration: Calibration, run_date: str = "") -> bytes:
     # Without a date equal calibrations give equal files.
     with PdfPages(buffer, metadata={"Title": _title(calibration), "CreationDate": None}) as pdf:
         pdf.savefig(_text_page(calibration, run_date))
-        for _, figure in figures(calibration):
-            pdf.savefig(figure)
+        for _, drawn in figures(calibration):
+            with styled():
+                pdf.savefig(drawn)
     return buffer.getvalue()
 
 
@@ -114,6 +115,6 @@ def _text_page(calibration: Calibration, run_date: str) -> Figure:
         "",
         *tests_page(calibration)[2:],
     ]
-    figure = new_figure(11.7, 8.3)
-    figure.text(0.04, 0.96, "\n".join(lines), family="monospace", fontsize=6.5, va="top")
-    return figure
+    page = new_figure(11.7, 8.3)
+    page.text(0.04, 0.96, "\n".join(lines), family="monospace", fontsize=6.5, va="top")
+    return page

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.pictures.style import ACCENT, MAIN, MM, key, panels, plain
+from photogram.comparator.pictures.style import (
+    ACCENT,
+    ACROSS,
+    MAIN,
+    MM,
+    OF_COMPARATOR,
+    OF_PLATE,
+    plan,
+    spacing,
+)
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
-from photogram.show.pictures import new_figure, round_length
+from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, Sketch, around, side_by_side
+from photogram.show.sketch.marks import Ellipses, Mark, Markers
 from photogram.show.style import FAINT
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from photogram.arguments.types import Floats
     from photogram.comparator.calibration import Calibration
     from photogram.comparator.pointing import Ellipse, Precision
@@ -26,27 +33,30 @@ LEAST = 39
 """Percent of the standard ellipse, which the program draws."""
 
 
-def pointing_ellipses(calibration: Calibration) -> Figure:
+def pointing_ellipses(calibration: Calibration) -> Sketch:
     """Draw the 39 percent ellipses of single pointings at the measured places of each case."""
-    figure, axes = panels(len(calibration.cases))
+    places = [case.placed.means_um / MM for case in calibration.cases]
     ellipses = [
         [readings.precision.ellipse for readings in case.placed.readings] for case in calibration.cases
     ]
     largest = max((ellipse.major_um for own in ellipses for ellipse in own), default=0.0)
-    scale = _scale(calibration.cases[0].placed.means_um / MM, largest)
-    for panel, case, own in zip(axes, calibration.cases, ellipses, strict=True):
-        _ellipses(panel, case.placed.means_um / MM, own, scale)
-        sd = case.placed.precision.sd_point_um
-        panel.set_title(f"case {case.number}, pooled {sd:.2f} µm", fontsize=9, loc="left")
-        plain(panel, "x, mm", "y, mm")
-    for panel in axes:
-        panel.label_outer()
-    key(axes, scale, round_length(largest))
-    figure.suptitle("Error ellipses of single pointings (39 percent; * no deviation)", fontsize=11)
-    return figure
+    scale, limits = _scale(places[0], largest), around(np.vstack(places))
+    panels = [
+        plan(
+            limits,
+            _ellipses(at, own, {LEAST: scale}),
+            f"case {case.number}, pooled {case.placed.precision.sd_point_um:.2f} µm",
+            OF_COMPARATOR,
+            (scale, round_length(largest)),
+        )
+        for at, case, own in zip(places, calibration.cases, ellipses, strict=True)
+    ]
+    return side_by_side(
+        panels, ACROSS, 3.4, "Error ellipses of single pointings (39 percent; * no deviation)"
+    )
 
 
-def operator_ellipses(calibration: Calibration) -> Iterator[tuple[int, Figure]]:
+def operator_ellipses(calibration: Calibration) -> Iterator[tuple[int, Sketch]]:
     """Draw for each operator the ellipses of his pointings, point by point over his cases, on the grid."""
     for operator, (points, total) in calibration.pointing.operators.items():
         own = [case for case in calibration.cases if case.placed.case.operator == operator]
@@ -54,7 +64,7 @@ def operator_ellipses(calibration: Calibration) -> Iterator[tuple[int, Figure]]:
         yield operator, _on_grid(calibration, own[0].placed.case.plate, points, total, title)
 
 
-def total_ellipses(calibration: Calibration) -> Figure:
+def total_ellipses(calibration: Calibration) -> Sketch:
     """Draw the ellipses of all pointings, point by point, on the grid of the first plate."""
     pointing = calibration.pointing
     title = f"All pointings, {len(calibration.cases)} cases, {len(pointing.operators)} operators"
@@ -64,29 +74,25 @@ def total_ellipses(calibration: Calibration) -> Figure:
 
 def _on_grid(
     calibration: Calibration, plate: int, points: Mapping[int, Precision], total: Precision, title: str
-) -> Figure:
+) -> Sketch:
     """Draw the ellipses of points at all levels, in the axes of the comparator."""
     grid = calibration.session.grids[plate]
     place = dict(zip(grid.points.tolist(), grid.xy_um / MM, strict=True))
     known = {point: own for point, own in points.items() if point in place and own.degrees_of_freedom > 0}
-    figure = new_figure(7.2, 7.0)
-    axes = figure.subplots()
-    if known:
-        places = np.array([place[point] for point in known])
-        ellipses = [own.ellipse for own in known.values()]
-        largest = max(CONFIDENCE_FACTORS.values()) * max(ellipse.major_um for ellipse in ellipses)
-        scale = _scale(places, largest)
-        for percent, factor in CONFIDENCE_FACTORS.items():
-            _ellipses(axes, places, ellipses, factor * scale, faint=percent != LEAST)
-        plain(axes, "X of the plate, mm", "Y of the plate, mm")
-        axes.margins(0.12)
-        key([axes], scale, round_length(largest))
     pooled = f"pooled {total.sd_point_um:.2f} µm" if total.degrees_of_freedom > 0 else "no repeated readings"
-    axes.set_title(f"{title}: {pooled}\nellipses of {LEVELS} percent; * no deviation", fontsize=10)
-    return figure
+    title = f"{title}: {pooled}\nellipses of {LEVELS} percent; * no deviation"
+    if not known:
+        return Sketch(7.2, 7.0, [plan(around(np.array([*place.values()])), (), title, OF_PLATE)])
+    places = np.array([place[point] for point in known])
+    ellipses = [own.ellipse for own in known.values()]
+    largest = max(CONFIDENCE_FACTORS.values()) * max(ellipse.major_um for ellipse in ellipses)
+    scale = _scale(places, largest)
+    scales = {percent: factor * scale for percent, factor in CONFIDENCE_FACTORS.items()}
+    marks, key = _ellipses(places, ellipses, scales), (scale, round_length(largest))
+    return Sketch(7.2, 7.0, [plan(around(places, 0.12), marks, title, OF_PLATE, key)])
 
 
-def pooled_ellipses(calibration: Calibration) -> Figure:
+def pooled_ellipses(calibration: Calibration) -> Sketch:
     """Draw the pooled ellipses of every case, every operator and all, each at all levels, on one scale."""
     pointing = calibration.pointing
     pooled = [
@@ -95,47 +101,36 @@ def pooled_ellipses(calibration: Calibration) -> Figure:
         ("all", pointing.total),
     ]
     known = [(name, own) for name, own in pooled if own.degrees_of_freedom > 0]
-    figure, axes = panels(max(len(known), 1), side=2.6)
     largest = max((own.ellipse.major_um for _, own in known), default=1.0) or 1.0
     reach = 1.15 * largest * max(CONFIDENCE_FACTORS.values())
-    for panel, (name, own) in zip(axes, known, strict=False):
-        for percent, factor in CONFIDENCE_FACTORS.items():
-            _ellipses(panel, np.zeros((1, 2)), [own.ellipse], factor, faint=percent != LEAST)
-        panel.set_title(f"{name}: {own.sd_point_um:.3f} µm", fontsize=9, loc="left")
-        plain(panel, "x, µm", "y, µm")
-        panel.set_xlim(-reach, reach)
-        panel.set_ylim(-reach, reach)
-        panel.label_outer()
-    figure.suptitle(f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)", fontsize=11)
-    return figure
+    limits = np.array([[-reach, -reach], [reach, reach]])
+    panels = [
+        Panel(
+            limits,
+            _ellipses(np.zeros((1, 2)), [own.ellipse], CONFIDENCE_FACTORS),
+            f"{name}: {own.sd_point_um:.3f} µm",
+            "x, µm",
+            "y, µm",
+            equal=True,
+        )
+        for name, own in known
+    ]
+    title = f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)"
+    return side_by_side(panels or [Panel(limits)], ACROSS, 2.6, title)
 
 
 def _scale(places_mm: Floats, largest_um: float) -> float:
     """Return millimetres of the picture a micrometre: the largest ellipse fills half the spacing."""
-    extent = float(np.ptp(places_mm, axis=0).max()) or 1.0
-    spacing = extent / max(math.sqrt(len(places_mm)) - 1, 1)
-    return 0.5 * spacing / largest_um if largest_um > 0 else 1.0
+    return 0.5 * spacing(places_mm) / largest_um if largest_um > 0 else 1.0
 
 
-def _ellipses(
-    axes: Axes, places: Floats, ellipses: Sequence[Ellipse], scale: float, *, faint: bool = False
-) -> None:
-    """Draw ellipses, and a star where a point has none."""
-    from matplotlib.collections import EllipseCollection
-
-    axes.plot(*places.T, "+", color=FAINT, markersize=4)
-    axes.add_collection(
-        EllipseCollection(
-            [2 * scale * ellipse.major_um for ellipse in ellipses],
-            [2 * scale * ellipse.minor_um for ellipse in ellipses],
-            [math.degrees(ellipse.angle_rad) for ellipse in ellipses],
-            units="xy",
-            offsets=places,
-            transOffset=axes.transData,
-            facecolor="none",
-            edgecolor=FAINT if faint else MAIN,
-            linewidth=0.7 if faint else 1.0,
-        )
-    )
-    none = [k for k, ellipse in enumerate(ellipses) if ellipse.major_um == 0.0]
-    axes.plot(*places[none].T, "*", color=ACCENT, markersize=5)
+def _ellipses(places: Floats, ellipses: Sequence[Ellipse], scales: Mapping[int, float]) -> list[Mark]:
+    """Return ellipses of each of some percents, and a star where a point has none."""
+    semi_axes = np.array([[each.major_um, each.minor_um] for each in ellipses])
+    turns = np.degrees([each.angle_rad for each in ellipses])
+    marks: list[Mark] = [Markers(places, "+", 4.0, FAINT)]
+    for percent, scale in scales.items():
+        colour, width = (MAIN, 1.0) if percent == LEAST else (FAINT, 0.7)
+        marks.append(Ellipses(places, scale * semi_axes, turns, colour, width))
+    none = places[semi_axes[:, 0] == 0.0]
+    return [*marks, Markers(none, "*", 5.0, ACCENT)] if len(none) else marks

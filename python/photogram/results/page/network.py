@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.plots.accessor import figures, sketch_of
+from photogram.plots.accessor import sketch_of
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
 from photogram.results.observation_rows import tested_singly
@@ -34,7 +34,7 @@ from photogram.statistics.distributions import LEVEL, bonferroni, critical_norma
 from photogram.statistics.findings import Tested
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 _NOT_CHECKED = 0.01
 
@@ -353,11 +353,7 @@ CAPTIONS = {
 
 def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
     """Return the pictures that a result may have, by name; what there is nothing of draws nothing."""
-
-    def draw(name: str) -> Figure | None:
-        return figures(result, [name]).get(name)
-
     return {
-        name: Drawing(f"picture-{name}", *words, partial(draw, name), partial(sketch_of, result, name))
+        name: Drawing(f"picture-{name}", *words, partial(sketch_of, result, name))
         for name, words in CAPTIONS.items()
     }

@@ -292,8 +292,8 @@ def _overlap(found: Statement) -> Drawing:
     texts, unit = found.texts, found.result.block.linear_unit
     labels = {name: texts(f"column.{name}") for name in ("east", "north", "photos")}
     labels |= {"unit": unit, "decimal": texts("number.decimal")}
-    draw = partial(overlap, found.result, labels)
-    return Drawing("map-overlap", texts("page.overlap"), texts("page.overlap.caption"), draw)
+    sketch = partial(overlap, found.result, labels)
+    return Drawing("map-overlap", texts("page.overlap"), texts("page.overlap.caption"), sketch)
 
 
 def _markers(found: Statement) -> list[Table]:

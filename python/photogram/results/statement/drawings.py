@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.lazy_dataclasses import replace
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.standards import Lengths
-from photogram.show.pictures import arrows, decimal_sign, ellipses, new_figure, round_length
-from photogram.show.style import BLUE, INK, SOFT, VERMILION
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, around, spread
+from photogram.show.sketch.marks import (
+    Arrows,
+    Ellipses,
+    Level,
+    Line,
+    Mark,
+    Markers,
+    Mesh,
+    Names,
+    Segments,
+    Shades,
+    ellipse_axes,
+    error_bars,
+)
+from photogram.show.style import BLUE, SOFT, VERMILION
 
 WIDTH = 6.3
 """Inches of a picture."""
@@ -29,88 +39,76 @@ CELLS = 120
 """Of the longer side of the map of overlap."""
 
 
-def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Figure | None:
+def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Sketch | None:
     """Draw (k, 3) control, check points, their differences in plan, and those in height as colours."""
     if not len(found) and not len(control):
         return None
-    places = [each[:, :2] for each in (found.places, control) if len(each)]
-    every = np.concatenate(places)
-    extent = np.ptp(every, axis=0)
-    figure = new_figure(WIDTH, float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH)))
-    axes = figure.add_subplot()
-    axes.set_aspect("equal", adjustable="datalim")
+    places = np.concatenate([each[:, :2] for each in (found.places, control) if len(each)])
+    extent = np.ptp(places, axis=0)
+    panel = _in_plan(around(places, 0.12), labels)
+    marks = list[Mark]()
     if len(control):
-        axes.plot(*control[:, :2].T, "^", color=SOFT, markersize=6, label=labels["control"], linestyle="none")
+        marks.append(Markers(control[:, :2], "^", 6.0, SOFT, label=labels["control"]))
     if len(found):
-        _points(figure, axes, found, float(extent.max()), labels)
-    axes.margins(0.12)
-    axes.legend(loc="upper left", fontsize="small")
-    return _in_plan(figure, axes, labels)
+        panel = _points(panel, found, float(extent.max()), labels)
+    height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
+    return Sketch(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="above")])
 
 
-def _in_plan(figure: Figure, axes: Axes, labels: dict[str, str]) -> Figure:
-    axes.set_xlabel(f"{labels['east']}, {labels['unit']}")
-    axes.set_ylabel(f"{labels['north']}, {labels['unit']}")
-    axes.ticklabel_format(useOffset=False, style="plain")
-    decimal_sign(figure, labels["decimal"])
-    return figure
+def _in_plan(limits: Floats, labels: dict[str, str]) -> Panel:
+    across, up = (f"{labels[axis]}, {labels['unit']}" for axis in ("east", "north"))
+    return Panel(limits, across=across, up=up, equal=True, decimal=labels["decimal"])
 
 
-def _points(figure: Figure, axes: Axes, found: Compared, extent: float, labels: dict[str, str]) -> None:
+def _points(panel: Panel, found: Compared, extent: float, labels: dict[str, str]) -> Panel:
+    """Return a panel with check points, their differences and ellipses, and the scales of these."""
     plan, d = found.places[:, :2], found.differences
     heights = np.where(np.isfinite(d[:, 2]), d[:, 2], 0.0)
     most = max(float(np.abs(heights).max()), 1e-12)
-    drawn = axes.scatter(
-        plan[:, 0],
-        plan[:, 1],
-        c=heights,
-        cmap="RdBu_r",
-        vmin=-most,
-        vmax=most,
-        marker="s",
-        s=26,
-        edgecolors=INK,
-        linewidths=0.5,
-        label=labels["check"],
-        zorder=3,
-    )
-    figure.colorbar(drawn, ax=axes, shrink=0.8, label=f"{labels['height']}, {labels['unit']}")
+    shades = Shades(-most, most, f"{labels['height']}, {labels['unit']}", "signed")
+    marks: list[Mark] = [
+        Markers(plan, "s", 5.1, edge=0.0, values=heights, shades=shades, layer=3.0),
+        Markers(plan, "s", 5.1, face="none", edge=0.5, label=labels["check"], layer=3.5),
+    ]
+    bars: list[ScaleBar] = []
     both = np.isfinite(d[:, :2]).all(axis=1)
     if both.any():
         largest = max(float(np.hypot(*d[both, :2].T).max()), 1e-12)
-        scale = largest / (REACH * max(extent, 1e-9))
-        style: dict[str, Any] = {"color": VERMILION, "width": 0.003, "zorder": 4}
-        arrows(axes, plan[both], d[both, :2], scale, **style)
-        own = found.blocks(found.covariance)[both, :2, :2]
-        ellipses(axes, plan[both], own, NINETY_FIVE / scale, color=BLUE, linewidth=0.6, zorder=2)
+        scale = REACH * max(extent, 1e-9) / largest
+        semi_axes, angles = ellipse_axes(found.blocks(found.covariance)[both, :2, :2])
+        marks += [
+            Ellipses(plan[both], NINETY_FIVE * scale * semi_axes, angles, BLUE, 0.6),
+            Arrows(plan[both], scale * d[both, :2], VERMILION, 0.003, layer=4.0),
+        ]
         length = round_length(largest)
-        sizes = (f"{size:.3g} {labels['unit']}" for size in (length, length / scale))
-        label = " = ".join(sizes).replace(".", labels["decimal"])
-        axes.plot([], [], color=VERMILION, label=label)
+        sizes = (f"{size:.3g} {labels['unit']}" for size in (length, length * scale))
+        bars.append((length * scale, VERMILION, " = ".join(sizes).replace(".", labels["decimal"])))
     if len(found) <= NAMED:
-        for name, place in zip(found.names, plan, strict=True):
-            axes.annotate(name, place, (4, 4), textcoords="offset points", fontsize="x-small", color=SOFT)
+        marks.append(Names(plan, found.names, [SOFT] * len(found)))
+    return replace(panel, marks=marks, bars=bars, shades=shades)
 
 
-def lengths(found: Lengths, labels: dict[str, str]) -> Figure:
+def lengths(found: Lengths, labels: dict[str, str]) -> Sketch:
     """Draw errors of calibrated lengths over these, with one standard deviation, and their limits."""
-    figure = new_figure(WIDTH, 3.0)
-    axes = figure.add_subplot()
-    order = np.argsort(found.calibrated, kind="stable")
-    test = found.test
-    axes.errorbar(found.calibrated, test.errors, test.sd, fmt="o", color=BLUE, markersize=3, elinewidth=0.7)
+    test, order = found.test, np.argsort(found.calibrated, kind="stable")
+    places = np.column_stack([found.calibrated, test.errors])
+    ends = [test.errors - test.sd, test.errors + test.sd]
+    marks: list[Mark] = [
+        Segments(error_bars(places, *ends), BLUE, 0.7),
+        Markers(places, "o", 3.0, BLUE),
+        Level(0.0, SOFT, 0.6),
+    ]
     if test.limits is not None:
-        for sign in (1.0, -1.0):
-            limits = sign * test.limits[order]
-            axes.plot(found.calibrated[order], limits, "--", color=VERMILION, linewidth=0.9)
-    axes.axhline(0.0, color=SOFT, linewidth=0.6)
-    axes.set_xlabel(f"{labels['length']}, {labels['unit']}")
-    axes.set_ylabel(f"{labels['error']}, {labels['unit']}")
-    decimal_sign(figure, labels["decimal"])
-    return figure
+        for limit in (test.limits, -test.limits):
+            ends.append(limit)
+            line = np.column_stack([found.calibrated, limit])[order]
+            marks.append(Line(line, VERMILION, 0.9, "--"))
+    limits = np.column_stack([spread(found.calibrated), spread(0.0, *ends)])
+    across, up = (f"{labels[name]}, {labels['unit']}" for name in ("length", "error"))
+    return Sketch(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=labels["decimal"])])
 
 
-def overlap(result: Result, labels: dict[str, str]) -> Figure | None:
+def overlap(result: Result, labels: dict[str, str]) -> Sketch | None:
     """Draw how many adjusted photos see each place of the ground; None without footprints."""
     outlines = footprints(result).outlines[:, :, :2]
     outlines = outlines[np.isfinite(outlines).all(axis=(1, 2))]
@@ -122,13 +120,11 @@ def overlap(result: Result, labels: dict[str, str]) -> Figure | None:
         return None
     x, y = (np.arange(low[k] + cell / 2, high[k], cell) for k in (0, 1))
     counts = photos_per_place(outlines, x, y)
-    figure = new_figure(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)))
-    axes = figure.add_subplot()
-    shown = np.ma.masked_equal(counts, 0)
-    drawn = axes.pcolormesh(x, y, shown, cmap="viridis", shading="nearest", rasterized=True)
-    figure.colorbar(drawn, ax=axes, shrink=0.8, label=labels["photos"])
-    axes.set_aspect("equal")
-    return _in_plan(figure, axes, labels)
+    shades = Shades(0.0, float(counts.max()) or 1.0, labels["photos"])
+    corners = np.array([low, low + cell * np.array([len(x), len(y)])])
+    cells = Mesh(corners, np.where(counts > 0, counts, np.nan), shades)
+    panel = replace(_in_plan(corners, labels), marks=[cells], shades=shades)
+    return Sketch(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)), [panel])
 
 
 def photos_per_place(outlines: Floats, x: Floats, y: Floats) -> Floats:

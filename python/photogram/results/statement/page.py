@@ -179,8 +179,8 @@ def _map(found: Statement) -> Drawing:
         "unit": found.result.block.linear_unit,
         "decimal": texts("number.decimal"),
     }
-    draw = partial(differences, found.compared, control, labels)
-    return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), draw)
+    sketch = partial(differences, found.compared, control, labels)
+    return Drawing("map-differences", texts("page.map"), texts("page.map.caption"), sketch)
 
 
 def _features(texts: Texts, features: Features) -> Table:
@@ -225,9 +225,9 @@ def _metrology(found: Statement) -> list[Section]:
         tables.append(Table.of(texts("table.lengths"), range(len(lengths.lines)), columns))
         labels = {name: texts(f"column.{name}") for name in ("length", "error")}
         labels |= {"unit": unit, "decimal": texts("number.decimal")}
-        draw = partial(drawn_lengths, lengths, labels)
+        sketch = partial(drawn_lengths, lengths, labels)
         title, caption = texts("picture.lengths"), texts("picture.lengths.caption")
-        tables.append(Drawing("lengths", title, caption, draw))
+        tables.append(Drawing("lengths", title, caption, sketch))
     if found.standards.iso_19157:
         measures = Table.of(
             texts("table.iso"),

@@ -145,7 +145,7 @@ class Statement(Grounds, Brief):
     def to_html(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return the page as one HTML file that needs nothing else, and write it where a path is given.
 
-        Needs jinja2 and matplotlib (`pip install 'photogram[report]'`).
+        Needs jinja2 (`pip install 'photogram[report]'`).
         """
         from photogram.show.html import page_html
 

@@ -28,8 +28,8 @@ def stops(name: str) -> tuple[Floats, Floats]:
 def rgb(shades: Shades, values: Floats) -> Indices:
     """Return (..., 3) red, green and blue, 0 to 255, of values; those beyond have the colours of the ends."""
     places, colours = stops(shades.map)
-    part = (values - shades.low) / (shades.high - shades.low)
-    return np.stack([np.interp(part, places, own) for own in colours.T], axis=-1).round().astype(np.int64)
+    parts = shades.parts(values)
+    return np.stack([np.interp(parts, places, own) for own in colours.T], axis=-1).round().astype(np.int64)
 
 
 def hexadecimal(colour: Indices) -> str:

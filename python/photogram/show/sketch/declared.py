@@ -30,13 +30,19 @@ class Panel:
     bars
         Scales of what is enlarged, above, under the title.
     legend
-        Where: `beside`, `above`, `upper right`, `lower right`, `best` (the emptiest corner), or nowhere.
+        Where: `beside`, `above`, `below`, a corner (`upper right` ...), `best` (the emptiest), or nowhere.
     across_names, up_names
         Of 0, 1, 2 ... along the axes, in place of numbers.
     turned
         Whether names across are written upwards.
-    bare
-        Whether there are no lines of axes.
+    bare, unnumbered
+        Whether there are no lines of axes; whether these have no numbers.
+    log_across, log_up
+        Whether equal ratios are equally long along an axis.
+    shades
+        What a bar of colours beside the panel shows.
+    decimal
+        Sign of the numbers along the axes, in the language of the picture.
     """
 
     limits: Floats
@@ -52,6 +58,16 @@ class Panel:
     up_names: Sequence[str] = ()
     turned: bool = False
     bare: bool = False
+    unnumbered: bool = False
+    log_across: bool = False
+    log_up: bool = False
+    shades: Shades | None = None
+    decimal: str = "."
+
+    def even(self, places: Floats) -> Floats:
+        """Return (..., 2) places as they are spaced: their logarithms along axes that have these."""
+        log = np.array([self.log_across, self.log_up])
+        return np.where(log, np.log10(np.where(log, places, 1.0)), places) if log.any() else places
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +80,12 @@ class Sketch:
         Inches, of which it takes no more than its panels need.
     columns
         Of panels.
-    shades, beside_all
-        What the bar of colours shows, and whether it stands beside all panels or belongs to the last.
+    shades
+        What a bar of colours beside all panels shows.
     shared
         Whether the panels of a column have their numbers across below the lowest only.
+    title
+        Of all panels.
     """
 
     width: float
@@ -75,8 +93,8 @@ class Sketch:
     panels: Sequence[Panel | None]
     columns: int = 1
     shades: Shades | None = None
-    beside_all: bool = False
     shared: bool = False
+    title: str = ""
 
     @property
     def rows(self) -> int:
@@ -92,3 +110,17 @@ def spread(*values: Floats | float) -> tuple[float, float]:
     # As wide as matplotlib has it: a twentieth on either side.
     room = 0.05 * (high - low) or 0.05 * (abs(low) or 1.0)
     return low - room, high + room
+
+
+def around(places: Floats, part: float = 0.08) -> Floats:
+    """Return (2, 2) limits around (n, 2) places with room on all sides, a part of their larger extent."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    room = part * (float((high - low).max()) or 1.0)
+    return np.array([low - room, high + room])
+
+
+def side_by_side(panels: Sequence[Panel], most: int, side: float, title: str = "") -> Sketch:
+    """Return a picture of panels about as high as wide, `side` inches, so many in a row at most."""
+    columns = min(len(panels), most)
+    height = side * -(-len(panels) // columns) + (0.3 if title else 0.0)
+    return Sketch(max(side * columns, 5.0), height, panels, columns, title=title)

@@ -13,13 +13,13 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.letters import widest, width, wrapped
-from photogram.show.sketch.marks import Band, Level, Line, Mark, Markers
+from photogram.show.sketch.marks import Band, Labelled, Level, Line, Markers, Segments
 from photogram.show.sketch.names import Box
 from photogram.show.sketch.ticks import Ticks, ticks
 
-TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 10.0, 9.0, 8.0, 8.0, 7.5, 7.0
+HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0
 """Sizes of letters, as in the settings of matplotlib."""
-TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 13.0, 9.6, 11.5, 12.0
+HEAD_LINE, TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 15.0, 13.0, 9.6, 11.5, 12.0
 SWATCH = 16.0
 """Width of the sample of a mark in a legend."""
 GAP = 8.0
@@ -42,6 +42,8 @@ class Placed:
         What is written along them; `numbered`: whether across, too.
     title, notes
         Their lines.
+    beside
+        Room of the numbers at the left, of all panels of its column: their names are aligned.
     """
 
     panel: Panel
@@ -51,24 +53,30 @@ class Placed:
     numbered: bool
     title: list[str]
     notes: list[str]
+    beside: float = 0.0
 
     def at(self, places: Floats) -> Floats:
         """Return (..., 2) places in the units of the axes as points of the picture."""
         left, top, right, low = self.box
-        first, last = self.panel.limits
-        part = (places - first) / (last - first)
+        first, last = self.panel.even(self.panel.limits)
+        part = (self.panel.even(places) - first) / (last - first)
         found: Floats = [left, low] + part * [right - left, top - low]
         return found
 
 
-def legend_size(marks: list[Mark]) -> tuple[float, float]:
+def legend_size(marks: list[Labelled]) -> tuple[float, float]:
     """Return width and height of a legend of marks below each other."""
     return SWATCH + 6.0 + widest([mark.label for mark in marks], LEGEND), LEGEND_LINE * len(marks)
 
 
-def labelled(panel: Panel) -> list[Mark]:
+def labelled(panel: Panel) -> list[Labelled]:
     """Return the marks that stand in the legend."""
-    return [mark for mark in panel.marks if mark.label]
+    return [mark for mark in panel.marks if isinstance(mark, Labelled) and mark.label]
+
+
+def heading(sketch: Sketch) -> list[str]:
+    """Return the lines of the title of all panels."""
+    return wrapped(sketch.title, HEAD, 72.0 * sketch.width - GAP)
 
 
 def named_axis(name: str, power: str) -> str:
@@ -82,6 +90,7 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     cells = [(*divmod(k, sketch.columns), _opened(panel)) for k, panel in there]
     lefts, rights, wide = _columns(sketch, cells)
     lowest = {column: row for row, column, _ in cells}
+    head = HEAD_LINE * len(heading(sketch))
     tops, belows, said = [0.0] * sketch.rows, [0.0] * sketch.rows, list[tuple[bool, list[str], list[str]]]()
     for row, column, panel in cells:
         room = wide + rights[column] - GAP
@@ -91,7 +100,7 @@ def laid_out(sketch: Sketch) -> list[Placed]:
         said.append((numbered, title, notes))
         tops[row] = max(tops[row], above(panel, title))
         belows[row] = max(belows[row], below(panel, numbered) + NOTE_LINE * len(notes) + GAP)
-    high = max((72.0 * sketch.height - sum(tops) - sum(belows)) / sketch.rows, SMALLEST)
+    high = max((72.0 * sketch.height - head - sum(tops) - sum(belows)) / sketch.rows, SMALLEST)
     sizes = [_size(panel, wide, high) for *_, panel in cells]
     # Panels that are lower than there is room leave none of it between them.
     heights = [0.0] * sketch.rows
@@ -100,11 +109,15 @@ def laid_out(sketch: Sketch) -> list[Placed]:
     found = []
     for (row, column, panel), size, (numbered, title, notes) in zip(cells, sizes, said, strict=True):
         left = sum(lefts[: column + 1]) + sum(rights[:column]) + column * wide
-        top = sum(tops[: row + 1]) + sum(belows[:row]) + sum(heights[:row])
+        top = head + sum(tops[: row + 1]) + sum(belows[:row]) + sum(heights[:row])
         box = (left, top, left + size[0], top + size[1])
         across, up = _ticks(panel, *size)
         found.append(Placed(panel, box, across, up, numbered, title, notes))
-    return found
+    columns = [column for _, column, _ in cells]
+    widths = [0.0] * sketch.columns
+    for column, placed in zip(columns, found, strict=True):
+        widths[column] = max(widths[column], widest(placed.up.texts, NUMBER))
+    return [replace(each, beside=widths[column]) for column, each in zip(columns, found, strict=True)]
 
 
 def _opened(panel: Panel) -> Panel:
@@ -118,10 +131,12 @@ def _columns(
     sketch: Sketch, cells: Sequence[tuple[int, int, Panel]]
 ) -> tuple[list[float], list[float], float]:
     """Return the margins of each column, and what is between them of each."""
-    lefts, rights = [0.0] * sketch.columns, [GAP] * sketch.columns
+    numbers, named, rights = ([each] * sketch.columns for each in (0.0, 0.0, GAP))
     for _, column, panel in cells:
-        left, right = _sides(panel, 72.0 * sketch.width / sketch.columns, 72.0 * sketch.height / sketch.rows)
-        lefts[column], rights[column] = max(lefts[column], left), max(rights[column], right)
+        sides = _sides(panel, 72.0 * sketch.width / sketch.columns, 72.0 * sketch.height / sketch.rows)
+        for known, own in zip((numbers, named, rights), sides, strict=True):
+            known[column] = max(known[column], own)
+    lefts = [one + other for one, other in zip(numbers, named, strict=True)]
     beside = sum(lefts) + sum(rights) + (OF_COLOURS if sketch.shades else 0.0)
     return lefts, rights, max((72.0 * sketch.width - beside) / sketch.columns, SMALLEST)
 
@@ -133,7 +148,13 @@ def above(panel: Panel, title: list[str]) -> float:
 
 
 def below(panel: Panel, numbered: bool) -> float:
-    """Return how high what stands below a box is, down to its notes: numbers and the name of the axis."""
+    """Return how high what stands below a box is, down to its notes: axis and legend."""
+    legend = LEGEND_LINE * len(labelled(panel)) + GAP / 2 if panel.legend == "below" else 0.0
+    return below_axis(panel, numbered) + legend
+
+
+def below_axis(panel: Panel, numbered: bool) -> float:
+    """Return how high numbers and the name of the axis below a box are."""
     numbers = 0.0
     if numbered:
         turned = widest(panel.across_names, NUMBER) if panel.turned else 0.0
@@ -141,22 +162,28 @@ def below(panel: Panel, numbered: bool) -> float:
     return numbers + (LABEL + 5.0 if panel.across else 0.0) + 3.0
 
 
-def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float]:
-    """Return how much room a panel needs at its left and right side, of a cell so wide and high."""
+def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float, float]:
+    """Return how much room numbers, names at the left and what is at the right need in a cell of a size."""
     across, up = _ticks(panel, 0.75 * wide, high)
-    left = widest(up.texts, NUMBER) + 7.0 + (LABEL + 6.0 if named_axis(panel.up, up.power) else 0.0)
+    numbers = widest(up.texts, NUMBER) + 7.0
+    named = LABEL + 6.0 if named_axis(panel.up, up.power) else 0.0
+    right = GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
     if panel.legend == "beside":
-        return left, GAP + legend_size(labelled(panel))[0] + GAP
-    return left, GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
+        right = GAP + legend_size(labelled(panel))[0] + GAP
+    return numbers, named, right + OF_COLOURS if panel.shades else right
 
 
 def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
+    if panel.unnumbered:
+        return Ticks(np.empty(0), []), Ticks(np.empty(0), [])
     found = []
-    for axis, (names, length) in enumerate(((panel.across_names, wide), (panel.up_names, high))):
+    sides = ((panel.across_names, wide, panel.log_across), (panel.up_names, high, panel.log_up))
+    for axis, (names, length, log) in enumerate(sides):
         if names:
             found.append(Ticks(np.arange(len(names), dtype=float), list(names)))
         else:
-            found.append(ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0))
+            own = ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log)
+            found.append(own.signed(panel.decimal))
     return found[0], found[1]
 
 
@@ -180,11 +207,12 @@ def legend_box(placed: Placed) -> Box:
         "lower left": (left + inner, low - high - inner),
         "lower right": (right - wide - inner, low - high - inner),
         "beside": (right + GAP, top),
+        "below": (left, low + below_axis(placed.panel, placed.numbered)),
     }
     where = placed.panel.legend
     if where == "best":
         curves = [placed.at(each) for each in _curves(placed.panel)]
-        del corners["beside"]
+        del corners["beside"], corners["below"]
         where = min(corners, key=lambda name: _inside(curves, (*corners[name], wide, high)))
     x, y = corners[where]
     return x, y, x + wide, y + high
@@ -198,6 +226,8 @@ def _curves(panel: Panel) -> list[Floats]:
             found += [np.column_stack([mark.across, each]) for each in (mark.low, mark.high)]
         elif isinstance(mark, (Line, Markers)):
             found.append(mark.places)
+        elif isinstance(mark, Segments):
+            found.append(mark.ends.reshape(-1, 2))
         elif isinstance(mark, Level):
             left, right = panel.limits[:, 0].tolist()
             found.append(np.column_stack([np.linspace(left, right, 60), np.full(60, mark.height)]))
@@ -209,15 +239,20 @@ def _inside(curves: list[Floats], box: Box) -> int:
     return sum(int(((each > [x, y]) & (each < [x + wide, y + high])).all(axis=1).sum()) for each in curves)
 
 
+def right_side(placed: Placed) -> float:
+    """Return the right side of a panel, or of the legend beside it."""
+    return legend_box(placed)[2] if placed.panel.legend == "beside" else placed.box[2]
+
+
 def right_end(placed: Placed) -> float:
     """Return how far to the right anything of a panel reaches."""
     left, _, right, _ = placed.box
     panel = placed.panel
     ends = [right + 0.5 * widest(placed.across.texts[-1:], NUMBER), left + widest(placed.title, TITLE)]
     ends.append(left + widest(placed.notes, NOTE))
+    ends.append(left + legend_size(labelled(panel))[0] if panel.legend == "below" else 0.0)
     ends.append(0.5 * (left + right + width(named_axis(panel.across, placed.across.power), LABEL)))
-    if panel.legend == "beside":
-        ends.append(legend_box(placed)[2])
+    ends.append(right_side(placed) + (GAP + OF_COLOURS if panel.shades else 0.0))
     scale = (right - left) / abs(panel.limits[1, 0] - panel.limits[0, 0])
     ends += [left + scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars]
     return max(ends)

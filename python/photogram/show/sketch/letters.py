@@ -30,12 +30,15 @@ def widest(texts: Sequence[str], size: float) -> float:
 
 
 def wrapped(text: str, size: float, room: float) -> list[str]:
-    """Return a text as lines that are no wider than there is room, broken between words."""
+    """Return a text as lines that are no wider than there is room, broken between words and where it is."""
     lines: list[str] = []
-    for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and width(longer, size) <= room:
-            lines[-1] = longer
-        else:
-            lines.append(word)
+    for given in text.split("\n"):
+        own: list[str] = []
+        for word in given.split():
+            longer = f"{own[-1]} {word}" if own else word
+            if own and width(longer, size) <= room:
+                own[-1] = longer
+            else:
+                own.append(word)
+        lines += own
     return lines

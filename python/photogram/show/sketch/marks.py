@@ -1,12 +1,8 @@
-"""What panels of pictures are made of: marks in the units of their axes, sizes in points (1/72 inch).
-
-A mark with a `label` stands in the legend; those of a higher `layer` lie over others.
-"""
+"""What panels of pictures are made of: marks in the units of their axes, sizes in points (1/72 inch)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import numpy as np
 
@@ -17,30 +13,54 @@ from photogram.show.style import INK
 NOWHERE = np.empty((0, 2))
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Mark:
+    """What stands on a panel; marks of a higher `layer` lie over others."""
+
+    layer: float = 2.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Labelled(Mark):
+    """A mark that stands in the legend where it has a `label`."""
+
+    label: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Shades:
-    """Colours of values from `low` to `high`: of the map `ordered` or `signed`; `label` of their bar."""
+    """Colours of values from `low` to `high`: of the map `ordered` or `signed`; `label` of their bar.
+
+    Where they are `log`, equal ratios of values have equal steps of colour.
+    """
 
     low: float
     high: float
     label: str
     map: str = "ordered"
+    log: bool = False
+
+    def parts(self, values: Floats) -> Floats:
+        """Return where values lie between the ends, which are 0 and 1."""
+        if self.log:
+            return np.asarray(np.log(values / self.low) / np.log(self.high / self.low))
+        return (values - self.low) / (self.high - self.low)
 
 
 @dataclass(frozen=True, eq=False)
-class Markers:
+class Markers(Labelled):
     """Small signs at (n, 2) places.
 
     Attributes
     ----------
     shape, size
-        As matplotlib has them: `.`, `o`, `+`, `^`, `s`, `D`, and the markersize.
+        As matplotlib has them: `.`, `o`, `+`, `^`, `s`, `D`, `*`, and the markersize.
     face
         Colour within the outline; that of the outline where nothing is given.
     edge
         Width of the outline.
     values, shades
-        (n,) values whose colours the markers have, the smallest on top.
+        (n,) values whose colours the markers have, the smallest on top, or the largest where `rising`.
     """
 
     places: Floats
@@ -52,12 +72,11 @@ class Markers:
     opacity: float = 1.0
     values: Floats | None = None
     shades: Shades | None = None
-    label: str = ""
-    layer: float = 2.0
+    rising: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class Line(Labelled):
     """A line through (n, 2) places; `dash` is nothing, `--` or `:`."""
 
     places: Floats
@@ -65,47 +84,40 @@ class Line:
     width: float = 1.5
     dash: str = ""
     opacity: float = 1.0
-    label: str = ""
-    layer: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class Level(Mark):
     """A line over the whole panel at a height."""
 
     height: float
     colour: str
     width: float = 0.5
     dash: str = ""
-    label: str = ""
-    layer: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Segments:
-    """Straight lines between (n, 2, 2) ends."""
+class Segments(Labelled):
+    """Straight lines between (n, 2, 2) ends; `dash` as of a line."""
 
     ends: Floats
     colour: str
     width: float
-    label: str = ""
-    layer: float = 2.0
+    dash: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class Arrows:
+class Arrows(Labelled):
     """Arrows from (n, 2) places by (n, 2) vectors, in one colour or n; `width` of the shaft in panels."""
 
     places: Floats
     vectors: Floats
     colours: str | Sequence[str]
     width: float
-    label: str = ""
-    layer: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Polygons:
+class Polygons(Labelled):
     """(n, v, 2) closed outlines; colours and opacities of their insides and edges."""
 
     outlines: Floats
@@ -114,36 +126,73 @@ class Polygons:
     edge: str
     edge_opacity: float
     width: float
-    label: str = ""
-    layer: float = 1.0
+    layer: float = field(default=1.0, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Ellipses:
-    """Ellipses about (n, 2) places: (n, 2) semi-axes, and (n,) degrees from the axis across to the first."""
+class Ellipses(Mark):
+    """Ellipses about (n, 2) places: (n, 2) semi-axes, and (n,) degrees from the axis across to the first.
+
+    Those with `fill`, an opacity, are filled and have no outline.
+    """
 
     places: Floats
     semi_axes: Floats
     angles: Floats
     colour: str
     width: float
-    label: str = ""
-    layer: float = 2.0
+    fill: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Mark):
     """Equal cells from the first corner to the second in the colours of (rows, columns) values; NaN: none."""
 
     corners: Floats
     values: Floats
     shades: Shades
-    label: str = ""
-    layer: float = 1.0
+    layer: float = field(default=1.0, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Band:
+class Contours(Mark):
+    """Areas between lines of equal value, of a grid.
+
+    Attributes
+    ----------
+    across, up
+        (columns,) and (rows,) places along the axes.
+    values
+        (rows, columns); NaN: none.
+    levels
+        Of the lines, upwards; each is written on its lines.
+    colour, width
+        Of the lines.
+    steps
+        Of colour from one level to the next.
+    """
+
+    across: Floats
+    up: Floats
+    values: Floats
+    levels: Floats
+    shades: Shades
+    colour: str = "white"
+    width: float = 0.9
+    steps: int = 1
+    layer: float = field(default=1.0, kw_only=True)
+
+    @property
+    def bounds(self) -> Floats:
+        """The values between which areas have one colour."""
+        places = np.arange(self.steps * (len(self.levels) - 1) + 1) / self.steps
+        along = np.log(self.levels) if self.shades.log else self.levels
+        found = np.interp(places, np.arange(len(self.levels)), along)
+        return np.asarray(np.exp(found) if self.shades.log else found)
+
+
+@dataclass(frozen=True, eq=False)
+class Band(Labelled):
     """What lies between two curves over (n,) `across`."""
 
     across: Floats
@@ -151,40 +200,51 @@ class Band:
     high: Floats
     colour: str
     opacity: float
-    label: str = ""
-    layer: float = 1.0
+    layer: float = field(default=1.0, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Texts:
-    """Words in the middle of (n, 2) places."""
+class Texts(Mark):
+    """Words at (n, 2) places, which are their `start`, `middle` or `end`."""
 
     places: Floats
     texts: Sequence[str]
     colours: Sequence[str]
     size: float
-    label: str = ""
-    layer: float = 3.0
+    anchor: str = "middle"
+    layer: float = field(default=3.0, kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Names:
+class Names(Mark):
     """Names beside (n, 2) places, where there is room: they cover no other place, and none to `avoid`."""
 
     places: Floats
     texts: Sequence[str]
     colours: Sequence[str]
     avoid: Floats = field(default_factory=lambda: NOWHERE)
-    label: str = ""
-    layer: float = 9.0
-
-
-Mark: TypeAlias = (
-    Markers | Line | Level | Segments | Arrows | Polygons | Ellipses | Mesh | Band | Texts | Names
-)
+    layer: float = field(default=9.0, kw_only=True)
 
 
 def bars(edges: Floats, heights: Floats, colour: str, opacity: float, label: str) -> Band:
     """Return a histogram, of (n + 1,) edges and (n,) heights from 0, as the band that it is."""
     across, up = np.repeat(edges, 2)[1:-1], np.repeat(heights, 2)
-    return Band(across, np.zeros(len(up)), up, colour, opacity, label)
+    return Band(across, np.zeros(len(up)), up, colour, opacity, label=label)
+
+
+def boxes(low: Floats, high: Floats) -> Floats:
+    """Return (n, 4, 2) outlines of boxes from (n, 2) lower left to (n, 2) upper right corners."""
+    corners = [low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])]
+    return np.stack(corners, axis=1)
+
+
+def ellipse_axes(covariances: Floats) -> tuple[Floats, Floats]:
+    """Return (n, 2) semi-axes and (n,) degrees of the standard ellipses of (n, 2, 2) covariances."""
+    variances, turns = np.linalg.eigh(covariances)
+    angles = np.degrees(np.arctan2(turns[:, 1, 1], turns[:, 0, 1]))
+    return np.sqrt(np.maximum(variances[:, ::-1], 0.0)), angles
+
+
+def error_bars(places: Floats, low: Floats, high: Floats) -> Floats:
+    """Return (n, 2, 2) upright ends of bars through (n, 2) places, from (n,) values to (n,) others."""
+    return np.stack([np.column_stack([places[:, 0], each]) for each in (low, high)], axis=1)

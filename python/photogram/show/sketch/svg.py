@@ -11,6 +11,8 @@ from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import (
     BAR_LINE,
     GAP,
+    HEAD,
+    HEAD_LINE,
     LABEL,
     LEGEND,
     LEGEND_LINE,
@@ -24,16 +26,20 @@ from photogram.show.sketch.layout import (
     Placed,
     above,
     below,
+    below_axis,
+    heading,
     labelled,
     laid_out,
     legend_box,
     low_end,
     named_axis,
     right_end,
+    right_side,
 )
-from photogram.show.sketch.letters import width
-from photogram.show.sketch.marks import Mark, Shades
+from photogram.show.sketch.letters import widest, width
+from photogram.show.sketch.marks import Labelled, Shades
 from photogram.show.sketch.names import Box
+from photogram.show.sketch.svg_contours import levels_written
 from photogram.show.sketch.svg_marks import Attributes, element, names, number, path, sample, svg, text
 from photogram.show.sketch.ticks import Ticks, ticks
 from photogram.show.style import FAINT, INK, SETTINGS
@@ -61,11 +67,13 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
     parts = [_panel(placed, f"{name}-{k}") for k, placed in enumerate(panels)]
     wide, high = max(map(right_end, panels)), max(map(low_end, panels))
     if sketch.shades is not None:
-        beside = panels if sketch.beside_all else panels[-1:]
-        top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
-        left = max(each.box[2] for each in beside) + GAP
-        parts.append(_colour_bar(sketch.shades, f"{name}-shades", (left, top, left + 9.0, low)))
-        wide = max(wide, left + OF_COLOURS)
+        parts.append(_colour_bar(sketch.shades, f"{name}-shades", panels))
+        wide = max(wide, max(map(right_side, panels)) + GAP + OF_COLOURS)
+    if said := heading(sketch):
+        x = min(each.box[0] for each in panels)
+        lines = "".join(text(x, HEAD_LINE * (k + 0.75), each) for k, each in enumerate(said))
+        parts.append(element("g", {"fill": INK, "font_size": HEAD}, lines))
+        wide = max(wide, x + widest(said, HEAD))
     look: Attributes = {"font_family": LETTERS, "font_size": NUMBER, "fill": "none"}
     size = f'viewBox="0 0 {wide + 2:.0f} {high + 2:.0f}" width="{96 / 72 * (wide + 2):.0f}"'
     head = element("svg", {"role": "img", "aria_label": title}).removesuffix("/>")
@@ -79,8 +87,10 @@ def _panel(placed: Placed, name: str) -> str:
     marks = "".join(svg(mark, placed) for mark in sorted(placed.panel.marks, key=lambda each: each.layer))
     legend, taken = _legend(placed)
     inside = element("g", {"clip_path": f"url(#{name}-clip)"}, marks) if marks else ""
-    words = [_axes(placed), _above(placed), legend, names(placed, taken), _notes(placed)]
-    return clip + inside + element("g", {"fill": INK}, "".join(words))
+    written = levels_written(placed, taken)
+    words = [_axes(placed), _above(placed), written, legend, names(placed, taken), _notes(placed)]
+    bar = _colour_bar(placed.panel.shades, f"{name}-shades", [placed]) if placed.panel.shades else ""
+    return clip + inside + element("g", {"fill": INK}, "".join(words)) + bar
 
 
 def _axes(placed: Placed) -> str:
@@ -105,12 +115,12 @@ def _axes(placed: Placed) -> str:
     found.append(element("g", {"text_anchor": "end"}, "".join(numbers)))
     middle: Attributes = {"text_anchor": "middle", "font_size": LABEL}
     if panel.across:
-        down = low + below(panel, placed.numbered) - 5.0
+        down = low + below_axis(panel, placed.numbered) - 5.0
         found.append(
             text(0.5 * (left + right), down, named_axis(panel.across, placed.across.power), **middle)
         )
     if up := named_axis(panel.up, placed.up.power):
-        x = left - 12.0 - max(width(each, NUMBER) for each in placed.up.texts)
+        x = left - 12.0 - placed.beside
         y = 0.5 * (top + low)
         found.append(text(x, y, up, **middle, transform=f"rotate(-90 {number(x)} {number(y)})"))
     return "".join(found)
@@ -166,13 +176,13 @@ def _legend(placed: Placed) -> tuple[str, list[Box]]:
     ground: Attributes = {"x": box[0], "y": box[1], "width": box[2] - box[0], "height": box[3] - box[1]}
     behind = (
         element("rect", {**ground, "fill": "white", "opacity": 0.85})
-        if placed.panel.legend != "beside"
+        if placed.panel.legend not in ("beside", "below")
         else ""
     )
     return behind + "".join(entries), [box]
 
 
-def _entry(mark: Mark, x: float, y: float) -> str:
+def _entry(mark: Labelled, x: float, y: float) -> str:
     """Return a sample of a mark and its name, their middle at a height."""
     panel = Panel(np.array([[0.0, 0.0], [SWATCH, 8.0]]))
     none = Ticks(np.empty(0), [])
@@ -181,9 +191,11 @@ def _entry(mark: Mark, x: float, y: float) -> str:
     return element("g", {"fill": "none"}, svg(sample(mark), own)) + said
 
 
-def _colour_bar(shades: Shades, name: str, box: Box) -> str:
-    """Return a bar of colours with numbers beside it."""
-    left, top, right, low = box
+def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
+    """Return a bar of colours with numbers beside it, at the right of panels."""
+    top, low = min(each.box[1] for each in beside), max(each.box[3] for each in beside)
+    left = max(map(right_side, beside)) + GAP
+    right = left + 9.0
     places, colours = stops(shades.map)
     steps = (
         element("stop", {"offset": place, "stop_color": hexadecimal(colour.astype(np.int64))})
@@ -193,8 +205,9 @@ def _colour_bar(shades: Shades, name: str, box: Box) -> str:
     found = [element("linearGradient", upwards, "".join(steps))]
     ground: Attributes = {"x": left, "y": top, "width": right - left, "height": low - top}
     found.append(element("rect", {**ground, "fill": f"url(#{name})"}))
-    given = ticks(np.array([shades.low, shades.high]), low - top, NUMBER, across=False)
-    heights = low - (given.values - shades.low) / (shades.high - shades.low) * (low - top)
+    ends = np.array([shades.low, shades.high])
+    given = ticks(ends, low - top, NUMBER, across=False, log=shades.log).signed(beside[0].panel.decimal)
+    heights = low - shades.parts(given.values) * (low - top)
     for y, said in zip(heights.tolist(), given.texts, strict=True):
         found.append(path(f"M{number(right)} {number(y)}h{TICK}", stroke=FAINT, stroke_width=0.8))
         found.append(text(right + 6.0, y + 0.36 * NUMBER, said, fill=INK))

@@ -20,6 +20,7 @@ from photogram.show.sketch.marks import (
     Arrows,
     Band,
     Ellipses,
+    Labelled,
     Level,
     Line,
     Mark,
@@ -28,6 +29,7 @@ from photogram.show.sketch.marks import (
     Names,
     Polygons,
     Segments,
+    Shades,
     Texts,
 )
 from photogram.show.sketch.names import Box, free_side
@@ -40,6 +42,10 @@ FAR = 1e5
 """Points, beyond which no line is drawn."""
 DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}
 """Lengths of strokes and gaps in widths of the line, as matplotlib has them."""
+STAR = np.stack([np.sin(np.pi / 5 * np.arange(10)), -np.cos(np.pi / 5 * np.arange(10))], axis=1)
+"""Directions of the corners of a star, from the top; every other one is an inner one."""
+HALO: dict[str, str | float] = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
+"""Of words over other things."""
 Attributes: TypeAlias = dict[str, str | float]
 
 
@@ -68,7 +74,7 @@ def path(data: str, **attributes: str | float) -> str:
     return element("path", {"d": data, **attributes}) if data else ""
 
 
-def _joined(places: Floats, end: str = "") -> str:
+def joined(places: Floats, end: str = "") -> str:
     """Return a line through (n, 2) points of the picture."""
     known = np.clip(places[np.isfinite(places).all(axis=1)], -FAR, FAR).round(1 if len(places) > MANY else 2)
     return "M" + " ".join(f"{x:g} {y:g}" for x, y in known.tolist()) + end if len(known) > 1 else ""
@@ -93,30 +99,35 @@ def _markers(mark: Markers, placed: Placed) -> str:
     at = placed.at(mark.places[inside])
     if mark.values is None or mark.shades is None:
         return _signs(mark, at, mark.colour)
-    # By colours, the smallest on top.
     shades, values = mark.shades, mark.values[inside]
-    levels = np.round((LEVELS - 1) * np.clip((values - shades.low) / (shades.high - shades.low), 0.0, 1.0))
+    levels = np.round((LEVELS - 1) * np.clip(shades.parts(values), 0.0, 1.0))
     found = []
-    for level in np.unique(levels[np.isfinite(levels)])[::-1].tolist():
-        value = shades.low + level / (LEVELS - 1) * (shades.high - shades.low)
-        found.append(_signs(mark, at[levels == level], hexadecimal(rgb(shades, np.array(value)))))
+    for level in np.unique(levels[np.isfinite(levels)])[:: 1 if mark.rising else -1].tolist():
+        colour = rgb(Shades(0.0, LEVELS - 1.0, "", shades.map), np.array(level))
+        found.append(_signs(mark, at[levels == level], hexadecimal(colour)))
     return "".join(found)
 
 
 def _signs(mark: Markers, at: Floats, colour: str) -> str:
     size, half = mark.size, number(0.5 * mark.size)
     opacity: str | float = mark.opacity if mark.opacity < 1 else ""
-    if mark.shape in "o." and not mark.face:
+    if mark.shape == "." or (mark.shape == "o" and not mark.face):
         # Half of the size and an outline: what matplotlib makes of a `.`.
         across = size if mark.shape == "o" else 0.5 * size + mark.edge
-        # As a style: figures of matplotlib on the same page have a rule for the ends of all lines.
-        look: Attributes = {"stroke": colour, "stroke_width": across, "style": "stroke-linecap:round"}
+        look: Attributes = {"stroke": colour, "stroke_width": across, "stroke_linecap": "round"}
         return path(_each(at, "h0"), **look, opacity=opacity)
     if mark.shape == "+":
         data = _each(at - [0.5 * size, 0.0], f"h{number(size)}m-{half}-{half}v{number(size)}")
         return path(data, stroke=colour, stroke_width=mark.edge, opacity=opacity)
     diagonal = number(np.sqrt(0.5) * size)
+    star = np.tile([0.5 * size, 0.19 * size], 5)[:, np.newaxis] * STAR
+    corners = "".join(f"l{x:.2f} {y:.2f}" for x, y in np.diff(star, axis=0).tolist())
     shift, sign = {
+        "*": (star[0], f"{corners}z"),
+        "o": (
+            [-0.5 * size, 0.0],
+            f"a{half} {half} 0 1 0 {number(size)} 0a{half} {half} 0 1 0 -{number(size)} 0z",
+        ),
         "^": ([0.0, -0.5 * size], f"l{half} {number(size)}h-{number(size)}z"),
         "s": ([-0.5 * size, -0.5 * size], f"h{number(size)}v{number(size)}h-{number(size)}z"),
         "D": (
@@ -137,20 +148,20 @@ def _stroke(colour: str, wide: float, dash: str = "") -> Attributes:
 def _line(mark: Line, placed: Placed) -> str:
     opacity: str | float = mark.opacity if mark.opacity < 1 else ""
     look = _stroke(mark.colour, mark.width, mark.dash)
-    return path(_joined(placed.at(mark.places)), **look, opacity=opacity, stroke_linejoin="round")
+    return path(joined(placed.at(mark.places)), **look, opacity=opacity, stroke_linejoin="round")
 
 
 @svg.register(Level)
 def _level(mark: Level, placed: Placed) -> str:
-    height = placed.at(np.array([0.0, mark.height]))[1]
+    height = placed.at(np.array([placed.panel.limits[0, 0], mark.height]))[1]
     data = f"M{number(placed.box[0])} {number(height)}H{number(placed.box[2])}"
     return path(data, **_stroke(mark.colour, mark.width, mark.dash))
 
 
 @svg.register(Segments)
 def _segments(mark: Segments, placed: Placed) -> str:
-    data = "".join(_joined(ends) for ends in placed.at(mark.ends))
-    return path(data, **_stroke(mark.colour, mark.width))
+    data = "".join(joined(ends) for ends in placed.at(mark.ends))
+    return path(data, **_stroke(mark.colour, mark.width, mark.dash))
 
 
 @svg.register(Arrows)
@@ -170,8 +181,8 @@ def _arrows(mark: Arrows, placed: Placed) -> str:
     colours = np.array([mark.colours] * len(lengths) if isinstance(mark.colours, str) else mark.colours)
     for colour in dict.fromkeys(colours.tolist()):
         own = (colours == colour) & (lengths > 0)
-        shafts = "".join(_joined(each) for each in np.stack([tails, necks], axis=1)[own & long])
-        heads = "".join(_joined(each, "z") for each in outlines[own])
+        shafts = "".join(joined(each) for each in np.stack([tails, necks], axis=1)[own & long])
+        heads = "".join(joined(each, "z") for each in outlines[own])
         found += [path(shafts, stroke=colour, stroke_width=thick), path(heads, fill=colour)]
     return "".join(found)
 
@@ -186,7 +197,7 @@ def _polygons(mark: Polygons, placed: Placed) -> str:
         "stroke_width": mark.width,
     }
     # Each by itself: where many lie over each other, it is darker.
-    return element("g", look, "".join(path(_joined(each, "z")) for each in placed.at(mark.outlines)))
+    return element("g", look, "".join(path(joined(each, "z")) for each in placed.at(mark.outlines)))
 
 
 @svg.register(Ellipses)
@@ -207,6 +218,8 @@ def _ellipses(mark: Ellipses, placed: Placed) -> str:
         f"a{a:.2f} {b:.2f} {angle:.1f} 1 0 {-u:.2f} {-v:.2f}z"
         for x, y, a, b, angle, u, v in rows.tolist()
     )
+    if mark.fill:
+        return path(data, fill=mark.colour, opacity=mark.fill)
     return path(data, **_stroke(mark.colour, mark.width))
 
 
@@ -245,14 +258,14 @@ def _png(pixels: Indices) -> bytes:
 def _band(mark: Band, placed: Placed) -> str:
     lower, upper = (np.column_stack([mark.across, each]) for each in (mark.low, mark.high))
     outline = placed.at(np.concatenate([lower, upper[::-1]]))
-    return path(_joined(outline, "z"), fill=mark.colour, opacity=mark.opacity)
+    return path(joined(outline, "z"), fill=mark.colour, opacity=mark.opacity)
 
 
 @svg.register(Texts)
 def _texts(mark: Texts, placed: Placed) -> str:
     words = zip(placed.at(mark.places).tolist(), mark.texts, mark.colours, strict=True)
     found = (text(x, y + 0.36 * mark.size, said, fill=colour) for (x, y), said, colour in words)
-    return element("g", {"font_size": mark.size, "text_anchor": "middle"}, "".join(found))
+    return element("g", {"font_size": mark.size, "text_anchor": mark.anchor}, "".join(found))
 
 
 @svg.register(Names)
@@ -278,11 +291,10 @@ def names(placed: Placed, taken: list[Box]) -> str:
             if box is not None:
                 taken.append(box)
                 found.append(text(box[0] + 0.4, -box[1] - 1.8, said, fill=colour))
-    halo: Attributes = {"stroke": "white", "stroke_width": 1.6, "stroke_linejoin": "round"}
-    return element("g", {"font_size": NAME, "paint_order": "stroke", **halo}, "".join(found)) if found else ""
+    return element("g", {"font_size": NAME, "stroke_width": 1.6, **HALO}, "".join(found)) if found else ""
 
 
-def sample(mark: Mark) -> Mark:
+def sample(mark: Labelled) -> Labelled:
     """Return what a legend shows of a mark, on a panel of 16 by 8 points."""
     line = np.array([[0.0, 4.0], [16.0, 4.0]])
     if isinstance(mark, Markers):
@@ -295,7 +307,5 @@ def sample(mark: Mark) -> Mark:
         return replace(mark, places=line[:1], vectors=line[1:] - line[:1], width=1.3 / 16.0)
     if isinstance(mark, Polygons):
         return replace(mark, outlines=np.array([[[0.0, 1.0], [16.0, 1.0], [16.0, 7.0], [0.0, 7.0]]]))
-    if isinstance(mark, Band):
-        ends = np.array([0.0, 16.0])
-        return replace(mark, across=ends, low=np.full(2, 1.0), high=np.full(2, 7.0))
-    return mark
+    assert isinstance(mark, Band)
+    return replace(mark, across=np.array([0.0, 16.0]), low=np.full(2, 1.0), high=np.full(2, 7.0))

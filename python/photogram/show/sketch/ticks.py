@@ -23,8 +23,12 @@ class Ticks:
     texts: list[str]
     power: str = ""
 
+    def signed(self, decimal: str) -> Ticks:
+        """Return the same with the decimal sign of a language."""
+        return Ticks(self.values, [text.replace(".", decimal) for text in self.texts], self.power)
 
-def ticks(limits: Floats, length: float, size: float, *, across: bool) -> Ticks:
+
+def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool = False) -> Ticks:
     """Return the ticks of an axis.
 
     Parameters
@@ -35,8 +39,12 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool) -> Ticks:
         Of the axis and of letters, points.
     across
         Whether texts stand side by side.
+    log
+        Whether equal ratios are equally long: then they are 1, 2, 5 times powers of ten.
     """
     low, high = sorted(limits.tolist())
+    if log and (ratios := _ratios(low, high, length, size, across=across)):
+        return ratios
     extent = high - low
     if not extent > 0:
         return _written(np.array([low]), extent)
@@ -54,6 +62,20 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool) -> Ticks:
         if step >= least * (1 - 1e-9) and fits:
             break
     return found
+
+
+def _ratios(low: float, high: float, length: float, size: float, *, across: bool) -> Ticks | None:
+    """Return ticks of a logarithmic axis, as many as there is room for; None where that is fewer than two."""
+    powers = 10.0 ** np.arange(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+    for steps in ((1.0, 2.0, 5.0), (1.0, 5.0), (1.0,)):
+        every = np.outer(powers, steps).ravel()
+        values = every[(every >= low * (1 - 1e-9)) & (every <= high * (1 + 1e-9))]
+        found = Ticks(values, [f"{value:g}" for value in values.tolist()])
+        places = np.log(values) / math.log(high / low) * length
+        room = widest(found.texts, size) + 0.8 * size if across else 1.6 * size
+        if len(values) > 1 and (np.diff(places) > room).all():
+            return found
+    return None
 
 
 def _written(values: Floats, step: float) -> Ticks:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.writing import write_whole
-from photogram.show.pictures import drawn, new_figure
 from photogram.show.sketch.marks import NOWHERE
 from photogram.show.sketch.names import Box, free_side
 from photogram.show.style import FAINT, INK, styled
@@ -27,9 +24,6 @@ if TYPE_CHECKING:
 if not TYPE_CHECKING:
     Where = Any
     """Axes, as many as there are panels, a figure to put them in, or None: a new one of pyplot."""
-
-
-Drawn = TypeVar("Drawn")
 
 
 @contextmanager
@@ -87,36 +81,6 @@ def handed_out(axes: list[Axes]) -> Any:
     return found
 
 
-def figure_of(draw: Callable[[Where], object]) -> Figure:
-    """Return what is drawn as a figure that belongs to no window; `draw` takes what :func:`panels` takes."""
-    figure = new_figure(1.0, 1.0)
-    draw(figure)
-    return figure
-
-
-def placed(draw: Callable[[Where], Drawn], path: Path | None, ax: Where) -> Drawn:
-    """Return the axes of a picture that is drawn where it is asked for, and written where there is a path.
-
-    Parameters
-    ----------
-    draw
-        Draws into what :func:`panels` takes, and returns axes.
-    path
-        Of the file, which has the figure of the axes, in the format that its suffix names; None: no file.
-    ax
-        As of :func:`panels`; with a path and None, a figure that belongs to no window.
-
-    Raises
-    ------
-    InputError
-        A suffix that names no format; another number of axes.
-    """
-    axes = draw(new_figure(1.0, 1.0) if ax is None and path is not None else ax)
-    if path is not None:
-        write_whole({path: drawn(_figure(np.atleast_1d(np.asarray(axes, dtype=object))[0]), path)})
-    return axes
-
-
 def note(axes: Axes, lines: Sequence[str]) -> None:
     """Write what a reader must know below the axes: what was left out, what stands for many."""
     from matplotlib.offsetbox import AnchoredText
@@ -138,7 +102,7 @@ def note(axes: Axes, lines: Sequence[str]) -> None:
     axes.add_artist(box)
 
 
-def _figure(axes: Axes) -> Figure:
+def whole_figure(axes: Axes) -> Figure:
     """Return the figure that axes are in, also where they are in a part of one."""
     part = axes.get_figure()
     assert part is not None
@@ -150,7 +114,7 @@ def _below(axes: Axes) -> Any:
     from matplotlib.transforms import ScaledTranslation
 
     down = 34.0 / 72.0 if axes.get_xlabel() else 22.0 / 72.0
-    figure = _figure(axes)
+    figure = whole_figure(axes)
     return axes.transAxes + ScaledTranslation(0.0, -down, figure.dpi_scale_trans)
 
 
@@ -168,7 +132,7 @@ def scale_bars(axes: Axes, bars: Sequence[tuple[float, str, str]], title: str) -
     """
     from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
-    figure = _figure(axes)
+    figure = whole_figure(axes)
     left, right = axes.get_xlim()
     plain = blended_transform_factory(axes.transData, axes.transAxes)
     sign = 1.0 if right > left else -1.0
@@ -222,10 +186,10 @@ def labels(
     """
     from matplotlib.text import Annotation
 
-    figure = _figure(axes)
+    figure = whole_figure(axes)
     # Where legends and scales of equal axes go is known only when the layout was made twice.
     for _ in range(2):
-        _lay_out(figure)
+        lay_out(figure)
     room: Box = axes.get_window_extent().extents
     point = figure.dpi / 72.0
     own_boxes = (each.get_window_extent() for each in axes.texts if isinstance(each, Annotation))
@@ -252,7 +216,7 @@ def labels(
     return left_out
 
 
-def _lay_out(figure: Figure) -> None:
+def lay_out(figure: Figure) -> None:
     """Put axes and legends of a figure where they will be drawn."""
     engine = figure.get_layout_engine()
     if engine is None:
