@@ -105,6 +105,15 @@ def test_a_start_far_away_ends_in_the_same_place() -> None:
     assert again.sum_and_freedom[0] == pytest.approx(golden()["solution"]["cost"], rel=1e-9)
 
 
+def test_chords_lead_to_the_solution_where_steps_creep() -> None:
+    """A loss that leaves everything as it is takes plain steps, each a fifth of the one before."""
+    plain, result = adjust(board(), loss=("huber", 1e6)), adjusted()
+    assert [result.formations, plain.formations] == [3, 8]
+    assert result.iterations[-1].largest_change < 1e-8
+    sd = np.sqrt(np.diagonal(plain.photo_cofactors, axis1=1, axis2=2))
+    assert (np.abs(result.photo_attitudes - plain.photo_attitudes) / sd[:, 3:]).max() < 1e-4
+
+
 def test_parts_refuse_unknown_knots() -> None:
     with pytest.raises(InputError, match=r"blocks in parts: images of the block pass a knots"):
         adjust_in_parts(board().replace(passages=[]), Division(parts=2))

@@ -18,7 +18,7 @@ use crate::normals::{Chord, dot};
 
 /// Steps that change the unknowns by less than this multiple of their standard deviations leave the normal equations as they are; from farther
 /// away chords lead higher.
-const CLOSE: f64 = 0.5;
+const CLOSE: f64 = 3.0;
 /// So many chords follow a step at the most, and are remembered;
 const MOST: usize = 40;
 /// so many leave this part of the first of them at the most: else normal equations of other values do better.
@@ -33,14 +33,13 @@ struct Link {
 }
 
 impl<'a> Run<'a, '_> {
-    /// Whether a full step is followed by chords until these have led to the solution: where steps have shown that they do not fall.
+    /// Whether a full step is followed by chords until these have led to the solution.
     pub(super) fn is_followed(&self, state: &State<'a>, step: &Iteration) -> bool {
         step.damping == 0.0
             && step.largest_change < CLOSE
             && self.options.loss.is_none()
             && self.problem.model.steps_swing()
             && state.linearized.factor.has_cached()
-            && (self.chord.is_some() || self.secants.correct() || self.is_slow(step))
     }
 
     /// The lowest values that chords lead to, the first of them from those given, and the length of the chord there; None where the first

@@ -115,16 +115,15 @@ impl<'a> Run<'a, '_> {
 }
 
 impl<'a> Run<'a, '_> {
-    /// The values that a step leads to, and a chord after it where that pays.
+    /// The values after a step, and after a chord from there where that pays.
     pub(super) fn stepped(
         &mut self,
         state: &State<'a>,
-        step: &[f64],
+        values: Vec<f64>,
         iteration: &Iteration,
     ) -> Result<Vec<f64>, AdjustError> {
         self.chord = None;
-        let (values, factor) = (self.problem.advanced(state.values(), step), &state.linearized.factor);
-        if !(factor.has_cached() && self.is_for_chord(iteration)) {
+        if !(state.linearized.factor.has_cached() && self.is_for_chord(iteration)) {
             return Ok(values);
         }
         let start = Instant::now();

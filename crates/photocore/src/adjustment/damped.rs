@@ -109,9 +109,6 @@ impl<'a> Run<'a, '_> {
             && state.linearized.damping() <= MOST_DAMPING
         {
             match self.step_from(state, &mut control)? {
-                ControlFlow::Continue(next) if self.is_outgrown(&next) => {
-                    return Ok(End::at(Status::NotConverged, next.recycle()));
-                }
                 ControlFlow::Continue(next) => state = next,
                 ControlFlow::Break(end) => return Ok(end),
             }
@@ -125,14 +122,30 @@ impl<'a> Run<'a, '_> {
         self.stay(state, status)
     }
 
-    /// Whether full steps have led to where groups touch other blocks than the layout has: more than a few groups, or any once steps are short.
-    fn is_outgrown(&self, state: &State<'a>) -> bool {
-        let Some(last) = self.iterations.last() else { return false };
-        let last = self.chord.unwrap_or(last.largest_change);
-        let most = if last <= SETTLED { 0 } else { self.problem.layout().groups() / FEW };
-        state.linearized.damping() == 0.0
+    /// Whether a full step leads to where groups touch other blocks than the layout has: more than a few groups, or any once steps are short. What
+    /// is left out of their equations would lead chords, and the last steps, elsewhere.
+    fn is_outgrown(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
+        let short = followed || step.largest_change <= SETTLED;
+        let most = if short { 0 } else { self.problem.layout().groups() / FEW };
+        step.damping == 0.0
             && self.problem.model.steps_swing()
-            && self.threads.install(|| self.problem.model.outgrown(state.values())) > most
+            && self.threads.install(|| self.problem.model.outgrown(values)) > most
+    }
+
+    /// Takes a step to where groups touch other blocks than the layout has, unless it leads higher: whether it was taken.
+    fn leaves_layout(
+        &mut self,
+        iteration: Iteration,
+        before: &[f64],
+        after: &[f64],
+        best: f64,
+    ) -> Result<bool, AdjustError> {
+        let sum_of_squares = self.objective(after);
+        let lower = sum_of_squares <= best * (1.0 + ROUNDING);
+        if lower {
+            self.accept(Iteration { sum_of_squares, ..iteration }, before, after)?;
+        }
+        Ok(lower)
     }
 
     /// Solves, and takes the step or ends with it.
@@ -175,15 +188,21 @@ impl<'a> Run<'a, '_> {
             None => (step, (step, iteration)),
         };
         let Iteration { damping, largest_change: change, .. } = iteration;
-        let trial = match followed {
-            true => self.chords(&state, step, control)?,
-            false => self.stepped(&state, step, &iteration)?,
+        let ahead = self.problem.advanced(state.values(), step);
+        let outgrown = self.is_outgrown(&iteration, followed, &ahead);
+        let trial = match followed && !outgrown {
+            true => self.chords(&state, ahead, control)?,
+            false => self.stepped(&state, ahead, &iteration)?,
         };
         let moved = if damping == 0.0 { state.moved(step) } else { vec![] };
         let unknowns = state.recycle();
         let far = change > FAR * (unknowns.len() as f64).sqrt();
+        let trial = if far { self.relocated(trial) } else { trial };
+        if outgrown && self.leaves_layout(iteration, &unknowns, &trial, control.best)? {
+            return Ok(ControlFlow::Break(End::at(Status::NotConverged, trial)));
+        }
         self.look_ahead(&iteration);
-        let next = self.form(if far { self.relocated(trial) } else { trial }, relaxed(damping))?;
+        let next = self.form(trial, relaxed(damping))?;
         let negligible = damping == 0.0 && change <= NEGLIGIBLE;
         let highest = if negligible { f64::MAX } else { control.best * (1.0 + ROUNDING) };
         // A sum of squares that is not a number is a failure too, and so is a step that loses a local block.
@@ -231,14 +250,13 @@ impl<'a> Run<'a, '_> {
         Ok(ControlFlow::Continue(next))
     }
 
-    /// The values that a step and chords after it lead to.
+    /// The values that chords lead to from those after a step.
     fn chords(
         &mut self,
         state: &State<'a>,
-        step: &[f64],
+        values: Vec<f64>,
         control: &Control,
     ) -> Result<Vec<f64>, AdjustError> {
-        let values = self.problem.advanced(state.values(), step);
         let found = self.followed(state, values.clone(), (control.best, control.stop))?;
         self.chord = found.as_ref().map(|&(_, length)| length);
         Ok(found.map_or(values, |(values, _)| values))

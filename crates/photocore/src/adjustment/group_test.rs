@@ -109,6 +109,21 @@ fn eigen(matrix: &Matrix2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
     (Vector2::new(larger, smaller), vectors)
 }
 
+/// Rounding of a bound of correlations, relatively.
+const BARELY: f64 = 1e-9;
+
+/// h / (1 - h) of a group whose leverages by itself are these, H, with h their largest eigenvalue, which is no more than the norm; infinite where
+/// that may be 1.
+pub fn leverage_odds(leverages: impl Iterator<Item = f64>) -> f64 {
+    let norm = leverages.map(|value| value.powi(2)).sum::<f64>().sqrt();
+    if norm < 1.0 { norm / (1.0 - norm) } else { f64::INFINITY }
+}
+
+/// Whether the tests of two groups may be correlated by a limit: rho^2 <= h h' / ((1 - h) (1 - h')), by the odds of both.
+pub fn may_correlate(odds: f64, other: f64, limit: f64) -> bool {
+    limit <= 0.0 || odds * other >= limit * limit * (1.0 - BARELY)
+}
+
 /// The largest canonical correlation of two groups of residuals: the largest singular value of R_g^-1/2 R_gh R_h^-1/2.
 ///
 /// An error of one of them moves the test value of the other by this share of its own: from 0.9 on the two cannot be told apart.

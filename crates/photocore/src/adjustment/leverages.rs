@@ -6,6 +6,7 @@
 use std::ops::ControlFlow;
 
 use super::equations::ObservationEquations;
+use super::group_test::{leverage_odds, may_correlate};
 use super::linearized::{CofactorError, Inverted, Linearized};
 use super::options::Phase;
 use super::problem::AnyProblem;
@@ -18,9 +19,6 @@ use crate::normals::{
 use crate::sorting::sort_by;
 use crate::{Threads, parallel};
 use nalgebra::DMatrix;
-
-/// Rounding of a bound of correlations, relatively.
-const BARELY: f64 = 1e-9;
 
 /// A problem at adjusted values, with cofactors of everything inside the pattern of its normal equations.
 #[derive(Debug)]
@@ -277,20 +275,18 @@ impl Leverages {
     }
 }
 
-/// The rows of the groups of a local block that is held, H their leverages each by itself, whose residuals may be correlated by a limit
-/// with those of another of its groups: rho^2 <= h h' / ((1 - h) (1 - h')), h the largest eigenvalue of H, which is no more than the norm.
+/// The rows of the groups of a local block that is held whose residuals may be correlated by a limit with those of another of its groups.
 fn correlated_rows(own: &LocalCofactors, layout: &Layout, local: usize, limit: f64) -> Vec<usize> {
     let (rows, all, groups) = (layout.rows(), own.rows(), layout.groups_of(local).len());
     let odds = |group: usize| {
         let block = (0..rows * rows).map(|k| (group * rows + k / rows) * all + group * rows + k % rows);
-        let norm = block.map(|at| own.equations[at].powi(2)).sum::<f64>().sqrt();
-        if norm < 1.0 { norm / (1.0 - norm) } else { f64::INFINITY }
+        leverage_odds(block.map(|at| own.equations[at]))
     };
     let odds: Vec<f64> = (0..groups).map(odds).collect();
     let mut order: Vec<usize> = (0..groups).collect();
     sort_by(&mut order, &|a, b| odds[*b].total_cmp(&odds[*a]));
     let partner =
         |group: usize| order.iter().find(|&&other| other != group).map_or(0.0, |&other| odds[other]);
-    let may = |&group: &usize| limit <= 0.0 || odds[group] * partner(group) >= limit * limit * (1.0 - BARELY);
+    let may = |&group: &usize| may_correlate(odds[group], partner(group), limit);
     (0..groups).filter(may).flat_map(|group| group * rows..(group + 1) * rows).collect()
 }

@@ -76,7 +76,7 @@ impl Columns {
     fn with_plain(&self, count: usize, take: impl FnOnce(&mut GroupRows<'_>)) {
         let beside = self.poses + self.all - self.camera;
         let ends = [1, 3, self.main, beside].map(|width| 2 * count * width);
-        let mut room = vec![0.0; ends.iter().sum()];
+        let mut room: SmallVec<[f64; 64]> = smallvec![0.0; ends.iter().sum()];
         let (constant, rest) = room.split_at_mut(ends[0]);
         let (local, rest) = rest.split_at_mut(ends[1]);
         let (retained, shared) = rest.split_at_mut(ends[2]);

@@ -14,7 +14,9 @@ use super::model::{Bundle, Owner};
 use super::predictions::OnPoint;
 use super::suspects::{Home, Suspects};
 use super::trial::Trial;
-use crate::adjustment::{AdjustError, Linearized, ObservationRows, canonical_correlation};
+use crate::adjustment::{
+    AdjustError, Linearized, ObservationRows, canonical_correlation, leverage_odds, may_correlate,
+};
 use crate::geometry::{AttitudeNumbers, Matrix3};
 use crate::{Threads, parallel};
 
@@ -338,8 +340,9 @@ impl Trial {
         let is_in = |&k: &usize| self.suspects.all[own.suspects[k]].rows.iter().any(|row| self.is_in(row.0));
         let taking_part: Vec<usize> = (0..own.suspects.len()).filter(is_in).collect();
         let alone: Vec<Vec<f64>> = (0..own.suspects.len()).map(|k| block(k, k)).collect();
+        let odds: Vec<f64> = alone.iter().map(|cofactors| leverage_odds(from_identity(cofactors))).collect();
         for (at, &j) in taking_part.iter().enumerate() {
-            for &i in &taking_part[..at] {
+            for &i in taking_part[..at].iter().filter(|&&i| may_correlate(odds[i], odds[j], limit)) {
                 let between = block(i, j);
                 if between.iter().any(|value| value.is_nan()) {
                     continue;
@@ -352,6 +355,12 @@ impl Trial {
         }
         found
     }
+}
+
+/// I - R of the cofactors R of some residuals.
+fn from_identity(cofactors: &[f64]) -> impl Iterator<Item = f64> {
+    let next = cofactors.len().isqrt() + 1;
+    cofactors.iter().enumerate().map(move |(k, value)| f64::from(u8::from(k % next == 0)) - value)
 }
 
 impl Bundle {

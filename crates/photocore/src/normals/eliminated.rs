@@ -6,7 +6,7 @@ use std::ops::Range;
 use pulp::Simd;
 use smallvec::SmallVec;
 
-use super::batch::{Batch, parts_of, united};
+use super::batch::{Batch, parts_of, unite};
 use super::equations::{Equations, Prior};
 use super::incidence::Batches;
 use super::layout::Layout;
@@ -87,12 +87,13 @@ impl Coupled {
         let numbers = system.incidence.members(set).iter();
         let groups = numbers.map(|&number| system.incidence.group_with(number));
         let parts = groups.flat_map(|group| parts_of(layout, symbolic, group));
-        let all = united(parts.map(|(position, unknowns, _)| (position, unknowns))).into_iter();
+        let mut spans = vec![];
+        unite(parts.map(|(position, unknowns, _)| (position, unknowns)), &mut spans);
         let place = |(position, unknowns): (usize, Range<usize>)| {
             let start = symbolic.range(position).start;
             start + unknowns.start..start + unknowns.end
         };
-        self.shared = all.map(place).collect();
+        self.shared = spans.into_iter().map(place).collect();
     }
 
     /// Unknowns in a range: D in a main block, where that is known.

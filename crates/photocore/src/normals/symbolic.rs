@@ -8,6 +8,9 @@ use super::ordering::Ordering;
 use super::supernodes::{Merged, merge_columns, offsets, places, sort_commons};
 use crate::parallel;
 
+/// Operations that are as good as the least.
+const AS_GOOD: f64 = 1.05;
+
 /// The order of elimination and the pattern of the factor of the reduced normal equations.
 ///
 /// Blocks are counted by *position*, their place in the order of elimination. Blocks of nearly the same pattern are eliminated together,
@@ -90,7 +93,12 @@ impl Symbolic {
         };
         let predictions =
             candidates.iter().map(|&(candidate, operations, _)| (candidate, operations)).collect();
-        let best = candidates.into_iter().min_by(|(_, a, _), (_, b, _)| a.total_cmp(b));
+        let least = candidates.iter().map(|&(_, operations, _)| operations).fold(f64::INFINITY, f64::min);
+        // In the order of the input, which comes first, photos stand before what they share: equations go into small fronts, side by side.
+        let is_as_good = |(candidate, operations, _): &(Ordering, f64, _)| {
+            *operations <= if *candidate == Ordering::Input { AS_GOOD * least } else { least }
+        };
+        let best = candidates.into_iter().find(is_as_good);
         let (ordering, order) =
             best.map_or((Ordering::Input, Vec::new()), |(candidate, _, order)| (candidate, order));
         Self { predictions, ..Self::with_order(layout, &graph, ordering, &order) }

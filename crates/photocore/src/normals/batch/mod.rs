@@ -16,7 +16,7 @@ use super::symbolic::Symbolic;
 use super::triangle::Triangle;
 use super::vectorised::{Rows, size};
 
-pub(super) use place::{parts_of, united};
+pub(super) use place::{parts_of, unite};
 
 /// A main retained block that the local blocks are tied to.
 #[derive(Debug, Clone)]
@@ -165,6 +165,8 @@ pub(super) struct Batch {
     set: Option<u32>,
     commons: Vec<Common>,
     parts: Vec<Part>,
+    /// Room for the unknowns of the segments.
+    spans: Vec<(usize, Range<usize>)>,
     constants: Vec<f64>,
     local_rows: Vec<f64>,
     retained_rows: Vec<f64>,

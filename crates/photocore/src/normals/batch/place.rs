@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 use super::{Batch, Common, Part, Place, Run, Segment, Slot};
 use crate::normals::layout::Layout;
@@ -113,16 +113,18 @@ impl Batch {
             self.parts.extend(parts_of(layout, symbolic, shared.group).map(part));
             shared.parts = start..self.parts.len();
         }
-        let all = self.parts.iter().map(|part| (part.position, part.unknowns.clone()));
+        unite(self.parts.iter().map(|part| (part.position, part.unknowns.clone())), &mut self.spans);
+        let node = self.node;
         let segment = |(position, unknowns): (usize, Range<usize>)| Segment {
             position,
-            row: symbolic.row_of(self.node, position) + unknowns.start,
+            row: symbolic.row_of(node, position) + unknowns.start,
             unknowns,
             coupling: 0,
             runs: SmallVec::new(),
             plain: false,
         };
-        self.segments = united(all).into_iter().map(segment).collect();
+        self.segments.clear();
+        self.segments.extend(self.spans.drain(..).map(segment));
         for part in &mut self.parts {
             let key = (part.position, part.unknowns.start);
             let after =
@@ -153,9 +155,10 @@ impl Batch {
                 }
             }
         }
-        for (index, segment) in self.segments.iter_mut().enumerate() {
-            let parts = self.places.iter().flat_map(|place| &self.parts[place.parts.clone()]);
-            let touching = parts.filter(|part| part.segment == index).count();
+        let mut touching: SmallVec<[usize; 32]> = smallvec![0; self.segments.len()];
+        let parts = self.places.iter().flat_map(|place| &self.parts[place.parts.clone()]);
+        parts.for_each(|part| touching[part.segment] += 1);
+        for (segment, touching) in self.segments.iter_mut().zip(touching) {
             segment.plain = segment.runs.iter().map(|run| run.places.len()).sum::<usize>() == touching;
         }
     }
@@ -197,26 +200,24 @@ pub(in crate::normals) fn parts_of<'a>(
     })
 }
 
-/// Unites ranges of the unknowns of blocks that overlap or meet, in the order of their positions.
-pub(in crate::normals) fn united(
+/// Puts ranges of the unknowns of blocks into `spans`, those that overlap or meet united, in the order of their positions.
+pub(in crate::normals) fn unite(
     parts: impl Iterator<Item = (usize, Range<usize>)>,
-) -> SmallVec<[(usize, Range<usize>); 4]> {
-    let mut sorted: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
+    spans: &mut Vec<(usize, Range<usize>)>,
+) {
+    spans.clear();
     // Most groups have the same in shared as one of the few before.
     parts.for_each(|part| {
-        if !sorted.iter().rev().take(FEW).any(|other| *other == part) {
-            sorted.push(part);
+        if !spans.iter().rev().take(FEW).any(|other| *other == part) {
+            spans.push(part);
         }
     });
-    sorted.sort_unstable_by_key(|(position, unknowns)| (*position, unknowns.start));
-    let mut found: SmallVec<[(usize, Range<usize>); 4]> = SmallVec::new();
-    for (position, unknowns) in sorted {
-        match found.last_mut() {
-            Some((at, last)) if position == *at && unknowns.start <= last.end => {
-                last.end = last.end.max(unknowns.end);
-            }
-            _ => found.push((position, unknowns)),
+    spans.sort_unstable_by_key(|(position, unknowns)| (*position, unknowns.start));
+    spans.dedup_by(|(position, unknowns), (at, last)| {
+        let meets = position == at && unknowns.start <= last.end;
+        if meets {
+            last.end = last.end.max(unknowns.end);
         }
-    }
-    found
+        meets
+    });
 }
