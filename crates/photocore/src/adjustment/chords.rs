@@ -42,9 +42,21 @@ impl<'a> Run<'a, '_> {
             && state.linearized.factor.has_cached()
     }
 
+    /// The values that chords lead to from those after a step.
+    pub(super) fn chords(
+        &mut self,
+        state: &State<'a>,
+        values: Vec<f64>,
+        above: (f64, Stop),
+    ) -> Result<Vec<f64>, AdjustError> {
+        let found = self.followed(state, values.clone(), above)?;
+        self.chord = found.as_ref().map(|&(_, length)| length);
+        Ok(found.map_or(values, |(values, _)| values))
+    }
+
     /// The lowest values that chords lead to, the first of them from those given, and the length of the chord there; None where the first
     /// would begin higher than `best`.
-    pub(super) fn followed(
+    fn followed(
         &mut self,
         state: &State<'a>,
         values: Vec<f64>,

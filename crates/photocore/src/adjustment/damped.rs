@@ -191,7 +191,7 @@ impl<'a> Run<'a, '_> {
         let ahead = self.problem.advanced(state.values(), step);
         let outgrown = self.is_outgrown(&iteration, followed, &ahead);
         let trial = match followed && !outgrown {
-            true => self.chords(&state, ahead, control)?,
+            true => self.chords(&state, ahead, (control.best, control.stop))?,
             false => self.stepped(&state, ahead, &iteration)?,
         };
         let moved = if damping == 0.0 { state.moved(step) } else { vec![] };
@@ -209,28 +209,7 @@ impl<'a> Run<'a, '_> {
         let sum = next.linearized.sum_of_squares;
         if !(sum <= highest && next.linearized.factor.deficient_locals.is_empty()) {
             next.recycle();
-            if damping == 0.0 {
-                control.in_valley = change <= VALLEY;
-            }
-            // Full steps that have led here say that the linearized equations are worth following. A step that the bends of a loss make
-            // fail follows no valley.
-            let led = self.iterations.iter().any(|iteration| iteration.damping == 0.0);
-            if damping == 0.0
-                && led
-                && self.options.loss.is_none()
-                && control.in_valley
-                && control.along < MOST_ALONG
-                && !self.is_still(&control.refused, control.best)
-                && let Some((values, sum)) = self.along_valley(&unknowns, step, change, control.best)?
-            {
-                let before = std::mem::replace(&mut control.best, sum);
-                control.along += 1;
-                self.weak = moved;
-                control.refused = Some((before, self.weak.clone()));
-                self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &values)?;
-                return self.form(values, 0.0).map(ControlFlow::Continue);
-            }
-            return self.refuse(unknowns, damping, control, moved);
+            return self.failed(iteration, unknowns, (step, moved), control);
         }
         let decrease = std::mem::replace(&mut control.best, sum) - sum;
         self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, next.reached())?;
@@ -250,16 +229,36 @@ impl<'a> Run<'a, '_> {
         Ok(ControlFlow::Continue(next))
     }
 
-    /// The values that chords lead to from those after a step.
-    fn chords(
+    /// Goes on after a step that has failed, and the unknowns that it moves most: along a valley where full steps have led here, which says that the
+    /// linearized equations are worth following; with more damping otherwise. A step that the bends of a loss make fail follows no valley.
+    fn failed(
         &mut self,
-        state: &State<'a>,
-        values: Vec<f64>,
-        control: &Control,
-    ) -> Result<Vec<f64>, AdjustError> {
-        let found = self.followed(state, values.clone(), (control.best, control.stop))?;
-        self.chord = found.as_ref().map(|&(_, length)| length);
-        Ok(found.map_or(values, |(values, _)| values))
+        iteration: Iteration,
+        unknowns: Vec<f64>,
+        (step, moved): (&[f64], Vec<usize>),
+        control: &mut Control,
+    ) -> Next<'a> {
+        let Iteration { damping, largest_change: change, .. } = iteration;
+        if damping == 0.0 {
+            control.in_valley = change <= VALLEY;
+        }
+        let led = self.iterations.iter().any(|iteration| iteration.damping == 0.0);
+        if damping == 0.0
+            && led
+            && self.options.loss.is_none()
+            && control.in_valley
+            && control.along < MOST_ALONG
+            && !self.is_still(&control.refused, control.best)
+            && let Some((values, sum)) = self.along_valley(&unknowns, step, change, control.best)?
+        {
+            let before = std::mem::replace(&mut control.best, sum);
+            control.along += 1;
+            self.weak = moved;
+            control.refused = Some((before, self.weak.clone()));
+            self.accept(Iteration { sum_of_squares: sum, ..iteration }, &unknowns, &values)?;
+            return self.form(values, 0.0).map(ControlFlow::Continue);
+        }
+        self.refuse(unknowns, damping, control, moved)
     }
 
     /// Goes on from the same values with more damping; or ends there, where the sum of squares has stood still although full steps,

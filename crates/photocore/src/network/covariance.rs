@@ -79,9 +79,8 @@ impl Network {
             let adjusted = state.adjusted(options);
             match datum {
                 None => {
-                    let (problem, values, held) =
-                        (&assembled.problem, state.unknowns.clone(), state.held.clone());
-                    Linearized::form(problem, adjusted.loss, values, held, threads, &mut between)
+                    let (values, held) = (state.unknowns.clone(), state.held.clone());
+                    Linearized::form(&assembled.problem, adjusted.loss, values, held, threads, &mut between)
                         .and_then(Linearized::determined)
                         .map_err(|error| NetworkError::new(error, &assembled))?
                 }
@@ -197,8 +196,8 @@ impl Network {
     /// The network without what is known of points and poses themselves.
     fn without_control(&self) -> Self {
         let mut free = self.clone();
-        let unused = |photo: usize| !self.images.iter().any(|image| image.photo == photo);
-        let held: Vec<bool> = (0..self.photos.len()).map(unused).collect();
+        let mut held = vec![true; self.photos.len()];
+        self.images.iter().for_each(|image| held[image.photo] = false);
         free.points.iter_mut().for_each(|point| point.sd = [f64::INFINITY; 3]);
         let photos = free.photos.iter_mut().zip(held).filter(|(_, held)| !held);
         photos.for_each(|(photo, _)| photo.sd = [f64::INFINITY; POSE]);
