@@ -132,15 +132,21 @@ impl Leverages {
         found: &mut [LocalCofactors],
         threads: &Threads,
     ) -> Result<(), AdjustError> {
-        let apart = |local: usize| problem.layout().stands_apart(local);
-        if !locals.iter().any(|&local| apart(local)) {
+        let layout = problem.layout();
+        let chosen_on = |(place, &local): (usize, &usize)| {
+            let rows = correlated_rows(&found[place], layout, local, limit);
+            (place, local, rows)
+        };
+        let apart = locals.iter().enumerate().filter(|&(_, &local)| layout.stands_apart(local));
+        let chosen: Vec<_> = apart.map(chosen_on).filter(|(.., rows)| !rows.is_empty()).collect();
+        if chosen.is_empty() {
             return Ok(());
         }
         let (_, asked, _) = self.equations(problem, observation_sd, threads);
         let (values, held, mut on) = (self.values.clone(), self.held.clone(), |_| ControlFlow::Continue(()));
         let formed = Linearized::form(problem, None, values, held, threads, &mut on)?;
-        for (&local, own) in locals.iter().zip(found).filter(|&(&local, _)| apart(local)) {
-            let chosen = correlated_rows(own, problem.layout(), local, limit);
+        for (place, local, chosen) in chosen {
+            let own = &mut found[place];
             let mut functions = problem.system.local_functions(&asked, local);
             let mut number = 0..;
             functions.retain(|_| number.next().is_some_and(|row| chosen.binary_search(&row).is_ok()));
