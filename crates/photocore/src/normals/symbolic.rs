@@ -95,8 +95,9 @@ impl Symbolic {
             candidates.iter().map(|&(candidate, operations, _)| (candidate, operations)).collect();
         let least = candidates.iter().map(|&(_, operations, _)| operations).fold(f64::INFINITY, f64::min);
         // In the order of the input, which comes first, photos stand before what they share: equations go into small fronts, side by side.
+        let enough = if layout.has_shared() { AS_GOOD * least } else { least };
         let is_as_good = |(candidate, operations, _): &(Ordering, f64, _)| {
-            *operations <= if *candidate == Ordering::Input { AS_GOOD * least } else { least }
+            *operations <= if *candidate == Ordering::Input { enough } else { least }
         };
         let best = candidates.into_iter().find(is_as_good);
         let (ordering, order) =
