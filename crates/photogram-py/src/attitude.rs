@@ -43,9 +43,7 @@ impl Representation {
         match (self, numbers) {
             (Self::Three(kind), &[p, q, r]) => {
                 let numbers = [p, q, r];
-                let regular =
-                    (!kind.is_singular(numbers)).then(|| kind.rates(numbers).try_inverse()).flatten();
-                let partials = regular.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+                let partials = kind.by_step(numbers).unwrap_or_else(|| Matrix3::repeat(f64::NAN));
                 partials.row_iter().map(|row| row.transpose()).collect()
             }
             (Self::Quaternion, &[w, x, y, z]) => quaternion_by_step([w, x, y, z]).to_vec(),

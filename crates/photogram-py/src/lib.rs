@@ -107,8 +107,6 @@ mod _photocore {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         crate::memory::arm()?;
-        // Threads are those of the caller's pool: the solvers of the library would start a pool of the whole process beside it.
-        faer::set_global_parallelism(faer::Par::Seq);
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("CAMERAS", photocore::geometry::Camera::NAMES.to_vec())?;
         module.add("UNKNOWNS", crate::commons::kinds())

@@ -14,8 +14,7 @@ use std::ptr;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::SeqCst};
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par};
+use photocore::normals::take_product_buffers;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 
@@ -173,10 +172,7 @@ pub fn take_buffers() -> bool {
     }
     // Where there is no room beside it, the buffers take its place.
     ROOM.set(Some(Room(pointer, layout)));
-    let ones = Mat::<f64>::full(SIDE, SIDE, 1.0);
-    let mut product = Mat::<f64>::zeros(SIDE, SIDE);
-    matmul(product.as_mut(), Accum::Replace, ones.as_ref(), ones.as_ref(), 1.0, Par::Seq);
-    black_box(product.as_ref());
+    take_product_buffers();
     if let Some(room) = ROOM.take() {
         room.give_back();
     }
@@ -184,8 +180,6 @@ pub fn take_buffers() -> bool {
     true
 }
 
-/// Side of matrices whose product is large enough for the buffers.
-const SIDE: usize = 32;
 /// What the library takes the last cache for where the system does not tell.
 const CACHE: usize = 4 << 20;
 

@@ -58,6 +58,22 @@ pub fn watched<T: Send, E: Send>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&Threads, Watch<'_>) -> Result<T, E> + Send,
 ) -> PyResult<Result<T, E>> {
+    let (mut work, mut found) = (Some(work), None);
+    let mut once = |pool: &Threads, watch: Watch<'_>| {
+        found = work.take().map(|work| work(pool, watch));
+        matches!(found, Some(Ok(_)))
+    };
+    supervise(py, workers, progress, &mut once)?;
+    found.ok_or_else(memory::no_buffers)
+}
+
+/// The same for work that keeps what it finds and says whether it succeeded: compiled once, not for each work.
+fn supervise(
+    py: Python<'_>,
+    workers: Workers,
+    progress: Option<Py<PyAny>>,
+    work: &mut (dyn FnMut(&Threads, Watch<'_>) -> bool + Send),
+) -> PyResult<()> {
     let failures = memory::arm()?;
     let mut raised = None;
     let (mut last, mut inverts) = (Instant::now(), false);
@@ -106,15 +122,12 @@ pub fn watched<T: Send, E: Send>(
             })
         }
     };
-    let done = done.ok_or_else(memory::no_buffers)?;
+    let succeeded = done.ok_or_else(memory::no_buffers)?;
     match raised {
         Some(error) => Err(error),
-        None if done.is_err() && failures.more() => Err(memory::failure()),
-        None => {
-            // What is made of the result needs a reserve again.
-            memory::arm()?;
-            Ok(done)
-        }
+        None if !succeeded && failures.more() => Err(memory::failure()),
+        // What is made of the result needs a reserve again.
+        None => memory::arm().map(drop),
     }
 }
 

@@ -215,9 +215,14 @@ impl AttitudeNumbers {
         }
     }
 
+    /// K^-1, with d(numbers) = K^-1 rho; None at a singular attitude.
+    pub fn by_step(&self, numbers: [f64; 3]) -> Option<Matrix3> {
+        self.rates(numbers).try_inverse().filter(|_| !self.is_singular(numbers))
+    }
+
     /// Cofactors of the numbers from those of the rotation step, K^-1 Q K^-T; None at a singular attitude.
     pub fn cofactors(&self, numbers: [f64; 3], of_step: &Matrix3) -> Option<Matrix3> {
-        let inverse = self.rates(numbers).try_inverse().filter(|_| !self.is_singular(numbers))?;
+        let inverse = self.by_step(numbers)?;
         Some(inverse * of_step * inverse.transpose())
     }
 }

@@ -1,6 +1,34 @@
 //! Vectors and matrices in cartesian axes.
 
+use crate::sorting::order;
+
 /// Three components in cartesian axes.
 pub type Vector3 = nalgebra::Vector3<f64>;
 /// A matrix in cartesian axes.
 pub type Matrix3 = nalgebra::Matrix3<f64>;
+
+/// Sweeps of an eigenvalue decomposition at the most: more where a matrix is not finite.
+const SWEEPS: usize = 1000;
+
+/// Eigenvalues of a symmetric matrix, the largest first, and its unit eigenvectors as columns; None where it is not finite.
+pub(crate) fn principal_axes(matrix: &Matrix3) -> Option<(Vector3, Matrix3)> {
+    let eigen = matrix.try_symmetric_eigen(f64::EPSILON, SWEEPS)?;
+    let values = eigen.eigenvalues;
+    let falling = order(3, &|a, b| values[b].total_cmp(&values[a]));
+    let columns = [0, 1, 2].map(|k| eigen.eigenvectors.column(falling[k]).into_owned());
+    Some((Vector3::from_fn(|k, _| values[falling[k]]), Matrix3::from_columns(&columns)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn principal_axes_fall() {
+        let matrix = Matrix3::new(2.0, -1.0, 0.5, -1.0, 7.0, 0.3, 0.5, 0.3, -4.0);
+        let (values, axes) = principal_axes(&matrix).unwrap();
+        assert!(values[0] > values[1] && values[1] > values[2]);
+        assert!((matrix * axes - axes * Matrix3::from_diagonal(&values)).norm() < 1e-13);
+        assert!(principal_axes(&Matrix3::repeat(f64::NAN)).is_none());
+    }
+}

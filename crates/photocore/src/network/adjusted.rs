@@ -137,8 +137,7 @@ fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64;
 fn in_angles(model: &Bundle, photo: usize, values: &[f64], mut found: DMatrix<f64>) -> DMatrix<f64> {
     let Some(sense) = model.turning_sense(photo) else { return found };
     let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
-    let inverse = numbers.rates(angles).try_inverse().filter(|_| !numbers.is_singular(angles));
-    let inverse = inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+    let inverse = numbers.by_step(angles).unwrap_or_else(|| Matrix3::repeat(f64::NAN));
     let rows = inverse * found.fixed_rows::<3>(3);
     found.fixed_rows_mut::<3>(3).copy_from(&rows);
     let columns = found.fixed_columns::<3>(3) * inverse.transpose();

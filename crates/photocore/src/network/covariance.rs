@@ -440,11 +440,7 @@ impl Covariances {
         match (model.turning_sense(photo).is_some(), step) {
             (true, true) | (false, false) => Matrix3::identity(),
             (false, true) => numbers.rates(angles),
-            (true, false) => {
-                let inverse = numbers.rates(angles).try_inverse();
-                let inverse = inverse.filter(|_| !numbers.is_singular(angles));
-                inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN))
-            }
+            (true, false) => numbers.by_step(angles).unwrap_or_else(|| Matrix3::repeat(f64::NAN)),
         }
     }
 }

@@ -160,8 +160,7 @@ impl Trial {
         let turn = |photo: usize| {
             let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
             let first = model.of_block(photo).start + 3;
-            let rates = numbers.rates([values[first], values[first + 1], values[first + 2]]);
-            Some((first, rates.try_inverse()?))
+            Some((first, numbers.by_step([values[first], values[first + 1], values[first + 2]])?))
         };
         Ok((0..model.cameras.len()).filter_map(turn).collect())
     }
@@ -299,8 +298,8 @@ impl Trial {
             let Some((photo, sense)) = turning else { continue };
             let first = model.of_block(photo).start + 3;
             let angles = [values[first], values[first + 1], values[first + 2]];
-            let rates = AttitudeNumbers::OmegaPhiKappa(sense).rates(angles);
-            let inverse = rates.try_inverse().unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+            let inverse = AttitudeNumbers::OmegaPhiKappa(sense).by_step(angles);
+            let inverse = inverse.unwrap_or_else(|| Matrix3::repeat(f64::NAN));
             for effect in own {
                 let turned = inverse * nalgebra::Vector3::new(effect[6], effect[7], effect[8]);
                 effect[6..].copy_from_slice(turned.as_slice());

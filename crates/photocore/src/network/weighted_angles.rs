@@ -56,8 +56,7 @@ fn angle_equations(
     let apart = |k: usize| if weighted[k] { observed[k] - angles[k] } else { 0.0 };
     let constant = Vector3::from_fn(|k, _| apart(k)).component_mul(&root);
     // An attitude on the way may be singular: there the angles say nothing of the step.
-    let inverse = numbers.rates(angles).try_inverse().filter(|_| !numbers.is_singular(angles));
-    (constant, Matrix3::from_diagonal(&root) * inverse.unwrap_or_else(Matrix3::zeros))
+    (constant, Matrix3::from_diagonal(&root) * numbers.by_step(angles).unwrap_or_else(Matrix3::zeros))
 }
 
 /// Of v = Log(A^T A0), the rotation that is left to the observed attitude, about the photo's axes: its partials are those of an observed

@@ -1,6 +1,8 @@
 //! Dense kernels on the fronts of the factorisation: tiles of fixed size, each computed by one thread with `faer`, so that
 //! the bits do not depend on the number of threads.
 
+use std::hint::black_box;
+
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
@@ -20,6 +22,20 @@ const STEP: usize = 48;
 const TILE: usize = 192;
 /// Multiply-adds below which a tile loop stays on one thread.
 const WORTH_SHARING: f64 = 2e6;
+
+/// Side of matrices whose product is large enough for buffers.
+const BUFFERED: usize = 32;
+
+/// Takes the buffers of this thread that products of matrices are made in, twice its last cache. The library keeps them; a thread that has
+/// none takes them with its first large product, and ends the process where there is no room.
+pub fn take_product_buffers() {
+    let ones = vec![1.0; BUFFERED * BUFFERED];
+    let ones = MatRef::from_column_major_slice(&ones, BUFFERED, BUFFERED);
+    let mut product = vec![0.0; BUFFERED * BUFFERED];
+    let into = MatMut::from_column_major_slice_mut(&mut product, BUFFERED, BUFFERED);
+    matmul(into, Accum::Replace, ones, ones, 1.0, Par::Seq);
+    black_box(&product);
+}
 
 /// Pivots that need a closer look, as columns of a front, ascending.
 #[derive(Debug, Default)]

@@ -21,6 +21,7 @@ use super::system::System;
 use super::vectorised::dot;
 use super::watch::{Between, Control, watched};
 use super::workspace::zeros;
+use crate::sorting::sort_by;
 use crate::{Stopped, Threads, parallel};
 
 /// A linear function of the unknowns: unknowns that it takes, with their coefficients.
@@ -236,7 +237,7 @@ impl Reduction<'_> {
             }
         }
         let mut taken: Vec<(usize, Taken)> = taken.into_iter().collect();
-        taken.sort_unstable_by_key(|&(local, _)| local);
+        sort_by(&mut taken, &|a, b| a.0.cmp(&b.0));
         let found = parallel::map_each(taken.chunks(CHUNK).collect(), &|taken| self.at_locals(taken));
         for (local, found) in found.into_iter().flatten() {
             for (index, y, entries) in found {

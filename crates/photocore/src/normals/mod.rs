@@ -83,6 +83,7 @@ pub use cofactors::{Cofactors, GroupCofactors};
 pub use columns::{Chord, ReducedRights};
 pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
+pub use dense::take_product_buffers;
 pub use equation_block::LocalCofactors;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
 pub use factor::Factor;

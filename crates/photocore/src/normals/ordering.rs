@@ -4,6 +4,7 @@ use super::dissection::minimum_degree;
 use super::dissection::nested_dissection;
 use super::graph::{Graph, NOWHERE};
 use super::layout::Layout;
+use crate::sorting::sort_by;
 
 /// How the retained blocks are ordered for elimination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -101,6 +102,6 @@ fn dense_blocks(graph: &Graph, layout: &Layout) -> Vec<usize> {
     let main = layout.are_main();
     let is_dense = |&block: &usize| !main[block] && graph.degree(block) as f64 > most;
     let mut dense: Vec<usize> = (0..graph.len()).filter(is_dense).collect();
-    dense.sort_by_key(|&block| graph.degree(block));
+    sort_by(&mut dense, &|&a, &b| graph.degree(a).cmp(&graph.degree(b)));
     dense
 }

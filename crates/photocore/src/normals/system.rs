@@ -14,6 +14,7 @@ use super::tree::Tree;
 use super::triangle::Triangle;
 use super::watch::Control;
 use super::workspace::Workspace;
+use crate::sorting::order;
 
 /// A system ready to be formed again and again: the pattern and the order are found once.
 #[derive(Debug)]
@@ -119,11 +120,10 @@ impl Nodes {
             positions.min().map_or(symbolic.supernode_count(), |first| symbolic.supernode_of(first))
         };
         let node: Vec<usize> = lists.map(node).collect();
-        let mut by_node: Vec<u32> = (0..node.len() as u32).collect();
-        by_node.sort_by_key(|&list| node[list as usize]);
-        let start = |supernode| by_node.partition_point(|&list| node[list as usize] < supernode);
+        let by_node = order(node.len(), &|a, b| node[a].cmp(&node[b]));
+        let start = |supernode| by_node.partition_point(|&list| node[list] < supernode);
         let node_ptr = (0..=symbolic.supernode_count()).map(start).collect();
-        Self { by_node, node_ptr }
+        Self { by_node: by_node.into_iter().map(|list| list as u32).collect(), node_ptr }
     }
 
     /// The lists whose node is a supernode.

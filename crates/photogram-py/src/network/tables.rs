@@ -3,10 +3,7 @@
 use photocore::Threads;
 use photocore::adjustment::Observed;
 use photocore::network::{AdjustedPoint, Solution};
-use rayon::prelude::*;
-
-/// Points and images that a thread takes at least.
-const TOGETHER: usize = 4096;
+use rayon::Scope;
 
 /// A solution whose points and images stand in columns: made on all threads, before Python waits for it.
 pub struct Told {
@@ -39,30 +36,47 @@ impl Told {
     }
 
     fn on_pool(mut solution: Solution) -> Self {
-        let (points, images) = (std::mem::take(&mut solution.points), std::mem::take(&mut solution.images));
+        let points: Vec<Option<AdjustedPoint>> = std::mem::take(&mut solution.points);
+        let images: Vec<Option<Observed<2>>> = std::mem::take(&mut solution.images);
         let (three, two) = ([f64::NAN; 3], [f64::NAN; 2]);
-        Self {
+        let mut told = Self {
             solution,
-            point_positions: column(&points, three, |point| point.coordinates),
-            point_cofactors: column(&points, [three; 3], |point: &AdjustedPoint| point.cofactors.data.0),
-            point_redundancy: column(&points, three, |point| point.redundancy),
-            point_last_corrections: column(&points, three, |point| point.last_correction),
-            point_rays: column(&points, 0, |point: &AdjustedPoint| point.rays as i64),
-            point_rays_behind: column(&points, 0, |point| point.behind as i64),
-            residuals: column(&images, two, |image: &Observed<2>| image.residual),
-            redundancy: column(&images, two, |image| image.redundancy),
-            standardized: column(&images, two, |image| image.standardized),
-            image_weights: column(&images, f64::NAN, |image| image.weight),
-        }
+            point_positions: vec![],
+            point_cofactors: vec![],
+            point_redundancy: vec![],
+            point_last_corrections: vec![],
+            point_rays: vec![],
+            point_rays_behind: vec![],
+            residuals: vec![],
+            redundancy: vec![],
+            standardized: vec![],
+            image_weights: vec![],
+        };
+        rayon::scope(|scope| {
+            fill(scope, &mut told.residuals, &images, two, |image| image.residual);
+            fill(scope, &mut told.redundancy, &images, two, |image| image.redundancy);
+            fill(scope, &mut told.standardized, &images, two, |image| image.standardized);
+            fill(scope, &mut told.image_weights, &images, f64::NAN, |image| image.weight);
+            fill(scope, &mut told.point_cofactors, &points, [three; 3], |point| point.cofactors.data.0);
+            fill(scope, &mut told.point_positions, &points, three, |point| point.coordinates);
+            fill(scope, &mut told.point_redundancy, &points, three, |point| point.redundancy);
+            fill(scope, &mut told.point_last_corrections, &points, three, |point| point.last_correction);
+            fill(scope, &mut told.point_rays, &points, 0, |point| point.rays as i64);
+            fill(scope, &mut told.point_rays_behind, &points, 0, |point| point.behind as i64);
+        });
+        told
     }
 }
 
-/// One part of everything that takes part; `missing` of all else.
-fn column<T: Sync, P: Copy + Send + Sync>(
-    all: &[Option<T>],
+/// Fills a column with one part of everything that takes part, and `missing` of all else, on one of the threads.
+fn fill<'s, T: Sync, P: Copy + Send>(
+    scope: &Scope<'s>,
+    column: &'s mut Vec<P>,
+    all: &'s [Option<T>],
     missing: P,
-    part: impl Fn(&T) -> P + Sync,
-) -> Vec<P> {
-    let each = |own: &Option<T>| own.as_ref().map_or(missing, &part);
-    all.par_iter().with_min_len(TOGETHER).map(each).collect()
+    part: impl Fn(&T) -> P + Send + 's,
+) where
+    P: 's,
+{
+    scope.spawn(move |_| *column = all.iter().map(|own| own.as_ref().map_or(missing, &part)).collect());
 }

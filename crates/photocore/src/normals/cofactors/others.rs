@@ -1,7 +1,10 @@
 //! Cofactors of local blocks and of their equations, from the inverse over everything that they are tied to.
 
+mod once;
+
+use once::{OfLocal, OfShared};
 use pulp::Simd;
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 
 use crate::normals::batch::{Batch, Part, Slot};
 use crate::normals::layout::Layout;
@@ -123,9 +126,7 @@ impl Others {
         let own = if batch.apart {
             self.without_local::<L>()
         } else {
-            self.reduce::<L, D>(batch, t);
-            self.multiply::<S, L>(simd);
-            self.own::<S, L>(simd, batch, t, found)
+            simd.vectorize(OfLocal::<S, L> { simd, others: self, batch, t, found })
         };
         for (slot, &(_, start, _)) in batch.slots.iter().zip(&self.strips) {
             for (k, p) in slot.groups.clone().enumerate() {
@@ -179,10 +180,10 @@ impl Others {
 
     /// Computes H = L^-T V, for local block `t` of the batch.
     #[inline(always)]
-    fn reduce<const L: usize, const D: usize>(&mut self, batch: &Batch, t: usize) {
+    fn reduce<const L: usize>(&mut self, batch: &Batch, t: usize) {
         let stride = self.stride;
         self.h.resize(L * stride, 0.0);
-        let slots = batch.slots.iter().map(|slot| batch.slot_coupling::<D>(slot, L));
+        let slots = batch.slots.iter().map(|slot| batch.slot_coupling::<0>(slot, L));
         let segments = batch.segments.iter().map(|segment| batch.segment_coupling(segment, L));
         for (v, &(_, start, _)) in slots.chain(segments).zip(&self.strips) {
             for d in 0..L {
@@ -315,14 +316,9 @@ impl Others {
         let retained = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
         let mut form = [[simd.splat_f64s(0.0); 2]; 2];
         self.tied(simd, &mut form, local, &[], retained);
-        let parts = batch.parts(p);
-        if !parts.is_empty() {
-            let mut before: SmallVec<[_; 4]> = smallvec![retained];
-            for part in parts {
-                let shared = self.shared(batch, group, picked, part);
-                self.tied(simd, &mut form, local, &before, shared);
-                before.push(shared);
-            }
+        if !batch.parts(p).is_empty() {
+            let form = &mut form;
+            simd.vectorize(OfShared { simd, others: self, batch, group, picked, local, retained, form });
         }
         let mut found = [[0.0; 2]; 2];
         for i in 0..2 {

@@ -9,6 +9,7 @@ use super::{Calibration, CalibrationError, Measurement, Solution};
 use crate::Threads;
 use crate::adjustment::{self, AdjustError, Adjustment, Evaluated, Event, Model, Problem, leading_matrix};
 use crate::normals::{GroupRows, Layout, Ordering, System};
+use crate::sorting::order;
 
 impl Calibration {
     /// Adjusts everything together by least squares. `watch` is called on the calling thread; when it breaks, the adjustment stops, on threads of its own.
@@ -66,8 +67,8 @@ impl Calibration {
 
     /// The least-squares problem: grid points are local blocks of two, cases retained blocks of three, the comparator one that all share.
     fn problem(&self) -> Result<Problem<Comparison>, CalibrationError> {
-        let mut order: Vec<usize> = (0..self.measurements.len()).collect();
-        order.sort_by_key(|&i| self.measurements[i].point);
+        let point = |i: usize| self.measurements[i].point;
+        let order = order(self.measurements.len(), &|a, b| point(a).cmp(&point(b)));
         let measurements: Vec<Measurement> = order.iter().map(|&i| self.measurements[i]).collect();
         let start =
             (0..=self.points.len()).map(|point| measurements.partition_point(|m| m.point < point)).collect();

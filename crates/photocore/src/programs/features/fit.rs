@@ -12,7 +12,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4, Vector4};
 
 use super::form::{ByMotions, Curvature, MOTIONS, Partials, RADIUS};
 use super::{FeatureError, Form};
-use crate::geometry::{Matrix3, Vector3, angle_axis_rotation};
+use crate::geometry::{Matrix3, Vector3, angle_axis_rotation, principal_axes};
 use crate::sorting::sort_by;
 
 /// Steps at the most, and the step below which the feature rests; lengths are those of points with a mean square distance of 1.
@@ -218,8 +218,6 @@ const DIRECTIONS: usize = 300;
 /// Of these the best, no two nearer to each other than this cosine (15 degrees).
 const TAKEN: usize = 8;
 const APART: f64 = 0.966;
-/// Steps of a decomposition at the most.
-const DECOMPOSITION_STEPS: usize = 1000;
 
 /// Where to begin, the likeliest first; points are counted from their mean. None where there is nothing to begin with.
 pub fn starts(form: Form, points: &[Vector3]) -> Vec<Placed> {
@@ -235,10 +233,7 @@ pub fn starts(form: Form, points: &[Vector3]) -> Vec<Placed> {
 /// Unit vectors along which the points extend most, less, least.
 fn main_axes(points: &[Vector3]) -> Option<Matrix3> {
     let scatter: Matrix3 = points.iter().map(|p| p * p.transpose()).sum();
-    let eigen = scatter.try_symmetric_eigen(f64::EPSILON, DECOMPOSITION_STEPS)?;
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    Some(Matrix3::from_columns(&order.map(|k| Vector3::from(eigen.eigenvectors.column(k)))))
+    principal_axes(&scatter).map(|(_, axes)| axes)
 }
 
 /// A feature with a given axis through the mean of the points, its centre and radius by linear equations.

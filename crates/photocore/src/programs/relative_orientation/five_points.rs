@@ -13,7 +13,7 @@
 use nalgebra::{SMatrix, SVector, Schur};
 
 use super::oriented::Oriented;
-use crate::geometry::{Matrix3, Vector3};
+use crate::geometry::{Matrix3, Vector3, principal_axes};
 
 /// Steps of the decompositions at the most.
 const STEPS: usize = 1000;
@@ -102,13 +102,21 @@ pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
         .collect()
 }
 
+/// Equations in the nine elements of a matrix: up to twelve, the others zero.
+type Equations = SMatrix<f64, 12, 9>;
+
+/// Right singular vectors, row by row, those of the largest singular values first.
+fn right_vectors(equations: Equations) -> Option<SMatrix<f64, 9, 9>> {
+    equations.try_svd(false, true, f64::EPSILON, STEPS)?.v_t
+}
+
 /// Four matrices that span what the five equations leave.
 fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
-    let mut equations = SMatrix::<f64, 9, 9>::zeros();
+    let mut equations = Equations::zeros();
     for (row, [first, second]) in pairs.iter().enumerate() {
         (0..9).for_each(|k| equations[(row, k)] = first[k / 3] * second[k % 3]);
     }
-    let rows = equations.try_svd(false, true, f64::EPSILON, STEPS)?.v_t?;
+    let rows = right_vectors(equations)?;
     Some(std::array::from_fn(|k| Matrix3::from_fn(|i, j| rows[(5 + k, 3 * i + j)])))
 }
 
@@ -179,27 +187,24 @@ pub fn over_plane(pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
 
 /// H with u2 x (H u1) = 0 and unit middle singular value.
 fn homography(pairs: &[[Vector3; 2]; 4]) -> Option<Matrix3> {
-    let mut equations = SMatrix::<f64, 12, 9>::zeros();
+    let mut equations = Equations::zeros();
     for (pair, [first, second]) in pairs.iter().enumerate() {
         let across = second.cross_matrix();
         for row in 0..3 {
             (0..9).for_each(|k| equations[(3 * pair + row, k)] = across[(row, k / 3)] * first[k % 3]);
         }
     }
-    let rows = equations.try_svd(false, true, f64::EPSILON, STEPS)?.v_t?;
+    let rows = right_vectors(equations)?;
     let h = Matrix3::from_fn(|i, j| rows[(8, 3 * i + j)]);
-    let mut sizes = h.singular_values();
-    sizes.as_mut_slice().sort_by(f64::total_cmp);
+    let middle = principal_axes(&h.tr_mul(&h))?.0[1].sqrt();
     let forward: f64 = pairs.iter().map(|[first, second]| second.dot(&(h * first))).sum();
-    (sizes[1] > 0.0).then(|| h * forward.signum() / sizes[1])
+    (middle > 0.0).then(|| h * forward.signum() / middle)
 }
 
 fn poses(h: &Matrix3, pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
-    let Some(eigen) = h.tr_mul(h).try_symmetric_eigen(f64::EPSILON, STEPS) else { return vec![] };
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let [v1, v2, v3] = order.map(|k| Vector3::from(eigen.eigenvectors.column(k)));
-    let (large, small) = (eigen.eigenvalues[order[0]], eigen.eigenvalues[order[2]]);
+    let Some((squares, axes)) = principal_axes(&h.tr_mul(h)) else { return vec![] };
+    let [v1, v2, v3] = [0, 1, 2].map(|k| Vector3::from(axes.column(k)));
+    let (large, small) = (squares[0], squares[2]);
     if large - small < NO_BASE {
         return vec![];
     }
