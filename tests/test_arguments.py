@@ -32,7 +32,7 @@ PACKAGES = (
 MADE_BY_THE_LIBRARY = {
     "photogram": "Cleaned Differences Feature Features FirstValues GroupSums Iteration Message Orientation"
     " Plan Pose Progress Resection Result Simulation Snooped Statement VarianceComponents VarianceFunction",
-    "photogram.absolute_orientation": "Model Orientation Strip",
+    "photogram.absolute_orientation": "Model Strip",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Comparison Decomposition Identity Place PlateResult"
     " Pointing Reading RecordedCalibration RecordedCase Session Simulation collect_cases",

@@ -1,10 +1,8 @@
 """Absolute orientation: the similarity between a model and its control (C&GS Technical Bulletin 19, 1962)."""
 
-from photogram.absolute_orientation.adjust import orient
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv
 from photogram.absolute_orientation.models import Model, Strip, relative_model, strip_of
-from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.absolute_orientation.stream import transform_file
@@ -12,11 +10,9 @@ from photogram.arguments.annotations import check_arguments
 
 __all__ = [
     "Model",
-    "Orientation",
     "Similarity",
     "Stations",
     "Strip",
-    "orient",
     "read_cards",
     "read_csv",
     "relative_model",
