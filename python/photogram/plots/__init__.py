@@ -12,6 +12,7 @@ from photogram.plots.network import network
 from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import residuals
 from photogram.plots.tests import tests
+from photogram.plots.trajectories import trajectory
 from photogram.show.pictures import drawn
 
 __all__ = [
@@ -28,4 +29,5 @@ __all__ = [
     "redundancy",
     "residuals",
     "tests",
+    "trajectory",
 ]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from photogram.stellar.night_file import read_night
     from photogram.stellar.night_report import report
     from photogram.stellar.night_result import CalibratedNight, Night
-    from photogram.stellar.parameters import GRAD, INDEX, NAMES
+    from photogram.stellar.parameters import GRAD, INDEX, NAMES, UNITS
     from photogram.stellar.places import Earth, apparent_places, sidereal_time
     from photogram.stellar.plain import read_plain
     from photogram.stellar.pointing import attitude_of
@@ -37,6 +37,7 @@ __all__ = [
     "INDEX",
     "LENSES",
     "NAMES",
+    "UNITS",
     "Air",
     "Axis",
     "BrownCamera",
@@ -96,6 +97,7 @@ _HOMES = {
     "report": "night_report",
     "sidereal_time": "places",
     "to_yaml": "camera_yaml",
+    "UNITS": "parameters",
 }
 """The module of each name, loaded when it is first asked for: what nights and files need, plates do not."""
 
@@ -108,5 +110,5 @@ __getattr__, __dir__ = on_demand(
     __name__,
     _HOMES,
     check_arguments,
-    unchecked={"ARCSEC", "CalibratedNight", "GRAD", "INDEX", "LENSES", "NAMES"},
+    unchecked={"ARCSEC", "CalibratedNight", "GRAD", "INDEX", "LENSES", "NAMES", "UNITS"},
 )
