@@ -92,7 +92,7 @@ HOSTILE = {
 def good(tmp_path_factory):
     """Return for each public name the arguments of a call that works."""
     from photogram import absolute_orientation, collection, comparator, perspective_center, stellar
-    from photogram.stellar.plain import read_plain
+    from photogram.stellar import read_plain
 
     folder = tmp_path_factory.mktemp("sound")
     examples = Path(photogram.__file__).parent / "examples"

@@ -128,7 +128,7 @@ def test_help_of_parents_names_their_commands(run):
 
 
 def test_progress_is_told_in_words():
-    from photogram.adjustment.adjustment import Progress
+    from photogram import Progress
     from photogram.cli.progress import shown
 
     lines = []

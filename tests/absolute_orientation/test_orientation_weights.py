@@ -8,9 +8,8 @@ from scipy import stats
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from photogram import orient
+from photogram import RankError, orient
 from photogram.absolute_orientation import Stations, read_cards, read_csv
-from photogram.errors import RankError
 
 NOISE = 0.004
 SINGLES = ("XZ", "Y", "X", "YZ", "Z", "XYZ", "X", "Z", "Y")
