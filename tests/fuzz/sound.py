@@ -19,8 +19,15 @@ from photogram.absolute_orientation import read_csv
 from photogram.absolute_orientation.cards import transformation_records
 from photogram.collection import simulate as simulate_collection
 from photogram.collection import to_bytes as collection_bytes
-from photogram.comparator import Grid, Options, calibrate, simulate_calibration, to_cards, to_csv
-from photogram.comparator.grid import built_in_grid
+from photogram.comparator import (
+    Grid,
+    Options,
+    built_in_grid,
+    calibrate,
+    simulate_calibration,
+    to_cards,
+    to_csv,
+)
 from photogram.giant import Common, Project
 from photogram.giant.files import to_bytes as record_bytes
 from photogram.stellar import calibrate_night, read_night, read_plain

@@ -1,6 +1,7 @@
-"""Pages and examples import public names alone, but for the page on extending the package."""
+"""What pages, examples and tests import: public names, but where the package itself is the subject."""
 
 import ast
+import inspect
 import re
 from importlib import import_module
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 
 import public_api
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 PAGES = sorted({ROOT / "README.md", *(ROOT / "docs").rglob("*.md")} - {ROOT / "docs" / "extending.md"})
 EXAMPLES = sorted(path for path in (ROOT / "examples").glob("*.py") if not path.name.startswith("make_"))
 BLOCK = re.compile(r"^```python.*?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -60,3 +61,17 @@ def test_pages_say_public_names(path):
     names = {name for block in BLOCK.findall(text) for name in imported(block)}
     names |= {name for name in NAME.findall(COMMENT.sub("", text)) if is_there(name)}
     assert sorted(name for name in names if not is_public(name)) == []
+
+
+def test_tests_import_public_names_where_there_are_any():
+    homes = [import_module(package) for package in public_api.packages()]
+    values = [getattr(home, name) for home in homes for name in home.__all__]
+    public = {inspect.unwrap(value) for value in values if callable(value)}
+    found = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        internal = (name for name in imported(path.read_text(encoding="utf-8")) if not is_public(name))
+        values = {name: resolve_name(name) for name in internal}
+        found += [
+            name for name, value in values.items() if callable(value) and inspect.unwrap(value) in public
+        ]
+    assert found == []
