@@ -103,6 +103,8 @@ def good(tmp_path_factory):
     adjustable = project.to_block()
     stations = absolute_orientation.read_csv(examples / "absolute_orientation" / "stations.csv")
     oriented = photogram.orient(stations)
+    orientation = folder / "orientation.json"
+    orientation.write_bytes(oriented.to_json())
     cards = folder / "cards.txt"
     cards.write_text("0 0 0 0 0 0 0 A\n3 3 3 A\n0 0 0 0 0 0 1\n10 0 0 1 0 0 2\n0 10 0 0 1 0 3\n")
     photos = collection.simulate(photos=3, points=8, seen=1.0).collection
@@ -197,6 +199,7 @@ def good(tmp_path_factory):
             "relative_model": {"block": pair, "first": pair.photo_ids[0], "second": pair.photo_ids[1]},
             "strip_of": {"block": pair, "photos": pair.photo_ids[:2]},
             "read_cards": {"path": cards},
+            "read_similarity": {"path": orientation, "usable": True},
             "read_csv": {"path": examples / "absolute_orientation" / "stations.csv"},
             "transform_file": {
                 "similarity": oriented.similarity,

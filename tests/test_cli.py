@@ -15,7 +15,8 @@ from rich.markup import render
 
 import photogram
 from photogram import simulate as simulate_function
-from photogram.cli.commands import app, application
+from photogram.cli import app
+from photogram.cli.commands import application
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.cli.simulation_options import MotionOptions
 from photogram.giant import read_project

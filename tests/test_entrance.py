@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from files.test_guards import COMMANDS, RUNS
-from photogram.cli.commands import app
+from photogram.cli import app
 from photogram.cli.job import Writes, roles
 
 PACKAGE = str(files("photogram").joinpath("examples"))

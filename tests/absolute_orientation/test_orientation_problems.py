@@ -8,8 +8,7 @@ import pytest
 from orientation_models import FULL, HEIGHT, HORIZONTAL, MIXED, simulate
 
 from photogram import InputError, orient
-from photogram.absolute_orientation import Stations, read_csv
-from photogram.absolute_orientation.document import read_similarity
+from photogram.absolute_orientation import Stations, read_csv, read_similarity
 
 NOISE = 0.004
 

@@ -9,8 +9,7 @@ import pytest
 from orientation_models import SIZE, simulate
 
 from photogram import InputError, orient
-from photogram.absolute_orientation import Similarity, stream, transform_file
-from photogram.absolute_orientation.document import read_similarity
+from photogram.absolute_orientation import Similarity, read_similarity, stream, transform_file
 
 
 @pytest.fixture(scope="module")

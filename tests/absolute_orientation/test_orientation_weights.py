@@ -152,7 +152,7 @@ def test_covariances_of_points_hold_where_all_standard_deviations_are_wrong_by_a
 
 
 def test_the_factor_of_deviations_goes_with_the_document(tmp_path):
-    from photogram.absolute_orientation.document import read_similarity
+    from photogram.absolute_orientation import read_similarity
 
     generator = np.random.default_rng(2)
     model = simulate(generator, angles=(0.1, -0.05, 2.0))

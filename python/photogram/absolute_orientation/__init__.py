@@ -2,6 +2,7 @@
 
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv
+from photogram.absolute_orientation.document import read_similarity
 from photogram.absolute_orientation.models import Model, Strip, relative_model, strip_of
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
@@ -15,12 +16,15 @@ __all__ = [
     "Strip",
     "read_cards",
     "read_csv",
+    "read_similarity",
     "relative_model",
     "strip_of",
     "transform_file",
 ]
 
-check_arguments(globals(), ["read_cards", "read_csv", "relative_model", "strip_of", "transform_file"])
+check_arguments(
+    globals(), ["read_cards", "read_csv", "read_similarity", "relative_model", "strip_of", "transform_file"]
+)
 
 WAYS = {
     "axes_of": ("plot",),
