@@ -7,6 +7,7 @@ report's matrix leads from the left-handed north, east, zenith to them.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,8 +40,8 @@ __all__ = [
 
 _STILL = Earth()
 _SLACK = math.radians(2.0)
-LARGEST_SD = 1e9
-"""Of an image coordinate, pixels: beyond it images say nothing."""
+LARGEST_SD = math.sqrt(sys.float_info.max)
+"""Whose square is a number."""
 _PER_IMAGE = 2000
 """Bytes of memory that an image takes."""
 
@@ -209,7 +210,7 @@ def calibrate_exposures(
     ------
     InputError
         No exposures, or one without stars; a parameter that does not exist; a standard deviation that is not
-        positive, or beyond all sense; a prior of another lens; fewer than one thread.
+        positive, or whose square is none; a prior of another lens; fewer than one thread.
     AdjustmentError
         The stars do not determine the camera, or the memory does not hold the adjustment.
     """
