@@ -1,4 +1,4 @@
-"""Stellar camera calibration (NOAA Technical Report NOS 55, 1972)."""
+"""Stellar camera calibration (NOAA Technical Report NOS 55, 1972), by plates and by digital exposures."""
 
 from __future__ import annotations
 
