@@ -13,7 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from views import BLUE, GREEN, GREY, LIGHT, RED, Floats, View, circle, svg
 
-from photogram.network.attitudes import Attitudes, Representation
+from photogram import Attitudes
+from photogram.network.attitudes import Representation
 
 FIGURE = Path(__file__).with_name("conventions.svg")
 

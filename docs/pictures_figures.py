@@ -29,11 +29,10 @@ from photogram import (
     simulate,
 )
 from photogram.giant import read_project
-from photogram.plots import figures
+from photogram.plots import drawn, figures
 from photogram.results.fitting import with_features
 from photogram.show.methods import page_of
 from photogram.show.page import Drawing
-from photogram.show.pictures import drawn
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 from self_calibration import measured

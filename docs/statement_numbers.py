@@ -11,7 +11,7 @@ import numpy as np
 from photogram import adjust, formats
 from photogram.results.statement.comparison import Compared, compared
 from photogram.results.statement.request import Asked
-from photogram.statistics.freedom import effective_freedom, rmse_interval
+from photogram.statistics import effective_freedom, rmse_interval
 
 __all__ = ["BLOCKS"]
 

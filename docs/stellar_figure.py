@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from views import BLUE, GREEN, GREY, LIGHT, RED, Floats, View, circle, svg
 
 from photogram import _photocore
-from photogram.stellar import Site
-from photogram.stellar.parameters import GRAD
+from photogram.stellar import GRAD, Site
 from photogram.stellar.pointing import terrestrial
 
 FIGURE = Path(__file__).with_name("stellar-frames.svg")

@@ -12,17 +12,25 @@ from pathlib import Path
 import erfa
 import numpy as np
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Result, calibrate, refraction
-from photogram.stellar.lenses import LENSES
+from photogram.stellar import (
+    ARCSEC,
+    GRAD,
+    LENSES,
+    NAMES,
+    Air,
+    CalibratedNight,
+    Result,
+    SkyCamera,
+    calibrate,
+    calibrate_night,
+    read_night,
+    read_plain,
+    refraction,
+    report,
+)
 from photogram.stellar.listing import summary
-from photogram.stellar.night_calibration import CalibratedNight, calibrate_night
-from photogram.stellar.night_file import read_night
-from photogram.stellar.night_report import report
 from photogram.stellar.night_report import summary as night_summary
-from photogram.stellar.parameters import GRAD, NAMES, UNITS
-from photogram.stellar.plain import read_plain
-from photogram.stellar.sky_cameras import SkyCamera
+from photogram.stellar.parameters import UNITS
 
 
 @cache

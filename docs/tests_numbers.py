@@ -7,8 +7,7 @@ import textwrap
 
 import numpy as np
 
-from photogram import adjust, simulate
-from photogram.network.block import Block
+from photogram import Block, adjust, simulate
 from photogram.show.sections import verdict_sections
 from photogram.statistics import (
     b_method,

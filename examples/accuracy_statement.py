@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import Result, adjust, formats, statement
-from photogram.results.statement.statement import Statement
+from photogram import Result, Statement, adjust, formats, statement
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "survey"))
 CORNERS = ("C01", "C26", "C30", "C05")

@@ -10,15 +10,21 @@ import sys
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site
-from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.lenses import LENSES
-from photogram.stellar.night_calibration import Night, calibrate_night
-from photogram.stellar.night_report import report
-from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky_calibration import Exposure, project_sky
-from photogram.stellar.sky_cameras import SkyCamera
+from photogram.stellar import (
+    ARCSEC,
+    LENSES,
+    Air,
+    Catalogue,
+    Exposure,
+    Night,
+    Site,
+    SkyCamera,
+    apparent_places,
+    calibrate_night,
+    project_sky,
+    report,
+    sidereal_time,
+)
 
 SITE = Site(np.radians(46.5), np.radians(-7.5), 1000.0, Air(278.15, 680.0), aberration=0.3192 * ARCSEC)
 FRAME, SD = (3000.0, 2800.0), 0.1

@@ -8,11 +8,8 @@ and say what is known of the camera afterwards.
 from importlib.resources import files
 from pathlib import Path
 
-from photogram import Camera, adjust, camera_from, comparator, simulate
-from photogram.results.result import Result
-from photogram.stellar import calibrate
-from photogram.stellar.cameras import camera_document
-from photogram.stellar.plain import read_plain
+from photogram import Camera, Result, adjust, camera_from, comparator, simulate
+from photogram.stellar import calibrate, camera_document, read_plain
 
 EXAMPLES = Path(str(files("photogram") / "examples"))
 

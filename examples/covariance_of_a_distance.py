@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import adjust, simulate
-from photogram.results.covariance import Propagated
+from photogram.results import Propagated
 
 Floats = NDArray[np.float64]
 

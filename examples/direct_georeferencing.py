@@ -8,11 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, Result, adjust
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import project, rotation_matrix
-from photogram.network.observations import Attitude, Control, Observation, Position
-from photogram.network.unknowns import Boresight, Drift, LeverArm, Shift
+from photogram import Attitudes, Block, LeverArm, Position, Result, adjust
+from photogram.network import (
+    Attitude,
+    Boresight,
+    Control,
+    Drift,
+    Observation,
+    Shift,
+    project,
+    rotation_matrix,
+)
 
 PRINCIPAL_DISTANCE = -100.0
 IMAGE_SD = 0.005

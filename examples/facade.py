@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, Result, adjust
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import project
-from photogram.network.observations import (
+from photogram import Attitudes, Block, Distance, Result, adjust
+from photogram.network import (
     Difference,
-    Distance,
+    Instrument,
+    Level,
+    Line,
     Observation,
     OnLevel,
     OnLine,
     OnPlane,
     OnPlumbLine,
+    Plane,
+    PlumbLine,
+    project,
 )
-from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine
 
 IMAGE_SD = 0.002
 """Millimetres."""

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, FirstValues, Result, adjust, first_values
-from photogram.network.geometry import project, rotation_angles, rotation_matrix
-from photogram.network.observations import Distance
+from photogram import Block, Distance, FirstValues, Result, adjust, first_values
+from photogram.network import project, rotation_angles, rotation_matrix
 
 PRINCIPAL_DISTANCE = -50.0
 HALF_FORMAT = 18.0

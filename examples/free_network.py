@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram import Block, InnerConstraints, Result, adjust
-from photogram.network.geometry import project
+from photogram.network import project
 
 IMAGE_SD = 0.001
 """Millimetres."""

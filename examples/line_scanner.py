@@ -10,13 +10,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, Camera, Result, adjust
-from photogram.network.attitudes import Attitudes
-from photogram.network.moving_photos import Lines, LineSensor, Timed
-from photogram.network.observations import Attitude, Position
-from photogram.network.projecting import projected
-from photogram.network.trajectories import Clock, Spline, Table, Trajectory
-from photogram.network.unknowns import Sensor
+from photogram import Attitudes, Block, Camera, Position, Result, adjust
+from photogram.network import (
+    Attitude,
+    Clock,
+    Lines,
+    LineSensor,
+    Sensor,
+    Spline,
+    Table,
+    Timed,
+    Trajectory,
+    projected,
+)
 
 SPEED, HEIGHT, SECONDS = 70.0, 1500.0, 40.0
 """Metres a second, metres, seconds."""

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram.absolute_orientation import Similarity
-from photogram.network.geometry import rotation_matrix
+from photogram.network import rotation_matrix
 
 TARGET = Path(__file__).resolve().parents[1] / "python" / "photogram" / "examples" / "absolute_orientation"
 ANGLES_DEG = (0.8, -1.3, 203.0)

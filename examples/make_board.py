@@ -14,11 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram import Camera
+from photogram import Attitudes, Camera
 from photogram.io.csv_text import csv_text
-from photogram.network.attitudes import Attitudes
-from photogram.targets import Board, Calibration, Corners
-from photogram.targets.calibration import simulate_corners
+from photogram.targets import Board, Calibration, Corners, simulate_corners
 
 SEED = 37
 SIZE = (1600, 1200)

@@ -13,13 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site
-from photogram.stellar.cameras import BrownCamera
-from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.pointing import attitude_of
-from photogram.stellar.sky_calibration import project_sky
+from photogram.stellar import (
+    ARCSEC,
+    Air,
+    BrownCamera,
+    Catalogue,
+    Earth,
+    Site,
+    apparent_places,
+    attitude_of,
+    project_sky,
+    sidereal_time,
+)
 
 FOLDER = Path(__file__).resolve().parents[1] / "python/photogram/examples/exposures"
 

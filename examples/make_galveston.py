@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram import Spheroid, network
 from photogram.giant import Camera, Common, Frame, GroundPoint, ImageFrame, Project, write_project
-from photogram.network import geometry
-from photogram.network.geometry import Spheroid
 
 ROOT = Path(__file__).resolve().parents[1]
 PRINTED = ROOT / "tests" / "data" / "giant"
@@ -123,7 +122,7 @@ def triple(values: Floats) -> tuple[float, float, float]:
 
 def project(station: tuple[Floats, Floats], point: Floats) -> Floats:
     """Return the image of a point in millimetres."""
-    return geometry.project(
+    return network.project(
         [point], [station[0]], [station[1]], [PRINCIPAL_DISTANCE], spheroid=SPHEROID, photo_to_ground=True
     )[0]
 
@@ -134,8 +133,8 @@ def ray(station: tuple[Floats, Floats], xy: Floats) -> tuple[Floats, Floats]:
     (sl, cl), (sp, cp) = ((math.sin(angle), math.cos(angle)) for angle in position[:2])
     east_north_up = np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
     image = np.array([*xy, PRINCIPAL_DISTANCE])
-    direction = east_north_up.T @ geometry.rotation_matrix([attitude])[0] @ image
-    return geometry.geographic_to_geocentric([position], SPHEROID)[0], direction / np.linalg.norm(direction)
+    direction = east_north_up.T @ network.rotation_matrix([attitude])[0] @ image
+    return network.geographic_to_geocentric([position], SPHEROID)[0], direction / np.linalg.norm(direction)
 
 
 def at_height(station: tuple[Floats, Floats], xy: Floats, height: float) -> Floats:
@@ -143,7 +142,7 @@ def at_height(station: tuple[Floats, Floats], xy: Floats, height: float) -> Floa
     origin, direction = ray(station, xy)
     distance = 0.0
     for _ in range(20):
-        point = geometry.geocentric_to_geographic([origin + distance * direction], SPHEROID)[0]
+        point = network.geocentric_to_geographic([origin + distance * direction], SPHEROID)[0]
         distance += point[2] - height
     return point
 
@@ -152,7 +151,7 @@ def intersection(rays: list[tuple[Floats, Floats]]) -> Floats:
     """Return the point nearest to the rays."""
     normals = [np.eye(3) - np.outer(direction, direction) for _, direction in rays]
     right = sum(normal @ origin for normal, (origin, _) in zip(normals, rays, strict=True))
-    return geometry.geocentric_to_geographic([np.linalg.solve(sum(normals), right)], SPHEROID)[0]
+    return network.geocentric_to_geographic([np.linalg.solve(sum(normals), right)], SPHEROID)[0]
 
 
 def seen_by(stations: Stations, point: Floats) -> list[str]:

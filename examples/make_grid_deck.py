@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.network.geometry import rotation_matrix
+from photogram.network import rotation_matrix
 
 DECK = Path(__file__).resolve().parents[1] / "python/photogram/examples/perspective_center/grid.deck"
 

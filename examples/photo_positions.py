@@ -15,8 +15,7 @@ import numpy as np
 from PIL import Image
 
 from photogram import Result, adjust, formats
-from photogram.formats import Frame, PhotoFiles, Wishes, read_metadata
-from photogram.formats.crs import from_frame
+from photogram.formats import Frame, PhotoFiles, Wishes, from_frame, read_metadata
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "project"))
 FRAME = Frame("topocentric", "EPSG:4979", (47.38, 8.54, 450.0))

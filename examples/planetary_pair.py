@@ -17,14 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from photogram import Result, adjust, formats
-from photogram.formats.csm.lists import read_support
-from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.format import Wishes
-from photogram.formats.isis.network import POINT_TYPES, ControlNetwork, measures_of, points_of
-from photogram.formats.isis.writing import network_text
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import Spheroid, geocentric_to_geographic, geographic_to_geocentric
+from photogram import Attitudes, Result, Spheroid, adjust, formats
+from photogram.formats import Wishes
+from photogram.formats.csm import SupportedImage, read_support
+from photogram.formats.isis import POINT_TYPES, ControlNetwork, measures_of, network_text, points_of
+from photogram.network import geocentric_to_geographic, geographic_to_geocentric
 
 RADIUS, HEIGHT, SPEED = 1737.4, 50.0, 1.66
 """Kilometres; kilometres a second."""

@@ -6,12 +6,12 @@ Run with `python examples/refraction_tables.py`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
 from photogram import Refraction
-from photogram.network import geometry
-from photogram.network.refraction import Air, Water
+from photogram.network import project, refraction_shift
 
 HEIGHTS_M = (500, 1000, 3000, 6000, 9000, 11000, 15000, 20000, 40000)
 CAMERAS_M = (100, 1000, 4500)
@@ -21,13 +21,13 @@ TANGENTS = (0.0, 0.5, 1.0)
 
 def lift(refraction: Refraction, camera: float, across: float, point: float) -> float:
     """Return the lift of a point `across` from the nadir; `camera` and `point` are heights; metres."""
-    shift = geometry.refraction_shift([[across, 0.0, point]], [[0.0, 0.0, camera]], refraction)
+    shift = refraction_shift([[across, 0.0, point]], [[0.0, 0.0, camera]], refraction)
     return float(shift[0, 2])
 
 
 def air_table() -> Iterator[str]:
     """Lines of the table of K_a at sea level, and of the lift at 45 degrees, by flying height."""
-    models: tuple[Air, ...] = ("giant", "standard")
+    models: tuple[Literal["giant", "standard"], ...] = ("giant", "standard")
     yield "camera       K giant  K standard  difference    lift at 45 deg: giant  standard"
     yield "     m         urad        urad        urad                        m         m"
     for height in HEIGHTS_M:
@@ -41,7 +41,7 @@ def air_table() -> Iterator[str]:
 
 def water_table() -> Iterator[str]:
     """Lines of the table of the lift of points under water, by flying height, depth and angle."""
-    models: tuple[Water, ...] = ("giant", "snell")
+    models: tuple[Literal["giant", "snell"], ...] = ("giant", "snell")
     yield "camera  depth  tan alpha     lift: giant     snell  difference  shift of the image"
     yield "     m      m                          m         m           m                  um"
     for camera in CAMERAS_M:
@@ -58,7 +58,7 @@ def water_table() -> Iterator[str]:
 
 def image(camera: float, across: float, height: float) -> float:
     """Return where a vertical photograph with c = -152.74 mm has a point, in millimetres from its centre."""
-    at = geometry.project([[across, 0.0, height]], [[0.0, 0.0, camera]], np.zeros((1, 3)), [-152.74])
+    at = project([[across, 0.0, height]], [[0.0, 0.0, camera]], np.zeros((1, 3)), [-152.74])
     return float(at[0, 0])
 
 

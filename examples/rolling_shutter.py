@@ -10,11 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, Camera, Result, adjust
-from photogram.network.moving_photos import Shutter, Timed
-from photogram.network.observations import Position, Velocity
-from photogram.network.projecting import projected
-from photogram.network.trajectories import Polynomial, Readout, Table, Trajectory
+from photogram import Block, Camera, Position, Result, adjust
+from photogram.network import Polynomial, Readout, Shutter, Table, Timed, Trajectory, Velocity, projected
 
 WIDTH, HEIGHT, F = 4000, 3000, 3650.0
 READOUT = 0.031

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, Result, adjust
-from photogram.network.geometry import project, rotation_matrix
-from photogram.network.observations import Attitude, Distance, EqualHeight, Observation, Position
+from photogram import Block, Distance, Position, Result, adjust
+from photogram.network import Attitude, EqualHeight, Observation, project, rotation_matrix
 
 IMAGE_SD = 0.001
 """Millimetres."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from photogram import Result, adjust, formats
 from photogram.film import Interior, interior_orientation
-from photogram.network.observations import Fiducial
+from photogram.network import Fiducial
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 

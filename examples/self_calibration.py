@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram import Block, Camera, Result, adjust
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import project
+from photogram import Attitudes, Block, Camera, Result, adjust
+from photogram.network import project
 
 IMAGE_SD = 0.001
 """Millimetres."""
@@ -87,7 +86,7 @@ def main(picture: Path | None = None) -> Result:
     start = report.index("Calibration of")
     print(report[start : report.index("\n\nPhotos\n", start)])
     if picture is not None:
-        from photogram.results.calibration_picture import draw_distortion  # needs matplotlib
+        from photogram.results import draw_distortion  # needs matplotlib
 
         draw_distortion(result, result.cameras[0], picture)
     return result

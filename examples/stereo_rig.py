@@ -8,12 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from photogram import Block, Result, adjust
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import project, rotation_matrix
-from photogram.network.observations import Base
-from photogram.network.rigs import Mount
-from photogram.network.unknowns import Sensor
+from photogram import Attitudes, Block, Result, adjust
+from photogram.network import Base, Mount, Sensor, project, rotation_matrix
 
 IMAGE_SD = 0.001
 """Millimetres."""

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram import Block, adjust, group_sums, simulate, variance_components, variance_function
-from photogram.results.components_picture import draw_components
-from photogram.results.variance_function import draw_variance_function
+from photogram.results import draw_components, draw_variance_function
 
 FACTOR = 2.5
 """Of the errors of the second strip."""

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram import Block, Camera
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import project
-from photogram.network.observations import Observation
+from photogram import Attitudes, Block, Camera
+from photogram.network import Observation, project
 
 C, HEIGHT, SD = -100.0, 1000.0, 0.002
 """Principal distance and image deviation in millimetres, flying height in metres."""

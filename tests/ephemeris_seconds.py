@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from photogram.network.moving_photos import Lines
+from photogram.network import Lines
 
 
 @contextmanager

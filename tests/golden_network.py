@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Block
-from photogram.network.attitudes import Attitudes
-from photogram.network.observations import Distance
+from photogram import Attitudes, Block, Distance
 
 FOLDER = Path(__file__).parents[1] / "../shared/data/network"
 

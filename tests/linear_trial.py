@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram import InputError
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
-from photogram.statistics.groups import group_tests
+from photogram.statistics import group_tests
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
     Out,

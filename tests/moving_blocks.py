@@ -6,12 +6,23 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from photogram import Block, Camera
-from photogram.network.attitudes import Attitudes
-from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
-from photogram.network.observations import Attitude, Position, Rate, Velocity
-from photogram.network.trajectories import Clock, GyroBias, Readout, Spline, Table, Trajectory
-from photogram.network.unknowns import Boresight, LeverArm
+from photogram import Attitudes, Block, Camera, LeverArm, Position
+from photogram.network import (
+    Attitude,
+    Boresight,
+    Clock,
+    GyroBias,
+    Lines,
+    LineSensor,
+    Rate,
+    Readout,
+    Shutter,
+    Spline,
+    Table,
+    Timed,
+    Trajectory,
+    Velocity,
+)
 
 Floats = np.ndarray
 

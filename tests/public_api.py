@@ -13,8 +13,6 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
-import photogram
-
 LIST = Path(__file__).with_name("public_api.txt")
 
 
@@ -50,10 +48,17 @@ def members(name: str, kind: type) -> Iterator[str]:
             yield f"{name}.{attribute}"
 
 
+def packages(name: str = "photogram") -> Iterator[str]:
+    """Return the names of a public package and of those in it."""
+    yield name
+    for inner in getattr(import_module(name), "MODULES", ()):
+        yield from packages(f"{name}.{inner}")
+
+
 def lines() -> list[str]:
     """Return the whole list."""
     found = []
-    for module in ("photogram", *(f"photogram.{name}" for name in photogram.MODULES)):
+    for module in packages():
         home = import_module(module)
         for own in sorted(home.__all__):
             value, name = getattr(home, own), f"{module}.{own}"

@@ -32,14 +32,14 @@ PACKAGES = (
 MADE_BY_THE_LIBRARY = {
     "photogram": "Cleaned Differences Feature Features FirstValues GroupSums Iteration Message Orientation"
     " Plan Pose Progress Resection Result Simulation Snooped Statement VarianceComponents VarianceFunction",
-    "photogram.absolute_orientation": "Model Orientation Strip",
+    "photogram.absolute_orientation": "Model Strip",
     "photogram.collection": "AdjustedCollection Simulation",
     "photogram.comparator": "Calibration Case CaseResult Comparison Decomposition Identity Place PlateResult"
     " Pointing Reading RecordedCalibration RecordedCase Session Simulation collect_cases",
     "photogram.distributed": "PartsPlan",
     "photogram.giant": "ErrorWarning ImageFrame Project",
     "photogram.perspective_center": "Cycle PerspectiveCenter Run Stop",
-    "photogram.stellar": "Result",
+    "photogram.stellar": "CalibratedNight Result",
     "photogram.adjustment.robust": "remark loss_row",
 }
 """Results and what readers make: nobody calls them with values of their own."""
@@ -92,7 +92,6 @@ HOSTILE = {
 def good(tmp_path_factory):
     """Return for each public name the arguments of a call that works."""
     from photogram import absolute_orientation, collection, comparator, perspective_center, stellar
-    from photogram.stellar.plain import read_plain
 
     folder = tmp_path_factory.mktemp("sound")
     examples = Path(photogram.__file__).parent / "examples"
@@ -104,6 +103,8 @@ def good(tmp_path_factory):
     adjustable = project.to_block()
     stations = absolute_orientation.read_csv(examples / "absolute_orientation" / "stations.csv")
     oriented = photogram.orient(stations)
+    orientation = folder / "orientation.json"
+    orientation.write_bytes(oriented.to_json())
     cards = folder / "cards.txt"
     cards.write_text("0 0 0 0 0 0 0 A\n3 3 3 A\n0 0 0 0 0 0 1\n10 0 0 1 0 0 2\n0 10 0 0 1 0 3\n")
     photos = collection.simulate(photos=3, points=8, seen=1.0).collection
@@ -124,7 +125,17 @@ def good(tmp_path_factory):
     own_grid.write_bytes(plate.to_csv())
     grid_deck = examples / "perspective_center" / "grid.deck"
     grid = perspective_center.read_deck(grid_deck)[0]
-    problem = read_plain(examples / "stellar" / "plate.toml")
+    plate_file, star_night = examples / "stellar" / "plate.toml", examples / "exposures" / "night.toml"
+    problem, night = stellar.read_plain(plate_file), stellar.read_night(star_night)
+    night = dataclasses.replace(night, exposures=night.exposures[:2], names=night.names[:2])
+    calibrated_night = stellar.calibrate_night(night)
+    exposure, catalogue = calibrated_night.exposures[0], night.catalogue.brighter(4.0)
+    star_deck, star_yaml = folder / "star_deck.txt", folder / "camera.yaml"
+    with pytest.MonkeyPatch.context() as paths:
+        paths.syspath_prepend(Path(__file__).parent / "stellar")
+        from star_decks import cards as star_cards
+    star_deck.write_text("\n".join(star_cards(problem)) + "\n")
+    star_yaml.write_bytes(stellar.to_yaml(night.camera, night.frame, "ros"))
     lens = photogram.Camera("brown", {"c": -152.74}, sd={"K1": 1e-8})
     calibrated = photogram.adjust(
         block.replace(cameras=[lens], photo_cameras=[0] * 3, principal_distances=None)
@@ -185,10 +196,10 @@ def good(tmp_path_factory):
                 for name in absolute_orientation.Similarity.__dataclass_fields__
             },
             "Stations": {"ids": ["a", "b"], "control": np.eye(2, 3), "model": np.eye(2, 3)},
-            "orient": {"stations": stations},
             "relative_model": {"block": pair, "first": pair.photo_ids[0], "second": pair.photo_ids[1]},
             "strip_of": {"block": pair, "photos": pair.photo_ids[:2]},
             "read_cards": {"path": cards},
+            "read_similarity": {"path": orientation, "usable": True},
             "read_csv": {"path": examples / "absolute_orientation" / "stations.csv"},
             "transform_file": {
                 "similarity": oriented.similarity,
@@ -259,7 +270,6 @@ def good(tmp_path_factory):
         },
         "photogram.distributed": {
             "Division": {"parts": 2},
-            "adjust_in_parts": {"block": block, "division": Division(parts=2)},
             "plan_in_parts": {"block": block, "division": Division(parts=2)},
         },
         "photogram.giant": {
@@ -299,6 +309,11 @@ def good(tmp_path_factory):
             "Air": {"temperature": 280.0, "pressure": 760.0},
             "Axis": {"azimuth": 0.0, "zenith_distance": 0.0, "xy": np.zeros(2), "weight": np.eye(2)},
             "BrownCamera": {"values": np.r_[9000.0, 9000.0, np.zeros(7)], "covariance": np.zeros((9, 9))},
+            "Catalogue": {name: getattr(catalogue, name) for name in stellar.Catalogue.__dataclass_fields__},
+            "Earth": {"dut1": -0.2, "pole": (1e-6, 2e-6)},
+            "Effects": {"refraction": False},
+            "Exposure": {name: getattr(exposure, name) for name in stellar.Exposure.__dataclass_fields__},
+            "Night": {name: getattr(night, name) for name in stellar.Night.__dataclass_fields__},
             "Options": {},
             "PlateCamera": {
                 "values": np.zeros(13),
@@ -307,12 +322,39 @@ def good(tmp_path_factory):
                 "degrees_of_freedom": 3,
             },
             "Problem": {name: getattr(problem, name) for name in stellar.Problem.__dataclass_fields__},
-            "Effects": {"refraction": False},
             "Site": {"latitude": 0.5},
             "SkyCamera": {"values": np.r_[9000.0, 9000.0, np.zeros(7)], "covariance": np.zeros((9, 9))},
+            "apparent_places": {"catalogue": catalogue, "utc": exposure.utc, "effects": stellar.Effects()},
+            "attitude_of": {"azimuth": 0.2, "elevation": 0.9, "roll": 0.1},
             "calibrate": {"problem": problem},
+            "calibrate_exposures": {
+                "exposures": calibrated_night.exposures,
+                "camera": night.camera,
+                "site": night.site,
+                "catalogue": night.catalogue,
+                "fixed": ("k2", "k3"),
+                "prior": None,
+                "threads": 1,
+            },
+            "calibrate_night": {"night": night, "threads": 1},
+            "camera_document": {"result": stellar.calibrate(problem)},
             "default_parameters": {"principal_distance": 0.3},
+            "landmark": {"site": night.site, "azimuth": 0.2, "elevation": 0.1, "weight": np.eye(2)},
+            "project_sky": {
+                "camera": night.camera,
+                "attitude": exposure.attitude,
+                "site": night.site,
+                "places": catalogue.places,
+                "time": 1.0,
+            },
+            "read_deck": {"path": star_deck},
+            "read_night": {"path": star_night, "values": {}},
+            "read_plain": {"path": plate_file},
+            "read_yaml": {"path": star_yaml},
             "refraction": {"zenith_distances": [0.5]},
+            "report": {"result": calibrated_night},
+            "sidereal_time": {"site": night.site, "utc": exposure.utc, "dut1": 0.1},
+            "to_yaml": {"camera": night.camera, "frame": night.frame, "form": "ros", "name": "A"},
         },
     }
 

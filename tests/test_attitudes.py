@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram.network.attitudes import Attitudes, Representation
+from photogram import Attitudes
+from photogram.network.attitudes import Representation
 
 GOLDEN = Path(__file__).parents[1] / "../shared/data/network/attitudes.json"
 golden = pytest.mark.skipif(not GOLDEN.exists(), reason="the shared golden data are not at hand")

@@ -25,7 +25,7 @@ from photogram import (
     adjust,
     simulate,
 )
-from photogram.network.geometry import project
+from photogram.network import project
 
 # Arrays
 

@@ -10,10 +10,7 @@ import pytest
 
 from photogram import Block, Camera, InputError, Result, adjust, adjust_in_parts, read_result
 from photogram.distributed import Division
-from photogram.network.geometry import rotation_angles
-from photogram.network.passages import Bend, Figure
-from photogram.network.rigs import Mount
-from photogram.network.unknowns import Sensor
+from photogram.network import Bend, Figure, Mount, Sensor, rotation_angles
 from shared_data import SHARED
 
 GOLDEN = SHARED / "targets" / "rig_small.json"

@@ -7,9 +7,8 @@ import pytest
 
 from example_scripts import load
 from photogram import Block, Camera, adjust
-from photogram.network.geometry import project
-from photogram.results.calibration import calibrations
-from photogram.results.distortion import distortion_curve, lens_field
+from photogram.network import project
+from photogram.results import calibrations, distortion_curve, lens_field
 from shared_data import SHARED
 
 FREE = np.inf
@@ -202,7 +201,7 @@ def test_what_comes_from_a_prior_is_said(example):
 
 
 def test_other_terms_have_a_field_of_vectors(example, result, tmp_path):
-    from photogram.results.calibration_picture import draw_lens_field
+    from photogram.results import draw_lens_field
 
     camera = result.cameras[0]
     field = lens_field(result, camera)

@@ -5,7 +5,7 @@ import pytest
 
 from example_scripts import load
 from photogram import Camera, InputError, _photocore, adjust
-from photogram.network.geometry import rotation_matrix
+from photogram.network import rotation_matrix
 
 LENS = {"c": -24.3, "xp": 0.1, "yp": -0.05, "K1": -3e-4, "K2": 2e-7, "P1": 1e-5, "P2": -2e-5, "b1": 1e-4}
 FREE = {"c": np.inf, "xp": np.inf, "yp": np.inf, "K1": np.inf, "K2": np.inf}

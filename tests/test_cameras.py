@@ -12,7 +12,7 @@ from example_scripts import load
 from photogram import AdjustmentError, Block, Camera, InputError, RankError, adjust, predict
 from photogram.adjustment.undetermined import in_words
 from photogram.giant import Project
-from photogram.network.geometry import project
+from photogram.network import project
 from photogram.network.rays import Rays
 
 FREE = np.inf

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import Camera, InnerConstraints, adjust, read_result, simulate
+from photogram import Camera, InnerConstraints, Spheroid, adjust, read_result, simulate
 from photogram.cli import app
 from photogram.formats import Wishes, read, to_files
 from photogram.formats.supplements import with_control
 from photogram.giant import Project, write_project
-from photogram.network.geometry import Spheroid
 from photogram.results.check_points import check_points
 from photogram.show.methods import page_of
 from photogram.statistics.agreement import agreement

@@ -14,11 +14,12 @@ import typer
 from rich.markup import render
 
 import photogram
-from photogram.cli.commands import app, application
+from photogram import simulate as simulate_function
+from photogram.cli import app
+from photogram.cli.commands import application
 from photogram.cli.simulate import simulate as simulate_command
 from photogram.cli.simulation_options import MotionOptions
 from photogram.giant import read_project
-from photogram.network.simulation import simulate as simulate_function
 
 STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg" / "giant"
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]

@@ -8,6 +8,7 @@ import pytest
 
 from photogram import (
     Block,
+    InputError,
     adjust,
     clean,
     group_sums,
@@ -17,7 +18,6 @@ from photogram import (
 )
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
-from photogram.errors import InputError
 from photogram.results.group_sums import Probing, factored
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
 from shared_data import SHARED

@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from contradictions import assert_one_judgement, contradictions, sentences_of
-from photogram import Camera, adjust, diagnose, plan, simulate, snoop, variance_components
-from photogram.absolute_orientation import Stations, orient
+from photogram import Camera, adjust, diagnose, orient, plan, simulate, snoop, variance_components
+from photogram.absolute_orientation import Stations
 from photogram.absolute_orientation import read_csv as read_stations
 from photogram.cli import app
 from photogram.collection import adjust as adjust_collection
@@ -342,7 +342,7 @@ def test_comparators_over_years(change):
 
 def plate(shift=0.0, image=100, mean_error=0.0):
     """Return the packaged plate with an error of one image (m), and a given mean error of unit weight."""
-    from photogram.stellar.plain import read_plain
+    from photogram.stellar import read_plain
 
     given = read_plain(Path(str(EXAMPLES / "stellar" / "plate.toml")))
     xy = given.image_xy.copy()
@@ -376,9 +376,7 @@ def test_plates(changes, code):
 @pytest.mark.parametrize("pixel_sd", [None, 0.02])
 def test_nights(pixel_sd):
     pytest.importorskip("erfa")
-    from photogram.stellar.night_calibration import calibrate_night
-    from photogram.stellar.night_file import read_night
-    from photogram.stellar.night_report import report
+    from photogram.stellar import calibrate_night, read_night, report
     from photogram.stellar.night_report import to_json as night_to_json
 
     night = read_night(Path(str(EXAMPLES / "exposures" / "night.toml")))

@@ -11,8 +11,7 @@ import pytest
 
 from example_scripts import load
 from golden_network import free_network, golden_file
-from photogram import InnerConstraints, InputError, OutOfMemoryError, adjust
-from photogram.network.attitudes import Attitudes
+from photogram import Attitudes, InnerConstraints, InputError, OutOfMemoryError, adjust
 
 
 @pytest.fixture(scope="module")

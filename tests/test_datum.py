@@ -10,8 +10,7 @@ import pytest
 
 from example_scripts import load
 from golden_network import free_network, golden_file
-from photogram import AdjustmentError, Block, InnerConstraints, InputError, MinimumConstraints, adjust
-from photogram.results.result import Result
+from photogram import AdjustmentError, Block, InnerConstraints, InputError, MinimumConstraints, Result, adjust
 
 FINE = 1e-9
 
@@ -173,7 +172,7 @@ def test_datums_that_cannot_be_are_refused(golden):
 
 def apart(golden, *, joined: bool) -> Block:
     """Return the network twice, the second one beside the first, joined by distances or not."""
-    from photogram.network.observations import Distance
+    from photogram import Distance
 
     block = free_network(golden, bars=False)
     block = block.replace(point_positions=adjust(block, datum=InnerConstraints()).point_positions)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from photogram import AdjustmentError, InnerConstraints, InputError, MinimumConstraints, adjust, simulate
-from photogram.network.geometry import rotation_matrix
+from photogram.network import rotation_matrix
 
 
 @pytest.fixture(scope="module")

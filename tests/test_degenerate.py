@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import degenerate as of
-from photogram import Camera, RankError, adjust, formats, read_result
-from photogram.network.observations import EqualHeight, OnPlumbLine, Position
-from photogram.network.unknowns import Drift, LeverArm, PlumbLine, Shift
+from photogram import Camera, LeverArm, Position, RankError, adjust, formats, read_result
+from photogram.network import Drift, EqualHeight, OnPlumbLine, PlumbLine, Shift
 
 STRIP = np.array([[200.0 * k, 0.0, of.HEIGHT] for k in range(6)])
 BELOW = np.array([[200.0 * k, y, 40 * np.sin(3 * k + y)] for k in range(-1, 8) for y in (-400.0, 0.0, 400.0)])

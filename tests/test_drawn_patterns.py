@@ -5,9 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from photogram import adjust, simulate
-from photogram.errors import InputError
-from photogram.results.pattern_pictures import drawn_patterns
+from photogram import InputError, adjust, simulate
+from photogram.results import drawn_patterns
 from photogram.statistics.patterns import durbin_watson, moran, moran_index
 
 BLOCK = simulate(strips=2, photos_per_strip=4, seed=5).block

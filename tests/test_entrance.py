@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from files.test_guards import COMMANDS, RUNS
-from photogram.cli.commands import app
+from photogram.cli import app
 from photogram.cli.job import Writes, roles
 
 PACKAGE = str(files("photogram").joinpath("examples"))
@@ -128,7 +128,7 @@ def test_help_of_parents_names_their_commands(run):
 
 
 def test_progress_is_told_in_words():
-    from photogram.adjustment.adjustment import Progress
+    from photogram import Progress
     from photogram.cli.progress import shown
 
     lines = []

@@ -12,9 +12,8 @@ import pytest
 
 from photogram import Camera, InputError, Result, adjust, diagnose, first_values, read_result, simulate
 from photogram.film import interior_orientation, which_mark
-from photogram.formats import read
-from photogram.formats.project import Project
-from photogram.network.films import Film, FilmPlacement, FilmSize, Readings, Scan, Scanner
+from photogram.formats import Project, read
+from photogram.network import Film, FilmPlacement, FilmSize, Readings, Scan, Scanner
 from shared_data import SHARED
 
 FOLDER = SHARED / "film"

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from photogram import Camera, Spheroid, adjust, simulate
-from photogram.network import geometry
+from photogram import Camera, Spheroid, adjust, network, simulate
 from photogram.results.ellipses import ellipses, fitting_scale, metric_covariances
 from photogram.results.footprints import footprints, grounds, picture_frames
 
@@ -28,7 +27,7 @@ def test_corners_of_a_footprint_are_seen_in_the_corners_of_the_picture(result):
     places = found.positions()[:, [0, 4, 8, 12]]
     corners = [[-115, -115], [115, -115], [115, 115], [-115, 115]]
     for photo in range(len(block.photo_ids)):
-        seen = geometry.project(
+        seen = network.project(
             places[photo],
             np.tile(result.photo_positions[photo], (4, 1)),
             np.tile(result.photo_attitudes[photo], (4, 1)),
@@ -60,9 +59,9 @@ def test_pictures_without_a_size_reach_as_far_as_measurements(result):
 def test_what_is_beyond_the_horizon_is_cut_off(result):
     # A third of a turn about its x axis: the upper half of the picture shows the sky.
     attitudes = result.photo_attitudes.copy()
-    attitudes[0] = geometry.rotation_angles(
-        geometry.rotation_matrix(np.array([[np.radians(80.0), 0.0, 0.0]]))
-    )[0]
+    attitudes[0] = network.rotation_angles(network.rotation_matrix(np.array([[np.radians(80.0), 0.0, 0.0]])))[
+        0
+    ]
     from dataclasses import replace
 
     found = footprints(replace(result, photo_attitudes=attitudes), [(230.0, 230.0)])

@@ -12,9 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photogram import InputError
-from photogram.network import geometry
-from photogram.network.geometry import Spheroid
+from photogram import InputError, Spheroid, network
 
 GIANT = Path(__file__).parent / "data" / "giant"
 GOLDEN: dict[str, Any] = json.loads((GIANT / "golden_cases.json").read_text())
@@ -40,7 +38,7 @@ def station(frame: str) -> tuple[np.ndarray, np.ndarray]:
 def test_section_15_projections_of_the_giant_sample(case):
     position, attitude = station(case["frame"])
     lon, lat, height = listed("ground_adjusted.csv", "point", case["point"], ["lon_deg", "lat_deg", "elev_m"])
-    xy = geometry.project(
+    xy = network.project(
         [[np.radians(lon), np.radians(lat), height]],
         [position],
         [attitude],
@@ -54,24 +52,24 @@ def test_section_15_projections_of_the_giant_sample(case):
 
 def test_the_senses_of_the_angles_are_transposes():
     case = GOLDEN["angle_mode_equivalence"]
-    matrix = geometry.rotation_matrix([np.radians(case["photo_to_ground_deg"])])
-    angles = np.degrees(geometry.rotation_angles(matrix.transpose(0, 2, 1)))
+    matrix = network.rotation_matrix([np.radians(case["photo_to_ground_deg"])])
+    angles = np.degrees(network.rotation_angles(matrix.transpose(0, 2, 1)))
     np.testing.assert_allclose(angles[0], case["ground_to_photo_deg"], rtol=0, atol=case["tol_deg"])
 
 
 @pytest.mark.giant("5", "inverse: omega, phi, kappa from M")
 @given(st.tuples(st.floats(-3.14, 3.14), st.floats(-1.5, 1.5), st.floats(-3.14, 3.14)))
 def test_section_5_angles_come_back(angles):
-    matrices = geometry.rotation_matrix([angles])
+    matrices = network.rotation_matrix([angles])
     np.testing.assert_allclose(matrices[0] @ matrices[0].T, np.eye(3), atol=1e-15)
-    np.testing.assert_allclose(geometry.rotation_angles(matrices)[0], angles, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(network.rotation_angles(matrices)[0], angles, rtol=0, atol=1e-13)
 
 
 @given(st.floats(-180, 180), st.floats(-90, 90), st.floats(-1e4, 1e7))
 def test_geographic_positions_come_back(lon, lat, height):
     spheroid = Spheroid.wgs84()
-    xyz = geometry.geographic_to_geocentric([[np.radians(lon), np.radians(lat), height]], spheroid)
-    again = geometry.geographic_to_geocentric(geometry.geocentric_to_geographic(xyz, spheroid), spheroid)
+    xyz = network.geographic_to_geocentric([[np.radians(lon), np.radians(lat), height]], spheroid)
+    again = network.geographic_to_geocentric(network.geocentric_to_geographic(xyz, spheroid), spheroid)
     np.testing.assert_allclose(again, xyz, rtol=1e-15, atol=4e-9)
 
 
@@ -81,44 +79,44 @@ def test_geographic_positions_come_back(lon, lat, height):
 def test_section_4_rectangular_projection_written_out():
     # Straight down from 1000 m with 100 mm: 1 mm on the photo is 10 m on the ground; y follows north, x east.
     for c, sign in ((-100.0, 1), (100.0, -1)):
-        xy = geometry.project([[510.0, 220.0, 0.0]], [[500.0, 200.0, 1000.0]], [[0.0, 0.0, 0.0]], [c])
+        xy = network.project([[510.0, 220.0, 0.0]], [[500.0, 200.0, 1000.0]], [[0.0, 0.0, 0.0]], [c])
         np.testing.assert_allclose(xy, [[sign * 1.0, sign * 2.0]], atol=1e-14)
 
 
 def test_points_beside_the_camera_have_no_image():
-    xy = geometry.project([[1.0, 2.0, 0.0]], [[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]], [-100.0])
+    xy = network.project([[1.0, 2.0, 0.0]], [[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]], [-100.0])
     assert not np.isfinite(xy).any()
 
 
 def test_empty_and_strided_arrays():
-    assert geometry.rotation_matrix(np.empty((0, 3))).shape == (0, 3, 3)
+    assert network.rotation_matrix(np.empty((0, 3))).shape == (0, 3, 3)
     angles = np.arange(12.0).reshape(3, 4).T
-    np.testing.assert_array_equal(geometry.rotation_matrix(angles), geometry.rotation_matrix(angles.copy()))
+    np.testing.assert_array_equal(network.rotation_matrix(angles), network.rotation_matrix(angles.copy()))
 
 
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
-        (geometry.rotation_matrix, ([1.0, 2.0, 3.0],), r"angles has the shape \(3\), not \(n, 3\)"),
-        (geometry.rotation_matrix, (np.zeros((4, 2)),), r"angles has the shape \(4, 2\), not \(n, 3\)"),
-        (geometry.rotation_angles, (np.zeros((4, 3)),), r"matrices has the shape \(4, 3\), not \(n, 3, 3\)"),
+        (network.rotation_matrix, ([1.0, 2.0, 3.0],), r"angles has the shape \(3\), not \(n, 3\)"),
+        (network.rotation_matrix, (np.zeros((4, 2)),), r"angles has the shape \(4, 2\), not \(n, 3\)"),
+        (network.rotation_angles, (np.zeros((4, 3)),), r"matrices has the shape \(4, 3\), not \(n, 3, 3\)"),
         (
-            geometry.geographic_to_geocentric,
+            network.geographic_to_geocentric,
             (np.zeros(3), Spheroid.wgs84()),
             r"positions has the shape \(3\)",
         ),
         (
-            geometry.geocentric_to_geographic,
+            network.geocentric_to_geographic,
             (np.zeros((1, 4)), Spheroid.wgs84()),
             r"xyz has the shape \(1, 4\)",
         ),
         (
-            geometry.project,
+            network.project,
             (np.zeros((2, 3)), np.zeros((1, 3)), np.zeros((2, 3)), np.zeros(2)),
             "positions has 1 rows, but points has 2",
         ),
         (
-            geometry.project,
+            network.project,
             (np.zeros((2, 3)), np.zeros((2, 3)), np.zeros((2, 3)), np.zeros((2, 1))),
             "principal_distances has the shape",
         ),
@@ -141,22 +139,20 @@ def test_lengths_of_units_are_those_of_small_steps():
     for axis, step in enumerate((1e-6, 1e-6, 1.0)):
         moved = positions.copy()
         moved[:, axis] += step
-        xyz, other = (geometry.geographic_to_geocentric(each, spheroid) for each in (positions, moved))
+        xyz, other = (network.geographic_to_geocentric(each, spheroid) for each in (positions, moved))
         lengths = np.linalg.norm(other - xyz, axis=1) / step
-        np.testing.assert_allclose(
-            geometry.lengths_of_units(positions, spheroid)[:, axis], lengths, rtol=1e-6
-        )
-    np.testing.assert_array_equal(geometry.lengths_of_units(positions, None), 1.0)
+        np.testing.assert_allclose(network.lengths_of_units(positions, spheroid)[:, axis], lengths, rtol=1e-6)
+    np.testing.assert_array_equal(network.lengths_of_units(positions, None), 1.0)
 
 
 def test_local_frames_point_east_north_and_up():
     spheroid = Spheroid.wgs84()
     positions = np.array([[0.1, 0.85, 500.0], [3.1, -0.2, 0.0]])
-    frames = geometry.local_frames(positions)
+    frames = network.local_frames(positions)
     for axis, step in enumerate((1e-6, 1e-6, 1.0)):
         moved = positions.copy()
         moved[:, axis] += step
-        xyz, other = (geometry.geographic_to_geocentric(each, spheroid) for each in (positions, moved))
+        xyz, other = (network.geographic_to_geocentric(each, spheroid) for each in (positions, moved))
         directions = (other - xyz) / np.linalg.norm(other - xyz, axis=1)[:, None]
         np.testing.assert_allclose(frames[:, axis], directions, atol=1e-6)
 
@@ -167,12 +163,12 @@ def test_a_point_in_the_viewing_direction_is_at_the_principal_point(spheroid, ph
     space = {"spheroid": spheroid, "photo_to_ground": photo_to_ground}
     positions = np.array([[0.3, 0.7, 3000.0], [-2.0, -0.4, 1500.0]])
     attitudes = np.array([[0.1, -0.2, 2.0], [-0.3, 0.1, -1.0]])
-    directions = geometry.viewing_directions(positions, attitudes, **space)
+    directions = network.viewing_directions(positions, attitudes, **space)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-15)
-    centres = positions if spheroid is None else geometry.geographic_to_geocentric(positions, spheroid)
+    centres = positions if spheroid is None else network.geographic_to_geocentric(positions, spheroid)
     points = centres + 1000.0 * directions
     if spheroid is not None:
-        points = geometry.geocentric_to_geographic(points, spheroid)
-    xy = geometry.project(points, positions, attitudes, np.full(2, -150.0), **space)
+        points = network.geocentric_to_geographic(points, spheroid)
+    xy = network.project(points, positions, attitudes, np.full(2, -150.0), **space)
     np.testing.assert_allclose(xy, 0.0, atol=1e-6)
     assert (points[:, 2] < positions[:, 2]).all()  # down, not up

@@ -9,7 +9,7 @@ import pytest
 
 import photogram
 from photogram import Block, adjust, diagnose, simulate, snoop
-from photogram.network.geometry import project
+from photogram.network import project
 from photogram.results.weakest import weakest_photos, weakest_points
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.statistics.history import history
 
 YEARS = np.array([0.0, 0.2, 0.5, 0.6, 1.1, 1.3, 1.9, 2.4])

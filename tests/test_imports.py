@@ -1,5 +1,6 @@
 """Every way to import works by itself, in a new process."""
 
+import inspect
 import subprocess
 import sys
 from importlib import import_module
@@ -10,6 +11,7 @@ from pkgutil import resolve_name
 import pytest
 
 import photogram
+import public_api
 
 
 @pytest.mark.parametrize(
@@ -21,7 +23,10 @@ import photogram
         ("from photogram.statistics import global_test", "global_test"),
         ("from photogram.adjustment import adjust, Progress", "adjust"),
         ("import photogram.adjustment", "photogram.adjust"),
-        ("from photogram.distributed import adjust_in_parts", "adjust_in_parts"),
+        ("from photogram.distributed import plan_in_parts", "plan_in_parts"),
+        ("from photogram.network import Film, Trajectory, project, with_gnss", "project"),
+        ("import photogram", "photogram.formats.csm.read_support"),
+        ("import photogram", "photogram.comparator.pictures.figures"),
         ("import photogram.io.writing.targets", "photogram.io.writing.targets.check_outputs"),
     ],
 )
@@ -32,7 +37,7 @@ def test_every_way_to_import_works_in_a_new_process(statement, name):
 
 
 @pytest.mark.parametrize(
-    "package", ["photogram", "photogram.targets", "photogram.film", "photogram.formats", "photogram.giant"]
+    "package", [name for name in public_api.packages() if hasattr(import_module(name), "_HOMES")]
 )
 def test_no_name_that_is_loaded_when_asked_for_is_that_of_a_module(package):
     """The import of such a module would stand in the place of what it has."""
@@ -42,6 +47,19 @@ def test_no_name_that_is_loaded_when_asked_for_is_that_of_a_module(package):
         each.stem for each in folder.iterdir() if each.suffix == ".py" or (each / "__init__.py").exists()
     }
     assert {*home._HOMES} & taken == set()
+
+
+def test_each_thing_has_one_public_name():
+    names = {}
+    for package in public_api.packages():
+        home = import_module(package)
+        assert sorted(set(home.__all__)) == sorted(home.__all__)
+        for name in home.__all__:
+            value = getattr(home, name)
+            if callable(value):
+                names.setdefault(inspect.unwrap(value), []).append(f"{package}.{name}")
+    assert len(names) > 300
+    assert [several for several in names.values() if len(several) > 1] == []
 
 
 def test_other_names_are_not_found():
@@ -55,7 +73,7 @@ def test_other_names_are_not_found():
 def test_the_reference_says_names_that_there_are():
     page = (Path(__file__).parents[1] / "docs" / "reference.md").read_text()
     said = [line.removeprefix("::: ") for line in page.splitlines() if line.startswith("::: ")]
-    assert len(said) > 40
+    assert set(public_api.packages()) < set(said)
     for name in said:
         assert resolve_name(name) is not None
 
@@ -79,8 +97,8 @@ def test_what_adjusts_has_no_more_parameters_than_can_be_read(call):
 
 
 PARTS = """
-from photogram.distributed import Division, adjust_in_parts
-from photogram.network.simulation import simulate
+from photogram import adjust_in_parts, simulate
+from photogram.distributed import Division
 
 block = simulate(strips=2, photos_per_strip=4, seed=1).block
 print(adjust_in_parts(block, Division(parts=2)).report().splitlines()[0])

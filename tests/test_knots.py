@@ -6,8 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from photogram import Block, Camera, InputError, adjust
-from photogram.network.attitudes import Attitudes
+from photogram import Attitudes, Block, Camera, InputError, adjust
 from photogram.network.knots import beyond_knots
 from shared_data import SHARED
 

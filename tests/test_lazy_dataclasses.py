@@ -10,8 +10,7 @@ from functools import partial
 
 import pytest
 
-from photogram import lazy_dataclasses
-from photogram.messages import Message
+from photogram import Message, lazy_dataclasses
 
 
 def is_made(kind):

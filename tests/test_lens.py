@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.network.lens import Lens
-from photogram.network.moving_photos import LineSensor
+from photogram.network import Lens, LineSensor
 
 TRANSVERSE = (
     *(0.01, 1.001, 2e-3, 1e-5, -2e-5, 3e-5, 1e-7, 2e-7, -1e-7, 3e-8),

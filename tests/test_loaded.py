@@ -87,6 +87,12 @@ def test_adjust_and_its_block_load_no_pictures(tmp_path):
     assert loaded(program, (*HEAVY, *SHOWING, *SELDOM), tmp_path) == []
 
 
+def test_a_name_of_a_package_loads_no_other(tmp_path):
+    program = "from photogram.network import Level\nfrom photogram.statistics import critical_normal"
+    among = ("photogram.network.block", "photogram.network.trajectories", "photogram.statistics.groups")
+    assert loaded(program, among, tmp_path) == []
+
+
 def test_a_command_loads_no_other(tmp_path):
     among = [f"photogram.cli.{name}" for name in ("adjust", "giant", "comparator", "stellar_camera", "plan")]
     assert loaded(COMMAND.format(arguments=["--help"]), among, tmp_path) == []

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import adjust, compare, eliminate_terms, score_test, terms_test
-from photogram.errors import InputError
+from photogram import InputError, adjust, compare, eliminate_terms, score_test, terms_test
 
 
 @pytest.fixture(scope="module")

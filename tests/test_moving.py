@@ -9,13 +9,28 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Block, Camera, InputError, adjust
-from photogram.network.geometry import Spheroid
-from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
-from photogram.network.observations import Attitude, Control, Position, Rate, Smoothness, Velocity
-from photogram.network.projecting import projected
-from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
-from photogram.network.unknowns import Boresight, Sensor
+from photogram import Block, Camera, InputError, Position, Spheroid, adjust
+from photogram.network import (
+    Attitude,
+    Boresight,
+    Clock,
+    Control,
+    GyroBias,
+    Lines,
+    LineSensor,
+    Polynomial,
+    Rate,
+    Readout,
+    Sensor,
+    Shutter,
+    Smoothness,
+    Spline,
+    Table,
+    Timed,
+    Trajectory,
+    Velocity,
+    projected,
+)
 from shared_data import SHARED
 
 MOVING = SHARED / "moving"

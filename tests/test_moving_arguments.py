@@ -6,12 +6,27 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling
+from photogram import PhotogramError, Position
 from photogram.adjustment.adjustment import core_options
-from photogram.errors import PhotogramError
+from photogram.network import (
+    Attitude,
+    Clock,
+    GyroBias,
+    Lines,
+    LineSensor,
+    Polynomial,
+    Range,
+    Rate,
+    Readout,
+    Shutter,
+    Smoothness,
+    Spline,
+    Table,
+    Timed,
+    Trajectory,
+    Velocity,
+)
 from photogram.network.core_arrays import block_network
-from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
-from photogram.network.observations import Attitude, Position, Range, Rate, Smoothness, Velocity
-from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
 from test_arguments import HOSTILE
 
 TABLE = Table([0.0, 1.0], np.zeros((2, 3)), [0.0, 1.0], [np.eye(3)] * 2)

@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling, scanned
-from photogram import Camera, InputError
+from photogram import Camera, InputError, Position
+from photogram.network import (
+    Attitude,
+    Clock,
+    Polynomial,
+    Range,
+    Rate,
+    Sensor,
+    Smoothness,
+    Table,
+    Timed,
+    Trajectory,
+    Velocity,
+)
 from photogram.network.motion import at_rest, flown_by, focal_images, of_pictures, scanners, timed_photos
-from photogram.network.moving_photos import Timed
-from photogram.network.observations import Attitude, Position, Range, Rate, Smoothness, Velocity
 from photogram.network.subset import of_photos
-from photogram.network.trajectories import Clock, Polynomial, Table, Trajectory
-from photogram.network.unknowns import Sensor
 
 
 def table():

@@ -18,11 +18,8 @@ from photogram import (
 )
 from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints
+from photogram.network import Lines, LineSensor, OnPlane, Plane, Polynomial, Table, Timed, Trajectory
 from photogram.network.directions import image_directions, seen_without_lenses
-from photogram.network.moving_photos import Lines, LineSensor, Timed
-from photogram.network.observations import OnPlane
-from photogram.network.trajectories import Polynomial, Table, Trajectory
-from photogram.network.unknowns import Plane
 from photogram.results.fixed_tests import held_tested
 
 

@@ -15,11 +15,10 @@ from photogram import (
     InnerConstraints,
     InputError,
     MinimumConstraints,
+    Position,
     adjust,
 )
-from photogram.network.moving_photos import Timed
-from photogram.network.observations import Attitude, Position
-from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
+from photogram.network import Attitude, Polynomial, Spline, Table, Timed, Trajectory
 
 C = -0.1
 """Of the camera, in metres as everything else: images are in the unit of the object space."""

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling, scanned
-from photogram import InputError, adjust, formats, predict
+from photogram import InputError, Spheroid, adjust, formats, predict
 from photogram.absolute_orientation import relative_model
+from photogram.formats import FORMATS, cannot_hold, to_files
 from photogram.formats.format_coordinates import in_pixels, in_topocentric
 from photogram.formats.models import is_free
 from photogram.formats.project import Repeated
-from photogram.formats.registry import FORMATS, cannot_hold, to_files
 from photogram.formats.supplements import repeated_remarks
+from photogram.network import Polynomial, Table, Timed, Trajectory
 from photogram.network.block import of_images_alone
-from photogram.network.geometry import Spheroid
-from photogram.network.moving_photos import Timed
-from photogram.network.trajectories import Polynomial, Table, Trajectory
 
 OTHERS = [name for name, each in FORMATS.items() if each.write is not None and name != "plain"]
 
@@ -117,7 +115,7 @@ def test_second_images_of_what_moves_are_not_computed(tmp_path):
 
 def test_maps_show_records_where_they_were_made():
     pytest.importorskip("geopandas")
-    from photogram.formats.maps.layers import map_layers
+    from photogram.formats.maps import map_layers
 
     block = scanned(photos=True)
     row = next(k for k, each in enumerate(block.observations) if each.KIND == "velocity")

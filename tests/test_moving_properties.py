@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from moving_blocks import rolling, scanned
-from photogram import adjust, simulate
-from photogram.network.attitudes import Attitudes
-from photogram.network.moving_photos import Lines, Shutter, Timed
-from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
+from photogram import Attitudes, adjust, simulate
+from photogram.network import Lines, Polynomial, Shutter, Spline, Table, Timed, Trajectory
 
 
 def agree(one, other, digits=1e-9):

@@ -26,11 +26,20 @@ from photogram import (
     variance_function,
 )
 from photogram.formats import Project, read, to_files
-from photogram.network.moving_photos import Lines, Timed
-from photogram.network.observations import Attitude, Prior
+from photogram.network import (
+    Attitude,
+    Boresight,
+    Clock,
+    Lines,
+    Prior,
+    Readout,
+    Sensor,
+    Spline,
+    Table,
+    Timed,
+    Trajectory,
+)
 from photogram.network.subset import kept_images
-from photogram.network.trajectories import Clock, Readout, Spline, Table, Trajectory
-from photogram.network.unknowns import Boresight, Sensor
 from photogram.results.courses import courses
 
 

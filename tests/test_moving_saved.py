@@ -7,9 +7,7 @@ import pytest
 
 from moving_blocks import rolling, scanned
 from photogram import InputError, adjust, group_sums, read_result
-from photogram.network.lens import Lens
-from photogram.network.observations import Smoothness
-from photogram.network.trajectories import Spline, Trajectory
+from photogram.network import Lens, Smoothness, Spline, Trajectory
 
 pytest.importorskip("pyarrow")
 

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram.errors import InputError
-from photogram.network.cameras import Camera
+from photogram import Camera, Distance, InputError, Position
 from photogram.network.core_arrays import CoreOptions, block_network
-from photogram.network.observations import Distance, Position
 
 OPTIONS = CoreOptions(
     criterion="fraction",

@@ -16,11 +16,9 @@ import pytest
 import photogram
 import typed_uses
 from example_scripts import load
-from photogram import Block, Camera, adjust, collection, errors, simulate
-from photogram.adjustment.adjustment import Progress
+from photogram import Block, Camera, Iteration, Progress, adjust, collection, errors, simulate
 from photogram.arguments.equality import alike
-from photogram.results.iteration import Iteration
-from photogram.stellar.plain import read_plain
+from photogram.stellar import read_plain
 
 
 @pytest.fixture(scope="module")

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Block, InputError, Spheroid, adjust, predict, simulate
+from photogram import Attitudes, Block, Distance, InputError, Position, Spheroid, adjust, predict, simulate
 from photogram.giant import Project
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import geographic_to_geocentric, local_frames, project, rotation_matrix
-from photogram.network.observations import (
+from photogram.network import (
     Attitude,
     Control,
     Difference,
-    Distance,
     EqualHeight,
-    Position,
     Range,
     Relative,
+    geographic_to_geocentric,
+    local_frames,
+    project,
+    rotation_matrix,
 )
 
 KINDS = {

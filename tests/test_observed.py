@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import collection
-from photogram.absolute_orientation import Orientation
+from photogram import Orientation, Result, collection
 from photogram.collection import AdjustedCollection
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.show.methods import Shown, axes_of, columns_of, report_of
 
 KINDS = {

@@ -5,22 +5,25 @@ import pytest
 
 import degenerate as of
 from fuzz.networks import random_network
-from photogram import InnerConstraints, adjust
-from photogram.network.geometry import rotation_matrix
-from photogram.network.observations import (
+from photogram import Distance, InnerConstraints, LeverArm, Position, adjust
+from photogram.network import (
     Attitude,
     Control,
     Difference,
-    Distance,
+    Drift,
     EqualHeight,
+    Level,
+    Line,
     OnLevel,
     OnLine,
     OnPlane,
     OnPlumbLine,
-    Position,
+    Plane,
+    PlumbLine,
     Relative,
+    Shift,
+    rotation_matrix,
 )
-from photogram.network.unknowns import Drift, Level, LeverArm, Line, Plane, PlumbLine, Shift
 
 SD = 0.001
 """Of everything but images, in metres and radians."""

@@ -73,9 +73,7 @@ def test_names_of_control_do_not_cover_each_other_in_given_axes(size):
 
 def test_what_is_drawn_goes_into_given_axes_or_a_file_or_both(tmp_path):
     from photogram import adjust, plan, simulate, variance_components, variance_function
-    from photogram.results.calibration_picture import draw_distortion, draw_lens_field
-    from photogram.results.components_picture import draw_components
-    from photogram.results.variance_function import draw_variance_function
+    from photogram.results import draw_components, draw_distortion, draw_lens_field, draw_variance_function
 
     block = simulate(strips=2, photos_per_strip=4, seed=2).block
     result = adjust(load("self_calibration").measured())

@@ -33,9 +33,9 @@ from photogram import (
 from photogram.adjustment.prediction import at_adjusted
 from photogram.cli.plan import plan as plan_command
 from photogram.cli.simulate import simulate as simulate_command
-from photogram.planning.pattern import Pattern
+from photogram.planning import Pattern
 from photogram.planning.statistics import locations
-from photogram.statistics.reliability import largest_effect, minimal_detectable_error, noncentrality
+from photogram.statistics import largest_effect, minimal_detectable_error, noncentrality
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "planning.md"
 RECTANGULAR: dict[str, Any] = {"origin": (5e5, 4e6, 100.0)}

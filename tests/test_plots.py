@@ -11,14 +11,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from example_scripts import EXAMPLES, load
-from photogram import adjust, collection, simulate
-from photogram.errors import InputError
+from photogram import InputError, adjust, collection, simulate
 from photogram.giant import read_project
-from photogram.plots import PICTURES, figures, picture_files
+from photogram.plots import PICTURES, drawn, figures, picture_files
 from photogram.plots.cells import cells
 from photogram.plots.picture_data import pictured
 from photogram.show.axes import labels
-from photogram.show.pictures import drawn
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}
 OF_LENSES = [name for name in PICTURES if name not in ("features", "films")]

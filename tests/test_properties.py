@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from noise import measured
-from photogram import Block, Result, Simulation, Spheroid, adjust, simulate
-from photogram.errors import RankError
-from photogram.network import geometry
+from photogram import Block, RankError, Result, Simulation, Spheroid, adjust, network, simulate
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +59,7 @@ def block_of(arguments: dict[str, Any]) -> Block:
 def jacobian(block: Block, result: Result) -> Floats:
     """Return partials of all image coordinates by photos (6 each), then points (3 each), (2 m, u).
 
-    Fourth-order differences of `photogram.network.geometry.project`, which knows nothing of the engine's
+    Fourth-order differences of `photogram.network.project`, which knows nothing of the engine's
     partials.
     """
     photos, points = len(block.photo_ids), len(block.point_ids)
@@ -80,7 +78,7 @@ def jacobian(block: Block, result: Result) -> Floats:
                 ]
             )
             values[:, k] += offset
-            return geometry.project(
+            return network.project(
                 values[:, 6:],
                 values[:, :3],
                 values[:, 3:6],

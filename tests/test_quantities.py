@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.io import json
 from photogram.show.cells import page_table
 from photogram.show.lines import fact_lines, field, marks, table_lines

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Block, InputError, Refraction, Simulation, Spheroid, adjust, simulate
+from photogram import Block, InputError, Refraction, Simulation, Spheroid, adjust, network, simulate
 from photogram.giant import Common, Project, read_project, write_project
 from photogram.giant.assembly import job_refraction
-from photogram.network import geometry
 
 ROOT = Path(__file__).parents[1]
 GOLDEN = json.loads((ROOT / "tests" / "data" / "giant" / "golden_cases.json").read_text())
@@ -29,7 +28,7 @@ WATERS = ("giant", "snell")
 
 def lift(refraction: Refraction, camera: float, across: float, point: float, **options: Any) -> float:
     """Return the lift of a point in rectangular space."""
-    shift = geometry.refraction_shift([[across, 0.0, point]], [[0.0, 0.0, camera]], refraction, **options)
+    shift = network.refraction_shift([[across, 0.0, point]], [[0.0, 0.0, camera]], refraction, **options)
     assert shift[0, :2].tolist() == [0.0, 0.0]
     return float(shift[0, 2])
 
@@ -85,7 +84,7 @@ def test_the_models_of_the_air_agree_up_to_9_km():
     zero = np.zeros_like(camera)
     giant, standard = (
         1e6
-        * geometry.refraction_shift(
+        * network.refraction_shift(
             np.column_stack([zero, zero, point]), np.column_stack([zero, zero, camera]), Refraction(air)
         )[:, 2]
         / (camera - point)
@@ -141,13 +140,13 @@ def test_a_point_projects_where_its_lift_puts_it(space):
     truth = simulate(strips=1, photos_per_strip=3, refraction=refraction, **space).truth
     points, photos = truth.point_positions[truth.image_points], truth.photo_positions[truth.image_photos]
     spheroid = truth.spheroid
-    shift = geometry.refraction_shift(points, photos, refraction, spheroid=spheroid)
+    shift = network.refraction_shift(points, photos, refraction, spheroid=spheroid)
     if spheroid is None:
         lifted = points + shift
     else:
-        xyz = geometry.geographic_to_geocentric(points, spheroid) + shift
-        lifted = geometry.geocentric_to_geographic(xyz, spheroid)
-    straight = geometry.project(
+        xyz = network.geographic_to_geocentric(points, spheroid) + shift
+        lifted = network.geocentric_to_geographic(xyz, spheroid)
+    straight = network.project(
         lifted,
         photos,
         truth.photo_attitudes[truth.image_photos],
@@ -232,7 +231,7 @@ def test_section_12_without_refraction_heights_are_wrong_by_the_lift(space, air,
     error = adjust(fixed.replace(refraction=None), unit_variance="unity").point_positions[:, 2] - right[:, 2]
 
     points, photos = truth.image_points, truth.image_photos
-    shift = geometry.refraction_shift(
+    shift = network.refraction_shift(
         truth.point_positions[points], truth.photo_positions[photos], refraction, spheroid=truth.spheroid
     )
     length = np.linalg.norm(shift, axis=1)

@@ -12,7 +12,7 @@ from scipy.stats import binom, chi2
 
 import photogram.adjustment.resection
 from photogram import AdjustmentError, InputError, RankError, Spheroid, resect
-from photogram.network.geometry import project, rotation_matrix
+from photogram.network import project, rotation_matrix
 
 BENCH = Path(__file__).parents[1] / "benches" / "resect_random.py"
 GROUND = np.array(

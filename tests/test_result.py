@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from photogram import Block, Result, Spheroid, adjust, simulate
-from photogram.network.geometry import project
+from photogram.network import project
 
 ARCSEC = 180 * 3600 / math.pi
 SPACES: dict[str, dict[str, Any]] = {

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from photogram.errors import InputError
+from photogram import InputError, Message
+from photogram.comparator import Place
 from photogram.io.numbers import finite_number, is_whole_number, whole_number
-from photogram.io.places import Place
 from photogram.io.rows import LONGEST_RECORD, Table, cells, read_rows
-from photogram.messages import MOST_CHARACTERS, Message, quoted
+from photogram.messages import MOST_CHARACTERS, quoted
 
 
 def written(tmp_path, text):

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import Block, Camera, InputError
-from photogram.network import geometry
-from photogram.network.geometry import Spheroid
-from photogram.network.simulation import simulate
+from photogram import Block, Camera, InputError, Spheroid, network, simulate
 
 GALVESTON = (math.radians(-95.0), math.radians(29.7), 0.0)
 SPACES = {
@@ -27,7 +24,7 @@ SPACES = {
 
 
 def project(block: Block) -> np.ndarray:
-    return geometry.project(
+    return network.project(
         block.point_positions[block.image_points],
         block.photo_positions[block.image_photos],
         block.photo_attitudes[block.image_photos],
@@ -215,8 +212,8 @@ def test_geographic_errors_are_in_metres():
     )
     block, truth = simulation.block, simulation.truth
     assert block.spheroid is not None
-    errors = geometry.geographic_to_geocentric(block.photo_positions, block.spheroid)
-    errors -= geometry.geographic_to_geocentric(truth.photo_positions, block.spheroid)
+    errors = network.geographic_to_geocentric(block.photo_positions, block.spheroid)
+    errors -= network.geographic_to_geocentric(truth.photo_positions, block.spheroid)
     assert errors.std() == pytest.approx(10.0, rel=0.2)
     standardized = (block.photo_positions - truth.photo_positions) / block.photo_position_sd
     np.testing.assert_allclose(standardized.std(axis=0), 1.0, rtol=0.3)

@@ -12,10 +12,15 @@ import numpy as np
 import pytest
 
 from photogram import (
+    Attitudes,
     Block,
     Camera,
+    Distance,
     InputError,
+    Position,
     Refraction,
+    Result,
+    Simulation,
     Spheroid,
     adjust,
     formats,
@@ -25,13 +30,8 @@ from photogram import (
 )
 from photogram.adjustment.prediction import at_adjusted
 from photogram.formats.self_check import agreement
-from photogram.network.attitudes import Attitudes
-from photogram.network.observations import Distance, Position
+from photogram.network import LineScanner, Polynomial, RollingShutter, Spline, Trajectory
 from photogram.network.projecting import projected_images
-from photogram.network.simulated_motion import LineScanner, RollingShutter
-from photogram.network.simulation import Simulation
-from photogram.network.trajectories import Polynomial, Spline, Trajectory
-from photogram.results.result import Result
 
 DRONE: dict[str, Any] = {
     "strips": 3,

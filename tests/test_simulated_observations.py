@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from photogram import InputError, Spheroid, adjust, simulate
-from photogram.network.attitudes import Attitudes
-from photogram.network.simulated_observations import with_distances, with_gnss, with_inertial, with_rig
+from photogram import Attitudes, InputError, Spheroid, adjust, simulate
+from photogram.network import with_distances, with_gnss, with_inertial, with_rig
 
 SPACES = [None, Spheroid.clarke_1866()]
 ARM = np.array([0.2, -0.4, 1.1])

@@ -11,10 +11,9 @@ from typer.testing import CliRunner
 import photogram
 import photogram.collection
 from linear_trial import LinearTrial
-from photogram import Block
+from photogram import Block, Distance
 from photogram.adjustment.snooping import block_trial
 from photogram.cli import app
-from photogram.network.observations import Distance
 from photogram.results import network_trial
 from photogram.statistics import lambda0
 from photogram.statistics.snooping.snooping import Settings, snooped

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import _photocore
-from photogram.errors import InputError
+from photogram import InputError, _photocore
 from photogram.statistics import (
     b_method,
     benjamini_hochberg,
@@ -16,6 +15,7 @@ from photogram.statistics import (
     critical_chi_square,
     critical_fisher,
     critical_normal,
+    critical_student,
     critical_tau,
     externally_studentized,
     global_test,
@@ -25,7 +25,6 @@ from photogram.statistics import (
     normal_limit,
     studentized_limit,
 )
-from photogram.statistics.distributions import critical_student
 
 CRITICAL = Path(__file__).parent / "data" / "statistics" / "critical_values.json"
 """Computed by independent programs; some stand in every table of the distributions."""

@@ -8,7 +8,7 @@ import pytest
 
 from photogram import adjust, formats, simulate
 from photogram.giant import Project as GiantProject
-from photogram.network.simulated_observations import with_gnss
+from photogram.network import with_gnss
 
 STATIONS = {"position_sd": 0.05, "attitude_sd": math.radians(0.003)}
 BLOCK = {"strips": 2, "photos_per_strip": 4, "points_per_photo": 20}

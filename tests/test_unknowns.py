@@ -7,38 +7,41 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import InputError, RankError, Spheroid, adjust, predict, simulate
-from photogram.network.attitudes import Attitudes
-from photogram.network.geometry import (
-    geocentric_to_geographic,
-    geographic_to_geocentric,
-    local_frames,
-    rotation_matrix,
+from photogram import (
+    Attitudes,
+    Distance,
+    InputError,
+    LeverArm,
+    Position,
+    RankError,
+    Spheroid,
+    adjust,
+    predict,
+    simulate,
 )
-from photogram.network.observations import (
+from photogram.network import (
     Attitude,
     Base,
-    Distance,
-    OnLevel,
-    OnLine,
-    OnPlane,
-    OnPlumbLine,
-    Position,
-    Prior,
-)
-from photogram.network.rigs import Mount
-from photogram.network.simulated_observations import with_gnss
-from photogram.network.unknowns import (
     Boresight,
     Drift,
     Instrument,
     Level,
-    LeverArm,
     Line,
+    Mount,
+    OnLevel,
+    OnLine,
+    OnPlane,
+    OnPlumbLine,
     Plane,
     PlumbLine,
+    Prior,
     Sensor,
     Shift,
+    geocentric_to_geographic,
+    geographic_to_geocentric,
+    local_frames,
+    rotation_matrix,
+    with_gnss,
 )
 
 EXAMPLES = ("direct_georeferencing", "stereo_rig", "facade")

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from contradictions import contradictions, sentences_of
-from photogram import adjust, resect
-from photogram.network.geometry import project
-from photogram.network.simulation import simulate
+from photogram import adjust, resect, simulate
+from photogram.network import project
 from photogram.show.judgement import judged
 from photogram.show.sections import composed, verdict_sections
 from photogram.statistics import global_test, group_tests

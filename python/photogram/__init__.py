@@ -15,13 +15,17 @@ if TYPE_CHECKING:
     from photogram import film as film
     from photogram import formats as formats
     from photogram import giant as giant
+    from photogram import network as network
     from photogram import perspective_center as perspective_center
     from photogram import planning as planning
     from photogram import plots as plots
+    from photogram import results as results
+    from photogram import statistics as statistics
     from photogram import stellar as stellar
     from photogram import targets as targets
     from photogram._photocore import __version__
-    from photogram.absolute_orientation import Orientation, orient
+    from photogram.absolute_orientation.adjust import orient
+    from photogram.absolute_orientation.orientation import Orientation
     from photogram.adjustment.adjustment import AsPublished, Progress, adjust
     from photogram.adjustment.cleaning import Cleaned, clean
     from photogram.adjustment.components import variance_components
@@ -46,7 +50,7 @@ if TYPE_CHECKING:
     from photogram.network.refraction import Refraction
     from photogram.network.simulation import Simulation, simulate
     from photogram.network.unknowns import LeverArm
-    from photogram.planning import Plan, plan
+    from photogram.planning.networks import Plan, plan
     from photogram.results.components import VarianceComponents
     from photogram.results.differences import Differences, differences
     from photogram.results.features import Feature, Features
@@ -143,10 +147,10 @@ _HOMES = {
     "LeverArm": "network.unknowns",
     "Message": "messages",
     "MinimumConstraints": "network.datum",
-    "Orientation": "absolute_orientation",
+    "Orientation": "absolute_orientation.orientation",
     "OutOfMemoryError": "errors",
     "PhotogramError": "errors",
-    "Plan": "planning",
+    "Plan": "planning.networks",
     "Pose": "adjustment.resection",
     "Position": "network.observations",
     "Progress": "adjustment.adjustment",
@@ -175,8 +179,8 @@ _HOMES = {
     "terms_test": "results.model_tests",
     "first_values": "adjustment.first_values",
     "group_sums": "results.group_sums",
-    "orient": "absolute_orientation",
-    "plan": "planning",
+    "orient": "absolute_orientation.adjust",
+    "plan": "planning.networks",
     "predict": "adjustment.prediction",
     "read_result": "formats.results",
     "resect": "adjustment.resection",
@@ -199,9 +203,12 @@ MODULES = (
     "film",
     "formats",
     "giant",
+    "network",
     "perspective_center",
     "planning",
     "plots",
+    "results",
+    "statistics",
     "stellar",
     "targets",
 )

@@ -5,10 +5,9 @@ import pytest
 from orientation_golden import cards_of, cases, csv_of, stations
 from orientation_models import simulate
 
-from photogram import orient
+from photogram import AdjustmentError, InputError, RankError, orient
 from photogram.absolute_orientation import Similarity, Stations, read_cards, read_csv
 from photogram.absolute_orientation.cards import read_transformation, restart_record, transformation_records
-from photogram.errors import AdjustmentError, InputError, RankError
 
 HEADER = "id,X,Y,Z,x,y,z\n"
 CARDS = """\

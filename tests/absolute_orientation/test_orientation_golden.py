@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from orientation_golden import array, cases, load, stations
 
-from photogram import _photocore, orient
+from photogram import RankError, _photocore, orient
 from photogram.absolute_orientation import Similarity
-from photogram.errors import RankError
 
 
 def check_parameters(similarity, expected):

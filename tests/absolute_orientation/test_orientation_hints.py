@@ -6,7 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from photogram.absolute_orientation import Stations, hints, orient
+from photogram import orient
+from photogram.absolute_orientation import Stations, hints
 from photogram.statistics.likelihood import judged, likelihood
 from shared_data import SHARED
 

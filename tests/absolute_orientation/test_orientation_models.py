@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError, MinimumConstraints, RankError, adjust, orient, simulate
-from photogram.absolute_orientation import Stations, relative_model, strip_of
-from photogram.absolute_orientation.csv_files import read_csv
+from photogram.absolute_orientation import Stations, read_csv, relative_model, strip_of
 
 PHOTOS = ["0101", "0102", "0103", "0104"]
 

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from orientation_models import FULL, HEIGHT, HORIZONTAL, MIXED, simulate
 
-from photogram import orient
-from photogram.absolute_orientation import Stations, read_csv
-from photogram.absolute_orientation.document import read_similarity
-from photogram.errors import InputError
+from photogram import InputError, orient
+from photogram.absolute_orientation import Stations, read_csv, read_similarity
 
 NOISE = 0.004
 

@@ -8,10 +8,8 @@ import pandas as pd
 import pytest
 from orientation_models import SIZE, simulate
 
-from photogram import orient
-from photogram.absolute_orientation import Similarity, stream, transform_file
-from photogram.absolute_orientation.document import read_similarity
-from photogram.errors import InputError
+from photogram import InputError, orient
+from photogram.absolute_orientation import Similarity, read_similarity, stream, transform_file
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from orientation_golden import array, cases, csv_of, load, stations
 
-from photogram import orient
+from photogram import InputError, orient
 from photogram.absolute_orientation.report import trace_text
-from photogram.errors import InputError
 
 PRINTS = [
     "sense switch 1, after statement 2: tan K",

@@ -8,9 +8,8 @@ from scipy import stats
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from photogram import orient
+from photogram import RankError, orient
 from photogram.absolute_orientation import Stations, read_cards, read_csv
-from photogram.errors import RankError
 
 NOISE = 0.004
 SINGLES = ("XZ", "Y", "X", "YZ", "Z", "XYZ", "X", "Z", "Y")
@@ -153,7 +152,7 @@ def test_covariances_of_points_hold_where_all_standard_deviations_are_wrong_by_a
 
 
 def test_the_factor_of_deviations_goes_with_the_document(tmp_path):
-    from photogram.absolute_orientation.document import read_similarity
+    from photogram.absolute_orientation import read_similarity
 
     generator = np.random.default_rng(2)
     model = simulate(generator, angles=(0.1, -0.05, 2.0))

@@ -7,7 +7,6 @@ import pytest
 
 from photogram import InputError, _photocore
 from photogram.collection import Collection, adjust, simulate
-from photogram.network.knots import KNOTTED
 
 MADE = simulate(photos=8, points=80, noise=0.3, seed=5)
 PRINCIPAL_POINT = np.array([612.5, 388.25])
@@ -82,7 +81,7 @@ def test_every_model_of_the_crate_can_be_named():
     assert list(models) == _photocore.CAMERAS
     for name, (formula, parameters, constants, *_) in models.items():
         assert "image = " in formula
-        if name == KNOTTED:
+        if name == "splined_stereographic":
             with pytest.raises(InputError, match="camera is one of"):
                 MADE.collection.replace(camera=name)
             continue
@@ -116,7 +115,7 @@ def random_cameras(rng):
                 values.append(rng.uniform(0.6, 0.9))
             elif parameter in ("c", "f", "fx", "fy", "w", "h", "b", "hx", "hy"):
                 values.append(rng.uniform(900.0, 1400.0))
-            elif name == KNOTTED and power == 0:
+            elif name == "splined_stereographic" and power == 0:
                 values.append({"order": 3.0, "fov_x_deg": 150.0}.get(parameter, 12.0))
             elif power == 1:
                 values.append(rng.uniform(-5.0, 5.0))

@@ -7,10 +7,19 @@ import numpy as np
 import pytest
 from plates import ARCSEC, LINEAR, QUICK, STRAIGHT, bent, case_2, document, noisy, printed_correction
 
-from photogram.comparator import Correction, Decomposition, Grid, Options, calibrate, simulate_calibration
+from photogram.comparator import (
+    Correction,
+    Decomposition,
+    Frame,
+    Grid,
+    Options,
+    Polynomial,
+    calibrate,
+    simulate_calibration,
+)
 from photogram.comparator.case import locations
 from photogram.comparator.fits import decomposition_jacobian, fit_affine, fit_rigid, rotation_matrix
-from photogram.comparator.polynomial import Frame, Polynomial, design, fit_polynomial
+from photogram.comparator.polynomial import design, fit_polynomial
 
 POINTS = np.arange(1, 26)
 GRID = Grid.square().xy_um

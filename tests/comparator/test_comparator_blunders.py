@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from plates import QUICK, case_2_session, noisy
 
+from photogram import InputError
 from photogram.comparator import Correction, Grid, Options, calibrate, simulate_calibration, to_csv, to_json
 from photogram.comparator.combined_solution import CombinedPolynomial
 from photogram.comparator.outliers import far_pointings, screen
 from photogram.comparator.reduction import Reduction
-from photogram.errors import InputError
 
 
 def refused(result, code=1):

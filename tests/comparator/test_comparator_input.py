@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from plates import PRINTED, QUICK, STRAIGHT, case_2, case_2_session, document, noisy, table
 
+from photogram import InputError
 from photogram.comparator import (
     Grid,
     Options,
@@ -26,7 +27,6 @@ from photogram.comparator.case import detect_orientation, intersect_legs, reduce
 from photogram.comparator.closeout import close_out
 from photogram.comparator.gridfile import corrected_grid
 from photogram.comparator.pointing import group, group_as_listed
-from photogram.errors import InputError
 
 
 def header(comparator=3, *, flags="10000", stage=" ", operators=(18,) * 4, master=1, date="7/17/72"):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from plates import PRINTED, QUICK, STRAIGHT, bent, case_2, case_2_session, noisy, printed_correction
 
+from photogram import AdjustmentError, InputError
 from photogram.comparator import (
     Correction,
     Grid,
@@ -23,7 +24,6 @@ from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.joint import Weights, adjust_jointly
 from photogram.comparator.listing.parameters import correction_table, table_nodes
 from photogram.comparator.variance import AxisSigma, _f_max_tail, compare_case_variances, difference
-from photogram.errors import AdjustmentError, InputError
 from photogram.show.sketch.marks import Ellipses
 
 

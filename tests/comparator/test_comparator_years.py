@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from plates import QUICK, bent
 
+from photogram import InputError
 from photogram.comparator import (
     Grid,
     RecordedCalibration,
@@ -20,7 +21,6 @@ from photogram.comparator import (
 )
 from photogram.comparator.years.joint import adjust_together
 from photogram.comparator.years.record import day_of
-from photogram.errors import InputError
 
 GRID = Grid.square(number=7, sigma_um=0.3)
 ERRORS = 0.3 * np.random.default_rng(1).standard_normal((25, 2))

@@ -7,17 +7,11 @@ import numpy as np
 import pytest
 
 from golden_network import free_network, golden_file
-from photogram import Camera, InputError, diagnose, simulate
+from photogram import Camera, Distance, InputError, Position, diagnose, simulate
 from photogram.collection import Collection, adjust
 from photogram.collection import simulate as simulate_collection
 from photogram.giant import Project
-from photogram.network.observations import Distance, Position
-from photogram.network.simulated_observations import (
-    with_distances,
-    with_gnss,
-    with_inertial,
-    with_rig,
-)
+from photogram.network import with_distances, with_gnss, with_inertial, with_rig
 
 SIZE = {"strips": 3, "photos_per_strip": 6, "points_per_photo": 40}
 OPENCV = Camera("opencv", {"fx": 9000.0, "fy": 9000.0, "cx": 6000.0, "cy": 6000.0, "k1": -0.05})

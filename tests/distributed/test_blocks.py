@@ -6,15 +6,22 @@ from test_parts import tied_block
 
 import photogram
 from example_scripts import load
-from photogram import AsPublished, adjust, adjust_in_parts, adjust_started
+from photogram import (
+    AdjustmentError,
+    AsPublished,
+    Distance,
+    InputError,
+    OutOfMemoryError,
+    RankError,
+    adjust,
+    adjust_in_parts,
+    adjust_started,
+)
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed import adjust as of_blocks
 from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.run import read_manifest
-from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
-from photogram.network.observations import Distance, Relative
-from photogram.network.simulated_observations import with_gnss, with_rig
-from photogram.network.unknowns import Drift
+from photogram.network import Drift, Relative, with_gnss, with_rig
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import photogram
 from photogram import adjust, adjust_in_parts, read_result
-from photogram.cli.commands import app
+from photogram.cli import app
 from photogram.cli.in_parts import TAKEN
 from photogram.cli.job import _option
 from photogram.cli.projects import Additions

@@ -5,14 +5,21 @@ import pytest
 from test_blocks import agrees, freed
 
 import photogram
-from photogram import InnerConstraints, MinimumConstraints, adjust, adjust_in_parts
+from photogram import (
+    AdjustmentError,
+    Camera,
+    Distance,
+    InnerConstraints,
+    InputError,
+    MinimumConstraints,
+    Position,
+    Spheroid,
+    adjust,
+    adjust_in_parts,
+)
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.run import read_manifest
-from photogram.errors import AdjustmentError, InputError
-from photogram.network.cameras import Camera
-from photogram.network.geometry import Spheroid
-from photogram.network.observations import Distance, Position
-from photogram.network.unknowns import Shift
+from photogram.network import Shift
 
 SIZE = {"strips": 4, "photos_per_strip": 10, "points_per_photo": 40, "seed": 3}
 

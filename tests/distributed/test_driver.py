@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from toy import ToyEngine, adjusted, kept, make
 
-from photogram import _photocore
+from photogram import AdjustmentError, RankError, _photocore
 from photogram.distributed.driver import Driver, Stop
 from photogram.distributed.executors import Serial
 from photogram.distributed.shelf import shelf
 from photogram.distributed.tasks import Job
-from photogram.errors import AdjustmentError, RankError
 
 
 @pytest.fixture(autouse=True)

@@ -8,28 +8,29 @@ from test_blocks import agrees
 from test_datum_in_parts import in_both
 
 import photogram
-from photogram import _photocore, adjust, adjust_in_parts
+from photogram import Camera, _photocore, adjust, adjust_in_parts
 from photogram.distributed import Division
 from photogram.distributed.graph import photos_of_unknowns
 from photogram.distributed.run import read_manifest, read_node
-from photogram.network.cameras import Camera
-from photogram.network.films import (
+from photogram.network import (
+    Fiducial,
     Film,
     FilmBend,
     FilmPlacement,
     FilmSize,
+    KnownFilm,
+    KnownTogether,
     Mark,
+    Mount,
     Pattern,
     Readings,
     Reseau,
     Roll,
     Scan,
     Scanner,
+    Sensor,
     Weights,
 )
-from photogram.network.observations import Fiducial, KnownFilm, KnownTogether
-from photogram.network.rigs import Mount
-from photogram.network.unknowns import Sensor
 
 HALF = 113.0
 

@@ -12,8 +12,7 @@ from photogram import adjust, adjust_in_parts, simulate
 from photogram.adjustment.adjustment import core_options
 from photogram.distributed import Division
 from photogram.distributed.adjust import fingerprint
-from photogram.network.simulated_motion import LineScanner, RollingShutter
-from photogram.network.trajectories import Polynomial
+from photogram.network import LineScanner, Polynomial, RollingShutter
 
 SIZE = {"strips": 3, "photos_per_strip": 6, "points_per_photo": 20, "seed": 3}
 ERRORS = {"position_error": 1.0, "attitude_error": 1e-3}

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 import photogram
+from photogram import Camera, Distance, LeverArm, Position
 from photogram.distributed.cut import Incidence, cut, homes, joined, tree_of
 from photogram.distributed.run import partition, read_manifest, read_node
-from photogram.network.cameras import Camera
+from photogram.network import Level, OnLevel, Relative, rotation_matrix
 from photogram.network.core_arrays import CoreOptions
-from photogram.network.geometry import rotation_matrix
-from photogram.network.observations import Distance, OnLevel, Position, Relative
-from photogram.network.unknowns import Level, LeverArm
 
 OPTIONS = CoreOptions("fraction", 1e-5, 50, True, None, "auto", "constrained", None)
 

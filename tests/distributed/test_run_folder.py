@@ -15,7 +15,7 @@ from test_parts import OPTIONS, tied_block
 from test_streamed import project_of
 
 import photogram
-from photogram import adjust_in_parts
+from photogram import InputError, adjust_in_parts
 from photogram.distributed import Division, plan_in_parts
 from photogram.distributed.adjust import fingerprint
 from photogram.distributed.executors import connected
@@ -23,8 +23,7 @@ from photogram.distributed.files import alone
 from photogram.distributed.nodes import CoreEngine
 from photogram.distributed.run import partition, read_node
 from photogram.distributed.shelf import shelf
-from photogram.errors import InputError
-from photogram.formats.format import Wishes
+from photogram.formats import Wishes
 from photogram.formats.in_parts import planned_on_disk
 
 

@@ -7,13 +7,12 @@ import pandas as pd
 import pytest
 from test_parts import OPTIONS, tied_block
 
+from photogram import Distance, InputError, Position
 from photogram.distributed.run import partition, read_manifest, read_node
-from photogram.errors import InputError
-from photogram.formats import Wishes, read, to_files
+from photogram.formats import Project, Wishes, read, to_files
 from photogram.formats.plain import batches
 from photogram.formats.plain.batches import Streamed, streamable
-from photogram.formats.project import Project
-from photogram.network.observations import Distance, Position, Relative
+from photogram.network import Relative
 
 
 def project_of(block, folder):

@@ -7,11 +7,10 @@ import toy
 from test_driver import agrees, run
 from toy import ToyEngine, kept, make
 
-from photogram import _photocore
+from photogram import InputError, _photocore
 from photogram.distributed.driver import Driver, Stop
 from photogram.distributed.executors import Workers, check_workers, connected
 from photogram.distributed.tasks import Job
-from photogram.errors import InputError
 
 cloudpickle.register_pickle_by_value(toy)
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram import RankError
 from photogram.distributed.cut import Incidence, Tree, cut, homes, tree_of
-from photogram.errors import RankError
 
 SD, STATION_SD = 0.01, 0.05
 

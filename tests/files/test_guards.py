@@ -12,7 +12,7 @@ import pytest
 import typer
 from typer.models import ArgumentInfo
 
-from photogram.cli.commands import app
+from photogram.cli import app
 from photogram.cli.job import Job, Reads, Writes, roles, with_job
 
 EXAMPLES = Path(str(files("photogram") / "examples"))

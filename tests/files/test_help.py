@@ -6,8 +6,8 @@ import pytest
 from typer.main import get_command
 
 from files.test_guards import COMMANDS
+from photogram.cli import app
 from photogram.cli.command_classes import PANEL_OF
-from photogram.cli.commands import app
 
 
 def parameters():

@@ -12,7 +12,7 @@ from typing import get_args
 import pytest
 from typer.models import ArgumentInfo, OptionInfo
 
-from photogram.cli.commands import app
+from photogram.cli import app
 from photogram.cli.job import Writes
 
 PROMPT = [

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.io.pvl import Group, Quantity, label_text, parsed
 from shared_data import SHARED
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from photogram.errors import AdjustmentError
+from photogram import AdjustmentError
 from photogram.film import Crossing, MarkDistance, RightAngle, adjust_distances
 from photogram.film.distances import _angle, _crossing, _distance
 

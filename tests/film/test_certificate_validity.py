@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 from photogram import InputError
 from photogram.cli import app
 from photogram.errors import ContradictionError
-from photogram.formats import Wishes, read
-from photogram.formats.project import Project
+from photogram.formats import Project, Wishes, read
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 

@@ -11,10 +11,8 @@ from photogram import InputError, _photocore, adjust
 from photogram.comparator import Correction, Frame, Polynomial
 from photogram.film import Certificate, interior_orientation
 from photogram.film.distances import with_datum
-from photogram.formats import read, to_files
-from photogram.formats.project import Project
-from photogram.network.films import Film, FilmPlacement, FilmSize
-from photogram.network.observations import Fiducial, KnownTogether
+from photogram.formats import Project, read, to_files
+from photogram.network import Fiducial, Film, FilmPlacement, FilmSize, KnownTogether
 from shared_data import SHARED
 from test_film import project
 

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from photogram import InputError
 from photogram.cli import app
-from photogram.errors import ContradictionError, InputError
+from photogram.errors import ContradictionError
 from photogram.formats import Wishes, read
 from photogram.formats.supplements import deviations
-from photogram.network.observations import Fiducial
+from photogram.network import Fiducial
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 

@@ -10,8 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from photogram import InputError, Result, adjust, formats, simulate
-from photogram.network.films import Film, Mark
-from photogram.network.observations import Fiducial, KnownTogether
+from photogram.network import Fiducial, Film, KnownTogether, Mark
 from photogram.results.film_pictures import film_patterns, mark_residuals, mean_mark_residuals
 from photogram.results.film_report import film_table, scanner_table
 from photogram.show.quantity import labelled

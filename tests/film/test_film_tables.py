@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from photogram import InputError, adjust
-from photogram.formats import read, to_files
+from photogram.formats import Project, read, to_files
 from photogram.formats.adjusted import adjusted
-from photogram.formats.project import Project
-from photogram.network.observations import Fiducial, KnownFilm
+from photogram.network import Fiducial, KnownFilm
 from shared_data import SHARED
 from test_film import project
 

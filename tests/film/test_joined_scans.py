@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import Result, adjust
+from photogram import InputError, Result, adjust
 from photogram.cli import app
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_scans import seam_hints
-from photogram.errors import InputError
 from photogram.formats import read
 from photogram.results.film_report import film_table
 

@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram import Result, adjust
+from photogram import Block, Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_lenses import lens_hints
 from photogram.formats import read
-from photogram.network.block import Block
 from shared_data import SHARED
 from test_film import project
 

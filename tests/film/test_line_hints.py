@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import adjust
+from photogram import Block, adjust
 from photogram.arguments.types import Floats
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_scans import line_hints
 from photogram.formats import read
-from photogram.network.block import Block
 
 
 @pytest.fixture(scope="module")

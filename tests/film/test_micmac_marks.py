@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.formats import Wishes, read
-from photogram.formats.micmac import read_marks, write_marks
-from photogram.formats.project import Project
+from photogram.formats import Project, Wishes, read, read_marks, write_marks
 from photogram.io.csv_text import csv_text
-from photogram.network.observations import Fiducial
+from photogram.network import Fiducial
 from shared_data import SHARED
 from test_film import project, project_again
 

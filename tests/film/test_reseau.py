@@ -8,9 +8,8 @@ import pytest
 
 from photogram import InputError, _photocore, adjust
 from photogram.film import interior_orientation
-from photogram.formats import Wishes, read, to_files
-from photogram.formats.project import Project
-from photogram.network.films import Film, FilmPlacement, FilmSize, Readings, Reseau, Scanner
+from photogram.formats import Project, Wishes, read, to_files
+from photogram.network import Film, FilmPlacement, FilmSize, Readings, Reseau, Scanner
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 GRID = (-100.0, -100.0, 50.0, 50.0, 5.0, 5.0)

@@ -9,7 +9,7 @@ import pytest
 from photogram import InputError, adjust, camera_from
 from photogram.film import Certificate
 from photogram.formats import read
-from photogram.stellar.cameras import PlateCamera
+from photogram.stellar import PlateCamera
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 INTERIOR = ("epsilon", "xp", "yp", "cx", "cy", "dx", "dy", "K1", "K2", "K3", "K4", "K5", "phi_T")

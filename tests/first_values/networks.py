@@ -3,7 +3,7 @@
 import numpy as np
 
 from photogram import Block
-from photogram.network.geometry import project, rotation_angles
+from photogram.network import project, rotation_angles
 
 C = -50.0
 SD = 0.003
@@ -63,7 +63,7 @@ def network(positions, angles, points, *, seed, control=(), wrong=0.0, half=40.0
 
 
 def rotation(angles):
-    from photogram.network.geometry import rotation_matrix
+    from photogram.network import rotation_matrix
 
     return rotation_matrix(angles[np.newaxis])[0]
 

@@ -6,9 +6,20 @@ import pytest
 from example_scripts import load
 from photogram import Block, InputError, Spheroid, adjust, simulate
 from photogram.adjustment.first_features import started
-from photogram.network.observations import OnLevel, OnLine, OnPlane, OnPlumbLine
-from photogram.network.simulated_observations import with_inertial, with_rig
-from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor
+from photogram.network import (
+    Boresight,
+    Level,
+    Line,
+    OnLevel,
+    OnLine,
+    OnPlane,
+    OnPlumbLine,
+    Plane,
+    PlumbLine,
+    Sensor,
+    with_inertial,
+    with_rig,
+)
 
 CLARKE = Spheroid(6378206.4, 6356583.8)
 BLANK = {

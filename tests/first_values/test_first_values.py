@@ -6,11 +6,19 @@ import pytest
 
 import photogram
 from example_scripts import load
-from photogram import AdjustmentError, Block, Camera, InputError, adjust, first_values
+from photogram import (
+    AdjustmentError,
+    Block,
+    Camera,
+    Distance,
+    InputError,
+    LeverArm,
+    Position,
+    adjust,
+    first_values,
+)
 from photogram.giant import read_project
-from photogram.network.geometry import rotation_matrix
-from photogram.network.observations import Attitude, Distance, Position
-from photogram.network.unknowns import Boresight, LeverArm
+from photogram.network import Attitude, Boresight, rotation_matrix
 from shared_data import SHARED
 
 ROMA = SHARED / "roma"

@@ -5,8 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from photogram.formats.isis.network import ControlNetwork, measures_of, points_of
-from photogram.formats.isis.reading import read_network
+from photogram.formats.isis import ControlNetwork, measures_of, points_of, read_network
 
 LABEL = 65536
 

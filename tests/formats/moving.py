@@ -5,12 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from photogram import Attitudes, Block, Camera, formats
+from photogram import Attitudes, Block, Camera, LeverArm, Position, formats
+from photogram.network import (
+    Attitude,
+    Boresight,
+    Clock,
+    GyroBias,
+    Lines,
+    LineSensor,
+    Polynomial,
+    Prior,
+    Rate,
+    Readout,
+    Sensor,
+    Shift,
+    Shutter,
+    Spline,
+    Table,
+    Timed,
+    Trajectory,
+    Velocity,
+)
 from photogram.network.motion import about
-from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
-from photogram.network.observations import Attitude, Position, Prior, Rate, Velocity
-from photogram.network.trajectories import Clock, GyroBias, Polynomial, Readout, Spline, Table, Trajectory
-from photogram.network.unknowns import Boresight, LeverArm, Sensor, Shift
 
 SPEED, LINE = 60.0, 0.002
 """Metres a second, seconds a line."""

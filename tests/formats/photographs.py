@@ -89,8 +89,7 @@ def block_with_pictures(folder, *, errors=(0.012, 0.011, 0.025), write=None):
         Writes the picture of a path from its longitude, latitude and height; default: RTK in XMP.
     """
     pytest.importorskip("pyproj")
-    from photogram.formats.crs import from_frame
-    from photogram.formats.project import Frame
+    from photogram.formats import Frame, from_frame
 
     folder.mkdir(parents=True, exist_ok=True)
     for name in ("cameras.csv", "photos.csv", "images.csv"):

@@ -8,8 +8,7 @@ from test_opensfm import only
 from test_plain_project import EXAMPLE, written
 
 from photogram import Attitudes, Camera, InputError, adjust, formats
-from photogram.formats import supplements
-from photogram.formats.project import Frame
+from photogram.formats import Frame, supplements
 from photogram.formats.self_check import agreement
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
@@ -19,7 +18,8 @@ def test_the_sample_is_the_truth():
     project = formats.read(sample("agisoft", "cameras.xml"))
     block = project.block
     # The frame has its origin amid the photos: what is compared is carried there by the same formulas.
-    from photogram.formats.crs import to_frame, turn_to_frame
+    from photogram.formats import to_frame
+    from photogram.formats.crs import turn_to_frame
 
     known = {name.rsplit(".", 1)[0]: each for name, each in truth()["photos"].items()}
     assert set(block.photo_ids) == set(known)

@@ -64,8 +64,7 @@ def test_a_round_trip_gives_the_same_adjustment(tmp_path):
 
 def test_a_projected_system_is_carried_into_a_frame_and_attitudes_with_it(tmp_path):
     pytest.importorskip("pyproj", reason="pyproj is not installed")
-    from photogram.formats.crs import from_frame
-    from photogram.formats.project import Frame
+    from photogram.formats import Frame, from_frame
 
     source = sample("blocksexchange", FILES[0])
     project = formats.read(source)

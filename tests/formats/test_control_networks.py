@@ -21,9 +21,9 @@ from control_networks import (
     varint,
 )
 
-from photogram.errors import InputError
-from photogram.formats.isis.reading import is_network, read_network
-from photogram.formats.isis.writing import binary_network, network_text
+from photogram import InputError
+from photogram.formats.isis import binary_network, network_text, read_network
+from photogram.formats.isis.reading import is_network
 from photogram.io.pvl import Group
 from shared_data import SHARED
 

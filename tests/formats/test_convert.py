@@ -9,8 +9,8 @@ from test_plain_project import EXAMPLE
 import photogram
 from photogram import InputError, Spheroid, adjust, formats
 from photogram.formats.format_coordinates import in_topocentric, topocentric_remarks
+from photogram.network import lengths_of_units
 from photogram.network.directions import image_directions
-from photogram.network.geometry import lengths_of_units
 
 
 @pytest.mark.parametrize(

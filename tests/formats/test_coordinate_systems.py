@@ -8,7 +8,7 @@ import pytest
 from test_plain_project import EXAMPLE, change, written
 
 from photogram import InputError, adjust, formats
-from photogram.formats.project import Frame
+from photogram.formats import Frame
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")

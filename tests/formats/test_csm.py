@@ -8,12 +8,12 @@ import pytest
 
 from ephemeris_seconds import added_to_ephemeris_seconds
 from photogram import Block, InputError, adjust
+from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
 from photogram.formats.csm.isd import Positions
-from photogram.formats.csm.photos import SupportedImage, trajectory_of, with_polynomial_pointing
-from photogram.formats.csm.reading import read_isd
+from photogram.formats.csm.photos import trajectory_of, with_polynomial_pointing
 from photogram.io.pvl import parsed
-from photogram.network.trajectories import Table, Trajectory
+from photogram.network import Table, Trajectory
 from shared_data import SHARED
 
 MOVING = SHARED / "moving"
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(not MOVING.exists(), reason=f"no {MOVING}")
 
 
 def supported(name, **how):
-    return SupportedImage(read_isd(MOVING / "csm" / f"{name}.json"), name, **how)
+    return SupportedImage(read_support(MOVING / "csm" / f"{name}.json"), name, **how)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_jitter_shifts_what_a_frame_has_measured(tmp_path):
     still = json.loads((MOVING / "csm" / "jitterFramer.json").read_text())
     del still["jitter"]
     (tmp_path / "still.json").write_text(json.dumps(still))
-    other = SupportedImage(read_isd(tmp_path / "still.json"), "still")
+    other = SupportedImage(read_support(tmp_path / "still.json"), "still")
     np.testing.assert_allclose(
         supported("jitterFramer").to_ground([8.0], [8.0]),
         other.to_ground([7.75], [8.25]),
@@ -91,12 +91,12 @@ def test_the_pixels_of_isis_are_half_a_pixel_from_those_of_csm():
 
 
 def test_lines_that_do_not_fit_their_tables_are_told():
-    isd = read_isd(MOVING / "csm" / "orbitalLineScan.json")
+    isd = read_support(MOVING / "csm" / "orbitalLineScan.json")
     assert isd.remarks == (
         "the 16 lines take 1.6 s by line_scan_rate, the table of instrument_pointing 1.5 s: the table is"
         " short by 6.3 %",
     )
-    assert not read_isd(MOVING / "csm" / "constVelocityLineScan.json").remarks
+    assert not read_support(MOVING / "csm" / "constVelocityLineScan.json").remarks
 
 
 # ---------------------------------------------------------------------------- Lunar Reconnaissance Orbiter
@@ -111,7 +111,7 @@ def lro():
 
 @pytest.fixture(scope="module")
 def isds():
-    return {side: read_isd(MOVING / "lro" / f"observationImage{side}.isd") for side in SIDES}
+    return {side: read_support(MOVING / "lro" / f"observationImage{side}.isd") for side in SIDES}
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,10 @@ import pytest
 from support_data import START, written
 
 from photogram import InputError
+from photogram.formats.csm import SupportedImage, read_list, read_support
 from photogram.formats.csm.angles import Polynomials, of_angles
 from photogram.formats.csm.cubes import read_cube, read_label, read_positions, read_turns, serial_number
-from photogram.formats.csm.lists import read_list, read_support
-from photogram.formats.csm.photos import SupportedImage, trajectory_of
-from photogram.formats.csm.reading import read_isd
+from photogram.formats.csm.photos import trajectory_of
 
 SAMPLES, LINES = np.array([1.0, 150.0, 300.0]), np.array([400.0, 200.5, 1.0])
 
@@ -19,7 +18,7 @@ SAMPLES, LINES = np.array([1.0, 150.0, 300.0]), np.array([400.0, 200.5, 1.0])
 def test_a_cube_says_what_its_isd_says(tmp_path, order):
     cube, isd = (
         read_cube(made_cubes.cube(tmp_path / "a.cub", order=order)),
-        read_isd(written(tmp_path, made_cubes.isd())),
+        read_support(written(tmp_path, made_cubes.isd())),
     )
     for name in ("kind", "size", "radii", "focal_length", "lens", "remarks"):
         assert getattr(cube, name) == getattr(isd, name)

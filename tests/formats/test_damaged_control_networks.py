@@ -18,9 +18,9 @@ from control_networks import (
     varint,
 )
 
-from photogram.errors import InputError
+from photogram import InputError
+from photogram.formats.isis import binary_network, network_text
 from photogram.formats.isis.network import ControlMeasures, ControlPoints
-from photogram.formats.isis.writing import binary_network, network_text
 from photogram.io.pvl import Group
 
 

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 import photogram
 from photogram import InputError, MinimumConstraints, adjust, formats
 from photogram.cli import app
-from photogram.formats.format import Wishes
-from photogram.network.geometry import geographic_to_geocentric
+from photogram.formats import Wishes
+from photogram.network import geographic_to_geocentric
 
 EXAMPLES = Path(photogram.__file__).parent / "examples"
 WRITTEN = [name for name, each in formats.FORMATS.items() if each.write]

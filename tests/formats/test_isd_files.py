@@ -7,17 +7,15 @@ import pytest
 from support_data import RADIUS, START, document, written
 
 from photogram import InputError
-from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.csm.reading import read_isd
-from photogram.network.projecting import projected
-from photogram.network.trajectories import Polynomial
+from photogram.formats.csm import SupportedImage, read_support
+from photogram.network import Polynomial, projected
 
 PLACES = np.array([[10.0, 20.0], [150.0, 200.5], [290.0, 399.0], [0.5, 0.5]])
 """Samples and lines."""
 
 
 def image(tmp_path, data, **how):
-    return SupportedImage(read_isd(written(tmp_path, data)), "I", **how)
+    return SupportedImage(read_support(written(tmp_path, data)), "I", **how)
 
 
 @pytest.mark.parametrize("kind", ["LINE_SCANNER", "FRAME", "PUSH_FRAME"])
@@ -52,7 +50,7 @@ def test_framelets_have_times_of_their_own(tmp_path):
 def test_rows_of_line_scan_rate_follow_each_other(tmp_path):
     data = document()
     data["line_scan_rate"] = [[0.5, -2.0, 0.01], [200.5, 0.1, 0.009]]
-    lines = read_isd(written(tmp_path, data)).lines
+    lines = read_support(written(tmp_path, data)).lines
     # Line 200 from the upper edge is 200.5 as ISIS counts.
     assert lines.times([0.0, 199.5, 200.0, 300.0]) == pytest.approx(START + np.array([0.0, 1.995, 2.1, 3.0]))
 
@@ -164,7 +162,7 @@ def test_what_is_wrong_is_named(tmp_path, change, said):
     change(data)
     path = written(tmp_path, data)
     with pytest.raises(InputError, match=said) as caught:
-        read_isd(path)
+        read_support(path)
     assert caught.value.file == path
 
 

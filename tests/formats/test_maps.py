@@ -14,9 +14,9 @@ from test_plain_project import EXAMPLE, change
 from test_results_in_a_system import FRAME, UTM
 
 from photogram import InputError, Spheroid, adjust, formats, read_result, simulate
-from photogram.formats.crs_results import placed
-from photogram.formats.maps.layers import chosen_crs, map_layers
-from photogram.formats.maps.ply import point_cloud
+from photogram.formats import placed
+from photogram.formats.maps import map_layers, point_cloud
+from photogram.formats.maps.layers import chosen_crs
 from photogram.formats.maps.styles import LAYERS, style
 
 geopandas = pytest.importorskip("geopandas", reason="geopandas is not installed")

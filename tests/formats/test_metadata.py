@@ -9,12 +9,12 @@ import pytest
 
 from formats.photographs import DJI, dji, packet, picture, tags
 from photogram import InputError
+from photogram.comparator import Place
 from photogram.formats import read_metadata
 from photogram.formats.metadata.mrk import number_of, read_exposures
 from photogram.formats.metadata.pictures import LARGEST, said_by_packet, said_by_picture, said_by_tags
 from photogram.formats.metadata.record import ELLIPSOIDAL, SEA_LEVEL, UNSAID, fix_of
 from photogram.formats.metadata.reference import is_reference, read_geo_txt, read_reference
-from photogram.io.places import Place
 from shared_data import SHARED
 
 SAMPLES = SHARED / "statement" / "metadata"

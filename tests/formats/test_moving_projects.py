@@ -17,11 +17,8 @@ from photogram import Attitudes, InputError, adjust, formats
 from photogram.formats import Wishes
 from photogram.formats.block_contents import motions
 from photogram.formats.plain.batches import Streamed, streamable
-from photogram.network.lens import Lens
+from photogram.network import Lens, Polynomial, Smoothness, Spline, Table, Timed, Trajectory
 from photogram.network.motion import about
-from photogram.network.moving_photos import Timed
-from photogram.network.observations import Smoothness
-from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
 GOLDEN = ("rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair")
 

@@ -18,10 +18,9 @@ from block import (
 from damaged import check_damaged
 from test_plain_project import EXAMPLE, written
 
-from photogram import InputError, adjust, formats
+from photogram import InputError, Position, adjust, formats
 from photogram.formats import supplements
 from photogram.formats.self_check import agreement
-from photogram.network.observations import Position
 
 
 def only(place, tracks="tracks.csv"):

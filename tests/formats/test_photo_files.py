@@ -8,11 +8,10 @@ import pytest
 
 from example_scripts import load
 from formats.photographs import EXAMPLE, ORIGIN, block_with_pictures, dji, packet, picture, tags
-from photogram import InputError, formats
+from photogram import InputError, Position, formats
 from photogram.formats import PhotoFiles, Wishes, read_metadata
 from photogram.formats.metadata.search import Photos
 from photogram.formats.metadata.systems import located
-from photogram.network.observations import Position
 
 MRK = "{}\t384233.385421\t[2264]\t -40,N\t 0,E\t 86,V\t{},Lat\t{},Lon\t{},Ellh\t0.021, 0.022, 0.043\t50,Q\n"
 PLACE = (8.5, 47.3, 500.0)
@@ -320,7 +319,7 @@ def test_control_in_axes_of_its_own_leaves_no_way_for_positions(flown):
     ],
 )
 def test_positions_come_into_the_frame_of_the_project(flown, frame):
-    from photogram.formats.crs import from_frame
+    from photogram.formats import from_frame
 
     folder, _, places = flown
     toml = folder / "project.toml"

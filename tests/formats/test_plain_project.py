@@ -8,12 +8,22 @@ import pytest
 from block import check_adjustment, check_poses, same_blocks, sample, truth, with_control, with_noise
 from damaged import check_damaged
 
-from photogram import Attitudes, Camera, InputError, Spheroid, adjust, first_values, formats, simulate
+from photogram import (
+    Attitudes,
+    Camera,
+    Distance,
+    InputError,
+    LeverArm,
+    Position,
+    Spheroid,
+    adjust,
+    first_values,
+    formats,
+    simulate,
+)
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
-from photogram.network.observations import Attitude, Control, Difference, Distance, Position
-from photogram.network.rigs import Mount
-from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift
+from photogram.network import Attitude, Boresight, Control, Difference, Drift, Mount, Sensor, Shift
 
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
 

@@ -8,10 +8,9 @@ import pytest
 from moving import edited, project_of, same, two_lines
 from test_plain_project import EXAMPLE, written
 
-from photogram import InputError, adjust, formats
+from photogram import Distance, InputError, adjust, formats
+from photogram.network import Instrument, Range
 from photogram.network.motion import about
-from photogram.network.observations import Distance, Range
-from photogram.network.unknowns import Instrument
 
 ARM = np.array([0.2, -0.4, 1.1])
 TIMES = (202.25, 204.5, 206.75)

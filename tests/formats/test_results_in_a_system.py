@@ -9,8 +9,8 @@ import pytest
 from test_plain_project import EXAMPLE, change
 
 from photogram import Attitudes, InputError, Spheroid, adjust, formats, simulate
+from photogram.formats import Frame
 from photogram.formats.planes import bend, plane_remarks
-from photogram.formats.project import Frame
 from photogram.giant import Project, write_project
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")

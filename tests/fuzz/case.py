@@ -13,7 +13,7 @@ from shutil import rmtree
 import orjson
 import typer
 
-from photogram.errors import AdjustmentError, PhotogramError
+from photogram import AdjustmentError, PhotogramError
 
 from .damage import damaged
 from .programs import PROGRAMS, Watch, unsound

@@ -19,8 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import InnerConstraints, PhotogramError, Result, adjust
-from photogram.network import geometry
+from photogram import InnerConstraints, PhotogramError, Result, adjust, network
 
 from .equations import STEP, Dense, logarithm
 from .networks import DATUMS, KINDS, MODELS, RandomNetwork, random_network
@@ -182,7 +181,7 @@ def _carriers(dense: Dense, datum: InnerConstraints) -> Floats:
 def _starts(random: RandomNetwork, dense: Dense) -> Floats:
     """Return what points and photos would step to their given places; zero for all others."""
     block, apart = random.block, np.zeros(dense.count)
-    matrices = geometry.rotation_matrix(block.photo_attitudes)
+    matrices = network.rotation_matrix(block.photo_attitudes)
     given = matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)
     for row, place in enumerate(dense.points):
         apart[dense.of("point", row)] = block.point_positions[row] - place

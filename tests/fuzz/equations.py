@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import Attitudes, Block, Camera, Result
-from photogram.network import geometry
+from photogram import Attitudes, Block, Camera, Result, network
+from photogram.network import Observation
 from photogram.network import observations as kinds_of
 from photogram.network import unknowns as commons
-from photogram.network.observations import Observation
 
 from .lenses import BACKWARD, FORWARD, Numbers, arctan2
 
@@ -90,7 +89,7 @@ class Dense:
         self.of_photo = {name: k for k, name in enumerate(block.photo_ids)}
         self.of_point = {name: k for k, name in enumerate(block.point_ids)}
         self.centres, self.points = result.photo_positions.copy(), result.point_positions.copy()
-        matrices = geometry.rotation_matrix(result.photo_attitudes)
+        matrices = network.rotation_matrix(result.photo_attitudes)
         self.attitudes = (matrices if block.photo_to_ground else matrices.transpose(0, 2, 1)).copy()
         self.cameras = [each.values.copy() for each in result.cameras]
         self.offsets, self.turns, self.spins = [], [], []
@@ -196,7 +195,7 @@ class Dense:
         """Return an attitude in the local axes at a cartesian position."""
         if self.block.spheroid is None:
             return attitude
-        at = geometry.geocentric_to_geographic(centre.real[None], self.block.spheroid)[0]
+        at = network.geocentric_to_geographic(centre.real[None], self.block.spheroid)[0]
         # One of Newton's steps carries over what is imaginary.
         partials = [self.cartesian(at + 1j * STEP * axis).imag / STEP for axis in np.eye(3)]
         return self.local(at + 1j * np.linalg.solve(np.stack(partials, axis=-1), centre.imag)) @ attitude

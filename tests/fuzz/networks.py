@@ -8,38 +8,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram import Attitudes, Block, Camera, InnerConstraints, MinimumConstraints, Spheroid, _photocore
-from photogram.network import geometry
-from photogram.network.knots import KNOTTED
-from photogram.network.observations import (
+from photogram import (
+    Attitudes,
+    Block,
+    Camera,
+    Distance,
+    InnerConstraints,
+    LeverArm,
+    MinimumConstraints,
+    Position,
+    Spheroid,
+    _photocore,
+)
+from photogram.network import (
     Attitude,
     Base,
+    Boresight,
     Control,
     Difference,
-    Distance,
+    Drift,
     EqualHeight,
+    Instrument,
+    Level,
+    Line,
+    Mount,
     Observation,
     OnLevel,
     OnLine,
     OnPlane,
     OnPlumbLine,
-    Position,
-    Prior,
-    Relative,
-)
-from photogram.network.rigs import Mount
-from photogram.network.unknowns import (
-    Boresight,
-    Drift,
-    Instrument,
-    Level,
-    LeverArm,
-    Line,
     Plane,
     PlumbLine,
+    Prior,
+    Relative,
     Sensor,
     Shift,
+    geometry,
 )
+from photogram.network.knots import KNOTTED
 
 __all__ = ["DATUMS", "KINDS", "MODELS", "RandomNetwork", "random_network"]
 

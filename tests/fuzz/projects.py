@@ -19,7 +19,7 @@ from photogram import Block, formats
 from photogram.cli import adjust as adjusting
 from photogram.cli.components import UnitVarianceName
 from photogram.distributed import Division
-from photogram.formats.format import Wishes
+from photogram.formats import Wishes
 from photogram.formats.images import to_corner
 from photogram.formats.supplements import self_calibrated, with_control
 

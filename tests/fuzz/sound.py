@@ -17,15 +17,20 @@ import numpy as np
 from photogram import Spheroid, orient, simulate
 from photogram.absolute_orientation import read_csv
 from photogram.absolute_orientation.cards import transformation_records
-from photogram.collection.formats import to_bytes as collection_bytes
-from photogram.collection.simulation import simulate as simulate_collection
-from photogram.comparator import Grid, Options, calibrate, simulate_calibration, to_cards, to_csv
-from photogram.comparator.grid import built_in_grid
+from photogram.collection import simulate as simulate_collection
+from photogram.collection import to_bytes as collection_bytes
+from photogram.comparator import (
+    Grid,
+    Options,
+    built_in_grid,
+    calibrate,
+    simulate_calibration,
+    to_cards,
+    to_csv,
+)
 from photogram.giant import Common, Project
 from photogram.giant.files import to_bytes as record_bytes
-from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_file import read_night
-from photogram.stellar.plain import read_plain
+from photogram.stellar import calibrate_night, read_night, read_plain
 
 from .projects import PROJECTS, Files, sound_projects
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fuzz.dense import ENDINGS, KINDS, SAID, TOLERANCE, _compared, compare, random_block
-from photogram import adjust, simulate
-from photogram.network import geometry
+from photogram import adjust, network, simulate
 
 BLOCKS = 100
 
@@ -56,7 +55,7 @@ def test_the_dense_equations_project_as_the_geometry_does(photo_to_ground):
 
     place = _Place(block, adjust(block, threads=1))
     values = place.unknowns[place.columns()]
-    expected = geometry.project(
+    expected = network.project(
         values[:, 6:],
         values[:, :3],
         values[:, 3:6],

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from photogram import Spheroid, adjust, simulate
 from photogram.cli import app
 from photogram.giant import Common, Frame, Project, read_project, write_project
-from photogram.network.geometry import geographic_to_geocentric, project, rotation_angles, rotation_matrix
+from photogram.network import geographic_to_geocentric, project, rotation_angles, rotation_matrix
 
 SIZE = {"strips": 2, "photos_per_strip": 4, "points_per_photo": 25, "check_points": 4}
 GEOGRAPHIC = {

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import diagnose, simulate
+from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
 from photogram.diagnosis.orientation import MIRRORS
 from photogram.diagnosis.predictions import exchange
@@ -18,7 +18,6 @@ from photogram.diagnosis.stations import neighbours
 from photogram.diagnosis.structure import parts_of
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check
-from photogram.network.geometry import Spheroid
 from photogram.network.rays import Rays
 from photogram.network.strips import strips_of
 from photogram.network.subset import kept_images, of_photos

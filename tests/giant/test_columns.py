@@ -9,11 +9,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.giant.columns import Columns, angle_fields, position_fields, real_fields, texts
 from photogram.giant.fields import format_angle, format_real
 from photogram.giant.records import Source
-from photogram.show.angles import ARCSEC
+from photogram.stellar import ARCSEC
 
 FIELDS = st.lists(
     st.one_of(

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from small_project import COMMON, FRAMES, GROUND, IMAGES, frame_record, ground_record, replaced, write_files
 
-from photogram import adjust
-from photogram.errors import InputError
+from photogram import InputError, adjust
 from photogram.giant import ErrorWarning, Limits, error_warnings, read_project
 
 

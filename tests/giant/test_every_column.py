@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_project import write_files
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.giant import Camera, Common, ImageFrame, Project, read_project
 from photogram.giant.cameras import parse_cameras
 from photogram.giant.common import common_records, parse_common

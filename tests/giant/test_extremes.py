@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from damage import FIELDS
 
-from photogram import Spheroid, diagnose, simulate
-from photogram.errors import InputError
+from photogram import InputError, Spheroid, diagnose, simulate
 from photogram.giant import Project, read_project
 from photogram.giant.files import to_bytes
 

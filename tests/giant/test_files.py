@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from small_project import FRAMES, GROUND, IMAGES, ground_record, replaced
 
-from photogram.errors import InputError
+from photogram import InputError
+from photogram.giant import Common
 from photogram.giant.cameras import camera_records, parse_cameras
-from photogram.giant.common import Common, common_records, parse_common
+from photogram.giant.common import common_records, parse_common
 from photogram.giant.frames import frame_records, parse_frames
 from photogram.giant.ground import ground_records, parse_ground
 from photogram.giant.images import image_records, parse_images

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from test_adjusting import GEOGRAPHIC, SIZE, changed, differences, run, solution, with_files
 
-from photogram import AsPublished, adjust, simulate
+from photogram import AsPublished, adjust, network, simulate
 from photogram.giant import Common, ImageFrame, Project, read_project, write_project
-from photogram.network import geometry
 
 SPACES = pytest.mark.parametrize("space", [{}, GEOGRAPHIC], ids=["rectangular", "geographic"])
 
@@ -300,7 +299,7 @@ def test_section_2_6_unheld_components_are_checks(directory, tmp_path):
     root = np.sqrt(np.nanmean(differences**2, axis=0))
     assert printed == pytest.approx(root * scale, abs=1e-5)
     middle = again.block.photo_positions.mean(axis=0, keepdims=True)
-    metres = root * geometry.lengths_of_units(middle, again.block.spheroid)[0]
+    metres = root * network.lengths_of_units(middle, again.block.spheroid)[0]
     assert lengths == pytest.approx(metres[:2] if again.block.geographic else [], abs=1e-4)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from photogram import Iteration
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame
 from photogram.giant.fields import printed_order
 from photogram.giant.printout.forms import Space, matrix_rows, printout
@@ -26,7 +27,6 @@ from photogram.giant.printout.results import (
     propagated_point_pages,
     station_pages,
 )
-from photogram.results.iteration import Iteration
 from photogram.results.result import SumsOfSquares
 
 DATA = Path(__file__).parents[1] / "data" / "giant"

@@ -22,12 +22,10 @@ from small_project import (
     write_files,
 )
 
-from photogram.errors import InputError
+from photogram import Block, InputError, Refraction
 from photogram.giant import Project, read_project, write_project
 from photogram.giant.export import adjusted_frames, adjusted_ground
 from photogram.io.writing import write_whole
-from photogram.network.block import Block
-from photogram.network.refraction import Refraction
 
 STRASBOURG = Path(__file__).parents[3] / "shared" / "data" / "strasbourg" / "giant"
 
@@ -298,7 +296,7 @@ def small_block(rng, geographic, photos=3, points=6):
     scale, offset = np.array([5000.0, 5000, 300]), np.array([600000.0, 5e6, 0])
     if geographic:
         # Needs the extension module, which rectangular blocks do not.
-        from photogram.network.geometry import Spheroid
+        from photogram import Spheroid
 
         spheroid = Spheroid(6378206.4, 6356583.8)
         scale, offset = (

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_project import same
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.giant import (
     Camera,
     Common,

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photogram import adjust, simulate
-from photogram.network.structuring import structure
+from photogram.network import structure
 
 GOLDEN = json.loads((Path(__file__).parents[1] / "data" / "giant" / "golden_cases.json").read_text())
 SIX = GOLDEN["bandwidth_six_photos"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from photogram import Attitudes, Block
-from photogram.network.geometry import rotation_angles, rotation_matrix
+from photogram.network import rotation_angles, rotation_matrix
 from shared_data import SHARED
 
 NETWORKS = SHARED / "network"

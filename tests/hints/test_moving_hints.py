@@ -24,10 +24,7 @@ from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, ex
 from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.shutters import rolling_hints
 from photogram.diagnosis.trajectory_hints import flown_hints
-from photogram.network.moving_photos import Lines
-from photogram.network.observations import Attitude
-from photogram.network.trajectories import Clock, Readout
-from photogram.network.unknowns import Boresight
+from photogram.network import Attitude, Boresight, Clock, Lines, Readout
 
 SCANNED = ("pushbroom_strips", "three_line", "planetary_pair", "jitter")
 

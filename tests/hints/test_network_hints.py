@@ -5,14 +5,13 @@ import numpy as np
 import pytest
 
 from example_scripts import load
-from photogram import Camera, InputError, RankError, Spheroid, adjust, diagnose, simulate
+from photogram import Camera, Distance, InputError, RankError, Spheroid, adjust, diagnose, simulate
 from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints, verdicts
 from photogram.diagnosis.regression import eligible, regressions, spread, view
 from photogram.giant import Project, write_project
+from photogram.network import project
 from photogram.network.directions import image_directions, without_lenses
-from photogram.network.geometry import project
-from photogram.network.observations import Distance
 
 IDENTITY = [[1, 0], [0, 1]]
 Y_DOWN, TURNED, MIRRORED = [[1, 0], [0, -1]], [[-1, 0], [0, -1]], [[-1, 0], [0, 1]]

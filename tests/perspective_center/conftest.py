@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from photogram.network.geometry import rotation_matrix
+from photogram.network import rotation_matrix
 from photogram.perspective_center import Grid
 
 DATA = Path(__file__).parents[1] / "data" / "perspective_center"

@@ -11,8 +11,7 @@ import pytest
 
 import browser as browsers
 import photogram
-from photogram import InnerConstraints, adjust, simulate
-from photogram.adjustment.snooping import snoop
+from photogram import InnerConstraints, adjust, simulate, snoop
 
 EXAMPLES = str(Path(photogram.__file__).parent / "examples")
 NETWORK = ["Verdict", "Plan of the network", "How much, how good", "Image residuals", "Redundancy", "Tests"]

@@ -11,8 +11,11 @@ import pytest
 from fuzz.networks import random_network
 from photogram import (
     Camera,
+    Distance,
     InnerConstraints,
     InputError,
+    LeverArm,
+    Position,
     Refraction,
     Spheroid,
     adjust,
@@ -23,8 +26,7 @@ from photogram import (
 from photogram import collection as collections
 from photogram.arguments.annotations import check_members
 from photogram.io.seals import seal
-from photogram.network.observations import Distance, OnLevel, Position
-from photogram.network.unknowns import Level, LeverArm, Shift
+from photogram.network import Level, OnLevel, Shift
 from photogram.results.cameras import AdjustedCamera
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")

@@ -3,8 +3,7 @@
 import numpy as np
 from unit_vectors import UnitVectors, project
 
-from photogram import adjust, simulate
-from photogram.network import geometry
+from photogram import adjust, network, simulate
 
 IMAGES = 67
 """Three blocks each: of the photo, of the point, of the adjusted image; 201 in all."""
@@ -42,5 +41,5 @@ def test_collinearity_equations_are_the_same() -> None:
     positions[:, 2] += 4500.0
     attitudes = random.uniform(-0.3, 0.3, (50, 3))
     distances = np.full(50, -152.74)
-    expected = geometry.project(points, positions, attitudes, distances)
+    expected = network.project(points, positions, attitudes, distances)
     np.testing.assert_allclose(project(points, positions, attitudes, distances), expected, rtol=1e-12)

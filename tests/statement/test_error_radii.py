@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from photogram.errors import InputError
-from photogram.statistics.error_radii import (
+from photogram import InputError
+from photogram.statistics import (
     circular_error,
     linear_error,
     mixture_circular,

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from photogram.errors import InputError
-from photogram.statistics.freedom import (
+from photogram import InputError
+from photogram.statistics import (
     coverage_factor,
     effective_freedom,
     joint_freedom,

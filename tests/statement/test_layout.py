@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.network.hull import area, hull, outside
 from photogram.results.statement.layout import area_in_plan, layout
 

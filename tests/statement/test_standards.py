@@ -9,7 +9,7 @@ from golden_statement import cofactors, control, differences, golden
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photogram.errors import InputError
+from photogram import InputError
 from photogram.results.statement import asprs, iso_19157
 from photogram.results.statement.asprs import accuracy, three_d, verdict
 from photogram.results.statement.lengths import (
@@ -20,7 +20,7 @@ from photogram.results.statement.lengths import (
     measured_lengths,
 )
 from photogram.results.statement.nssda import nssda
-from photogram.statistics.freedom import effective_freedom
+from photogram.statistics import effective_freedom
 
 
 def root_mean_square(rows):

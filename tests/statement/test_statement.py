@@ -14,7 +14,7 @@ from photogram.results.statement.comparison import compared
 from photogram.results.statement.honest import bias, prediction
 from photogram.results.statement.judgement import judged
 from photogram.results.statement.request import Asked
-from photogram.statistics.freedom import rmse_interval
+from photogram.statistics import rmse_interval
 
 KINDS = ("point C08 z", "distance C01 C30", "camera drone f")
 """The quantities of the golden budgets, as they are asked for."""

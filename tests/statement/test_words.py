@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram import _photocore, formats
+from photogram import Refraction, _photocore, formats
+from photogram.formats import Frame
 from photogram.formats.crs import axes_of
-from photogram.network.frame import Frame
-from photogram.network.observations import Observation
-from photogram.network.refraction import Air, Refraction, Water
-from photogram.network.unknowns import Unknown
+from photogram.network import Observation, Unknown
+from photogram.network.refraction import Air, Water
 from photogram.results import datum as datums
 from photogram.results import patterns
 from photogram.results.features import KINDS as FORMS

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 @pytest.fixture(scope="session")
 def plate():
     """Return the example: 75 stars, five images each, three groups."""
-    from photogram.stellar.plain import read_plain
+    from photogram.stellar import read_plain
 
     return read_plain(Path(str(files("photogram") / "examples" / "stellar" / "plate.toml")))
 
@@ -33,7 +33,7 @@ def night():
     """Return the example of a night."""
     from nights import EXAMPLE
 
-    from photogram.stellar.night_file import read_night
+    from photogram.stellar import read_night
 
     return read_night(EXAMPLE)
 
@@ -41,7 +41,7 @@ def night():
 @pytest.fixture(scope="module")
 def result(night):
     """Return the calibration of the night of the module."""
-    from photogram.stellar.night_calibration import calibrate_night
+    from photogram.stellar import calibrate_night
 
     return calibrate_night(night)
 

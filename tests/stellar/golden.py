@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.stellar import Air, Options, Problem, Site
-from photogram.stellar.parameters import NAMES
+from photogram.stellar import NAMES, Air, Options, Problem, Site
 
 DATA = Path(__file__).parents[1] / "data" / "stellar"
 TO_GOLDEN = {"epsilon": "eps", "dx": "Dx", "dy": "Dy", "phi_T": "phiT"}

@@ -3,7 +3,7 @@
 import erfa
 import numpy as np
 
-from photogram.show.angles import ARCSEC
+from photogram.stellar import ARCSEC
 
 
 def places_of_j2000(stars):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from photogram.stellar.parameters import GRAD
+from photogram.stellar import GRAD
 
 
 def put(*fields):

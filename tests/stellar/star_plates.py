@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar.parameters import INDEX, NAMES
+from photogram.stellar import ARCSEC, INDEX, NAMES
 
 PLATE_SD, STAR_SD = 3e-6, 0.2 * ARCSEC
 """Noise of the computed references."""

@@ -7,8 +7,7 @@ import pytest
 import star_plates as plates
 
 from photogram import AdjustmentError, InputError
-from photogram.stellar import calibrate
-from photogram.stellar.parameters import INDEX
+from photogram.stellar import INDEX, calibrate
 from photogram.stellar.report_iteration import DIVERGED, SETTLED, stop_reason
 
 

@@ -8,9 +8,7 @@ import pytest
 import star_plates
 
 from photogram import InputError, adjust, camera_from, simulate
-from photogram.stellar import calibrate
-from photogram.stellar.cameras import BrownCamera, camera_document
-from photogram.stellar.parameters import INDEX, NAMES, UNITS
+from photogram.stellar import INDEX, NAMES, UNITS, BrownCamera, calibrate, camera_document
 
 VALUES = np.array([8000.0, 8010.0, 6010.0, 5990.0, -0.02, 0.004, -3e-4, 1e-4, -2e-4])
 SD = np.array([0.5, 0.5, 0.8, 0.8, 2e-4, 2e-4, 1e-5, 1e-5, 0.0])

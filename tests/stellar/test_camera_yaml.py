@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.stellar.camera_yaml import read_yaml, to_yaml
-from photogram.stellar.night_file import read_night
-from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
+from photogram.stellar import BrownCamera, SkyCamera, read_night, read_yaml, to_yaml
 
 FRAME = (6000.0, 4000.0)
 BROWN = BrownCamera(

@@ -8,13 +8,16 @@ from typer.testing import CliRunner
 
 from photogram import _photocore
 from photogram.cli import app
-from photogram.stellar.cameras import BrownCamera
-from photogram.stellar.catalogue import Catalogue
+from photogram.stellar import (
+    BrownCamera,
+    Catalogue,
+    apparent_places,
+    calibrate_exposures,
+    calibrate_night,
+    read_night,
+    sidereal_time,
+)
 from photogram.stellar.comparison import held_out
-from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_file import read_night
-from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky_calibration import calibrate_exposures
 
 
 @pytest.fixture(scope="module")

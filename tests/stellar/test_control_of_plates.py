@@ -12,12 +12,9 @@ from typer.testing import CliRunner
 from photogram import InputError
 from photogram.cli import app
 from photogram.io.rows import read_rows
-from photogram.show.angles import ARCSEC
-from photogram.stellar import calibrate
-from photogram.stellar.landmarks import HOUR, landmark
-from photogram.stellar.places import apparent_places, epoch, sidereal_time
-from photogram.stellar.plain import read_plain
-from photogram.stellar.sky import Site
+from photogram.stellar import ARCSEC, Site, apparent_places, calibrate, landmark, read_plain, sidereal_time
+from photogram.stellar.landmarks import HOUR
+from photogram.stellar.places import epoch
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar"))
 
@@ -126,7 +123,7 @@ def test_times_before_1960_are_universal_time():
 
 
 def test_apparent_places_as_a_command(tmp_path):
-    from photogram.stellar.catalogue import Catalogue
+    from photogram.stellar import Catalogue
 
     out = tmp_path / "stars.csv"
     utc = "1966-03-01T21:03:05"

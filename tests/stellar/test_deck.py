@@ -11,9 +11,7 @@ from typer.testing import CliRunner
 
 from photogram import InputError
 from photogram.cli import app
-from photogram.stellar import calibrate
-from photogram.stellar.deck import read_deck
-from photogram.stellar.plain import read_plain
+from photogram.stellar import calibrate, read_deck, read_plain
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))
 

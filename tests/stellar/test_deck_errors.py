@@ -7,8 +7,7 @@ from typer.testing import CliRunner
 
 from photogram import AdjustmentError, InputError
 from photogram.cli import app
-from photogram.stellar import calibrate
-from photogram.stellar.deck import read_deck
+from photogram.stellar import calibrate, read_deck
 
 OPTIONS = "0 0 1 1 0 0 0 1 0 0 0 0 0 0.0"
 FIRST_STAR = 17

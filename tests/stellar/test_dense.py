@@ -7,11 +7,9 @@ import pytest
 import star_plates as plates
 
 from photogram._photocore import pointing_matrix
-from photogram.stellar import calibrate
+from photogram.stellar import INDEX, NAMES, Axis, calibrate
 from photogram.stellar.adjustment import free_parameters
 from photogram.stellar.movement import modify
-from photogram.stellar.parameters import INDEX, NAMES
-from photogram.stellar.problem import Axis
 
 
 def as_it_is(truth, generator):

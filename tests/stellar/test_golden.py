@@ -8,11 +8,9 @@ import pytest
 from star_plates import columns
 
 from photogram import _photocore
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site, calibrate, refraction
+from photogram.stellar import ARCSEC, GRAD, INDEX, NAMES, Air, Site, calibrate, refraction
 from photogram.stellar.curves import distortion_curves
 from photogram.stellar.movement import constraints, modify
-from photogram.stellar.parameters import GRAD, INDEX, NAMES
 from photogram.stellar.pointing import transformed_angles
 
 

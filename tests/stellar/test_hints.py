@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.stellar.cameras import BrownCamera
-from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_file import read_night
-from photogram.stellar.pointing import attitude_of, axis_of, roll_of
+from photogram.stellar import BrownCamera, attitude_of, calibrate_night, read_night
+from photogram.stellar.pointing import axis_of, roll_of
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "exposures" / "night.toml"))
 

@@ -3,13 +3,19 @@
 import numpy as np
 import pytest
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site
-from photogram.stellar.cameras import BrownCamera
-from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.night_calibration import Night, calibrate_night
-from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky_calibration import Exposure, project_sky
+from photogram.stellar import (
+    ARCSEC,
+    Air,
+    BrownCamera,
+    Catalogue,
+    Exposure,
+    Night,
+    Site,
+    apparent_places,
+    calibrate_night,
+    project_sky,
+    sidereal_time,
+)
 
 SITE = Site(np.radians(47.0), np.radians(-8.5), 500.0, Air(283.15, 715.0), aberration=0.3192 * ARCSEC)
 FRAME = (6000.0, 4000.0)

@@ -8,11 +8,8 @@ import pytest
 from observer import places_of_j2000
 
 from photogram import _photocore
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site
-from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.places import Earth, apparent_places, inertial_attitude, sidereal_time
-from photogram.stellar.sky import Effects
+from photogram.stellar import ARCSEC, Air, Catalogue, Earth, Effects, Site, apparent_places, sidereal_time
+from photogram.stellar.places import inertial_attitude
 
 UTC = "2024-03-01T21:03:05.25"
 SITE = Site(np.radians(47.0), np.radians(-8.5), 500.0, Air(283.15, 715.0))

@@ -7,15 +7,11 @@ import pytest
 import star_plates as plates
 from nights import MAKER
 
-from photogram.stellar import calibrate
+from photogram.stellar import INDEX, calibrate, calibrate_exposures, calibrate_night, report
 from photogram.stellar.lens_choice import equal
 from photogram.stellar.lens_choice import test_scale as scale_of
 from photogram.stellar.lens_choice import test_terms as terms_of
 from photogram.stellar.listing import listing
-from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_report import report
-from photogram.stellar.parameters import INDEX
-from photogram.stellar.sky_calibration import calibrate_exposures
 
 FRAME = (6000.0, 4000.0)
 

@@ -7,13 +7,18 @@ import pytest
 
 from example_scripts import load
 from photogram import InputError, _photocore
-from photogram.stellar.lenses import LENSES
-from photogram.stellar.night_calibration import calibrate_night
+from photogram.stellar import (
+    LENSES,
+    BrownCamera,
+    SkyCamera,
+    apparent_places,
+    calibrate_night,
+    project_sky,
+    report,
+    sidereal_time,
+)
 from photogram.stellar.night_plots import sketches
-from photogram.stellar.night_report import report
-from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky_calibration import partials, project_sky
-from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
+from photogram.stellar.sky_calibration import partials
 
 allsky = load("all_sky_camera")
 FISHEYES = ("equidistant", "equisolid", "stereographic", "kannala_brandt")

@@ -14,16 +14,26 @@ from typer.testing import CliRunner
 from photogram import AdjustmentError, InputError, _photocore
 from photogram.cli import app
 from photogram.network.neighbours import mutually_nearest
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site
-from photogram.stellar.cameras import BrownCamera
-from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_file import inputs, read_night
-from photogram.stellar.night_report import report, to_json
-from photogram.stellar.places import Earth, apparent_places, sidereal_time
-from photogram.stellar.pointing import attitude_of, axis_of, pole_matrix, terrestrial
-from photogram.stellar.sky_calibration import calibrate_exposures, project_sky, stars_near
+from photogram.stellar import (
+    ARCSEC,
+    Air,
+    BrownCamera,
+    Catalogue,
+    Earth,
+    Site,
+    apparent_places,
+    attitude_of,
+    calibrate_exposures,
+    calibrate_night,
+    project_sky,
+    read_night,
+    report,
+    sidereal_time,
+)
+from photogram.stellar.night_file import inputs
+from photogram.stellar.night_report import to_json
+from photogram.stellar.pointing import axis_of, pole_matrix, terrestrial
+from photogram.stellar.sky_calibration import stars_near
 
 TRUTH = MAKER["CAMERA"].values
 

@@ -12,14 +12,11 @@ from typer.testing import CliRunner
 from example_scripts import load
 from photogram import InputError
 from photogram.cli import app
-from photogram.stellar.catalogue import Catalogue
+from photogram.stellar import Catalogue, Exposure, calibrate_night, read_night, report
 from photogram.stellar.comparison import fewer_stars
-from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_file import read_night
-from photogram.stellar.night_report import report, to_json
+from photogram.stellar.night_report import to_json
 from photogram.stellar.night_tables import exposure_table, image_table
 from photogram.stellar.odds import LOG_ODDS, binomial_tail, log_odds, star_probabilities
-from photogram.stellar.sky_calibration import Exposure
 
 allsky = load("all_sky_camera")
 TRUTH = MAKER["CAMERA"].values

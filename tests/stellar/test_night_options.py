@@ -12,10 +12,8 @@ from typer.testing import CliRunner
 from photogram import InputError
 from photogram.cli import app
 from photogram.cli.stellar_camera import Effect, Lens
-from photogram.stellar.lenses import LENSES
-from photogram.stellar.night_file import AUTO, read_night
-from photogram.stellar.night_report import report
-from photogram.stellar.sky import Effects
+from photogram.stellar import LENSES, Effects, read_night, report
+from photogram.stellar.night_file import AUTO
 
 
 def run(folder, *said):

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import star_plates as plates
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar import calibrate
+from photogram.stellar import ARCSEC, INDEX, NAMES, calibrate
 from photogram.stellar.movement import movement, pairs_to_combine
-from photogram.stellar.parameters import INDEX, NAMES
 
 RUNS = 120
 

@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 
 from photogram.cli import app
 from photogram.statistics.verdict import EXIT_NOT_USABLE
-from photogram.stellar import calibrate
+from photogram.stellar import INDEX, NAMES, calibrate
 from photogram.stellar.movement import combine
-from photogram.stellar.parameters import INDEX, NAMES
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar"))
 

@@ -13,10 +13,8 @@ from typer.testing import CliRunner
 
 from photogram import InputError
 from photogram.cli import app
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Options
-from photogram.stellar.parameters import INDEX
-from photogram.stellar.plain import inputs, read_plain
+from photogram.stellar import ARCSEC, INDEX, Options, read_plain
+from photogram.stellar.plain import inputs
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))

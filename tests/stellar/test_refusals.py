@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 
 from photogram import InputError
-from photogram.stellar import Air
-from photogram.stellar.night_file import read_night
-from photogram.stellar.plain import read_plain
+from photogram.stellar import Air, read_night, read_plain
 
 EXAMPLES = Path(str(files("photogram") / "examples"))
 HEAD = "id,ra_deg,dec_deg,pm_ra_mas,pm_dec_mas,parallax_mas,magnitude\n"

@@ -11,15 +11,21 @@ import numpy as np
 import pytest
 
 from photogram import InputError
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Options, calibrate
-from photogram.stellar.cameras import BrownCamera, PlateCamera, camera_document
+from photogram.stellar import (
+    ARCSEC,
+    INDEX,
+    NAMES,
+    BrownCamera,
+    Options,
+    PlateCamera,
+    calibrate,
+    camera_document,
+    read_plain,
+)
 from photogram.stellar.comparator_frame import comparator_frame
 from photogram.stellar.document import to_json
 from photogram.stellar.listing import listing
 from photogram.stellar.movement import fictitious_points
-from photogram.stellar.parameters import INDEX, NAMES
-from photogram.stellar.plain import read_plain
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))
 

@@ -8,15 +8,17 @@ import pytest
 from observer import places_of_j2000
 
 from photogram import AdjustmentError, InputError
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site
-from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.places import apparent_places, sidereal_time
-from photogram.stellar.sky_calibration import (
+from photogram.stellar import (
+    ARCSEC,
+    Air,
     BrownCamera,
+    Catalogue,
     Exposure,
+    Site,
+    apparent_places,
     calibrate_exposures,
     project_sky,
+    sidereal_time,
 )
 
 SITE = Site(np.radians(47.0), np.radians(-8.5), 500.0, Air(283.15, 715.0), aberration=0.3192 * ARCSEC)

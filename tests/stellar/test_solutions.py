@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 import star_plates as plates
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar import calibrate, refraction
+from photogram.stellar import ARCSEC, INDEX, NAMES, calibrate, refraction
 from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
-from photogram.stellar.parameters import GROUPS, INDEX, NAMES
+from photogram.stellar.parameters import GROUPS
 from photogram.stellar.result import ellipse
 from photogram.stellar.tables import star_means
 

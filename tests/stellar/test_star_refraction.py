@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from photogram.show.angles import ARCSEC
-from photogram.stellar import Air, Site, refraction
+from photogram.stellar import ARCSEC, Air, Site, refraction
 
 EARTH, TROPOPAUSE, TOP = 6378120.0, 11000.0, 80000.0
 LAPSE, MOLAR, GAS = 0.0065, 28.9644, 8314.32

@@ -7,8 +7,7 @@ import pytest
 import star_plates as plates
 
 from photogram import AdjustmentError, InputError
-from photogram.stellar import calibrate
-from photogram.stellar.parameters import INDEX, NAMES
+from photogram.stellar import INDEX, NAMES, calibrate
 
 BOTH = pytest.mark.parametrize("as_published", [False, True])
 

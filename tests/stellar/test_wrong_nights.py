@@ -8,11 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from photogram.cli import app
-from photogram.stellar.catalogue import Catalogue
+from photogram.stellar import Catalogue, attitude_of, calibrate_night, read_night
 from photogram.stellar.hints import _HOUR
-from photogram.stellar.night_calibration import calibrate_night
-from photogram.stellar.night_file import read_night
-from photogram.stellar.pointing import attitude_of, turn_between
+from photogram.stellar.pointing import turn_between
 
 AROUND = "no exposure shows stars of the catalogue where its attitude says they are; "
 

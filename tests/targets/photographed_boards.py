@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from photogram.network.attitudes import Attitudes
+from photogram import Attitudes
 
 FLIP = np.array([1.0, -1.0, -1.0])
 PARTS = 4

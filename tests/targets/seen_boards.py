@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from photogram.network.attitudes import Attitudes
+from photogram import Attitudes
 from photogram.targets import Corners
 
 FLIP = np.array([1.0, -1.0, -1.0])

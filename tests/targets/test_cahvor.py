@@ -7,9 +7,8 @@ import pytest
 from golden_boards import left, needs_golden
 from typer.testing import CliRunner
 
-from photogram import Camera
+from photogram import Camera, InputError
 from photogram.cli import app
-from photogram.errors import InputError
 from photogram.targets import Calibration, camera_files, convert_lens, difference, first_values
 from photogram.targets.mrcal_model import read_lens, read_model
 from photogram.targets.output.mrcal import mrcal_models

@@ -5,9 +5,7 @@ import pytest
 from seen_boards import seen
 
 from photogram import Camera
-from photogram.targets import Board, Calibration
-from photogram.targets.appraisal import appraise
-from photogram.targets.calibration_result import WorthOptions
+from photogram.targets import Board, Calibration, WorthOptions, appraise
 from photogram.targets.document import calibration_document
 from photogram.targets.findings import judged, showings
 

@@ -11,12 +11,11 @@ import pytest
 import yaml
 from golden_boards import left, needs_golden, rig
 
-from photogram.errors import InputError
-from photogram.targets import Calibration, camera_files, first_values
+from photogram import InputError
+from photogram.targets import Calibration, camera_files, first_values, projection_uncertainty, uncertainty_map
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.output.formats import CAMERA_FORMATS, cameras_covariance
 from photogram.targets.projection import worst
-from photogram.targets.uncertainty import projection_uncertainty, uncertainty_map
 
 pytestmark = needs_golden
 

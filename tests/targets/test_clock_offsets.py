@@ -8,10 +8,9 @@ import pytest
 from given_targets import rig_small
 from typer.testing import CliRunner
 
-from photogram import InputError, RankError, adjust, formats
+from photogram import Camera, InputError, RankError, adjust, formats
 from photogram.cli import app
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
-from photogram.network.cameras import Camera
 from photogram.targets import Board, Calibrated, Calibration, Corners, cross_validate, read, simulate_corners
 from photogram.targets.motion import errors_of_speeds, moving
 from photogram.targets.vision import of_vectors

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from golden_boards import GOLDEN, needs_golden
 
-from photogram import Camera
-from photogram.errors import InputError
+from photogram import Camera, InputError
 from photogram.targets import convert_lens
 from photogram.targets.mrcal_model import read_model
 

@@ -7,12 +7,12 @@ import pytest
 from given_targets import DATA, rig_small
 
 from photogram import Camera, InputError
-from photogram.targets import Board
+from photogram.targets import Board, read
 from photogram.targets.corner_files import holds_targets, read_table, read_vnl, sorted_files
 from photogram.targets.corner_views import Grouping, grouped
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.opencv_corners import read_npz, read_storage
-from photogram.targets.reading import _measured, read
+from photogram.targets.reading import _measured
 
 SMALL = Board(columns=3, rows=2, spacing=0.1)
 XY = np.array([[10.5, 20.25], [30.0, 21.0], [50.0, 22.0], [11.0, 40.0], [31.0, 41.0], [51.0, 42.0]])

@@ -6,7 +6,7 @@ from given_targets import golden
 from golden_calibrations import adjusted_rig
 
 from photogram import InputError
-from photogram.targets.appraisal import cross_validate
+from photogram.targets import cross_validate
 from photogram.targets.cross_validation import changes_between, cross_map, parts_agree, splits
 
 

@@ -16,9 +16,8 @@ from photographed_boards import (
 )
 from typer.testing import CliRunner
 
-from photogram import Camera
+from photogram import Camera, InputError
 from photogram.cli.commands import application
-from photogram.errors import InputError
 from photogram.targets import Board, read
 from photogram.targets.detection import detected
 

@@ -5,8 +5,7 @@ import pytest
 from golden_boards import golden, left, needs_golden, rig, wide
 from relisted import relisted
 
-from photogram.targets import Calibration
-from photogram.targets.first_calibration import first_values
+from photogram.targets import Calibration, first_values
 
 pytestmark = needs_golden
 

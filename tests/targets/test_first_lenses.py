@@ -5,11 +5,9 @@ import pytest
 from relisted import relisted
 from seen_boards import seen
 
-from photogram import Camera
-from photogram.errors import InputError
-from photogram.targets import Board, Calibration
+from photogram import Camera, InputError
+from photogram.targets import Board, Calibration, first_values
 from photogram.targets import first_calibration as first_module
-from photogram.targets.first_calibration import first_values
 
 BOARD = Board(columns=9, rows=7, spacing=0.04, shape="held")
 LENSES = {

@@ -5,9 +5,8 @@ import pytest
 from golden_boards import left, needs_golden, rig
 from relisted import relisted
 
-from photogram.errors import InputError
-from photogram.targets import Board
-from photogram.targets.first_calibration import first_values
+from photogram import InputError
+from photogram.targets import Board, first_values
 from photogram.targets.sightings import LISTED, Listings
 
 pytestmark = needs_golden

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from photogram.network.attitudes import Attitudes
+from photogram import Attitudes
 from photogram.targets import Board
 from photogram.targets.first_calibration import connected, mean_pose
 from photogram.targets.sightings import Listings

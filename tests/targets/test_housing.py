@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from golden_calibrations import adjusted_rig, rig_small
 
-from photogram.targets.appraisal import cross_validate
+from photogram.targets import cross_validate
 from photogram.targets.housings import housing_of
 from photogram.targets.vision import sensor_steps
 

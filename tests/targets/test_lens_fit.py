@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from photogram import Camera
-from photogram.errors import InputError
+from photogram import Camera, InputError
 from photogram.targets.lens_fit import fitted, grid_of_pixels, is_perspective
 
 SIZE = (6016, 4016)

@@ -4,12 +4,10 @@ import given_targets
 import numpy as np
 import pytest
 
-from photogram.targets.appraisal import cross_validate
-from photogram.targets.calibration import simulate_corners
+from photogram.targets import cross_validate, simulate_corners, triangulate
 from photogram.targets.cross_validation import changes_between
 from photogram.targets.housings import housing_of
 from photogram.targets.projection import common_partials, datum_rows, housing_rows
-from photogram.targets.triangulation import triangulate
 from photogram.targets.vision import imaged
 
 DRAWS = 60

@@ -7,7 +7,8 @@ import pytest
 from given_targets import golden
 from golden_calibrations import rig_small
 
-from photogram.targets.new_views import Candidate, best_views
+from photogram.targets import Candidate
+from photogram.targets.new_views import best_views
 from photogram.targets.projection import common_partials, datum_rows, worst
 from photogram.targets.vision import composed
 

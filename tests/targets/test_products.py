@@ -10,18 +10,21 @@ from given_targets import golden
 from golden_calibrations import adjusted_rig
 
 from photogram import Camera, InputError, variance_components
-from photogram.targets import read
-from photogram.targets.drawing import draw_uncertainty_curve, steps_of_125
-from photogram.targets.housings import housing_of
-from photogram.targets.projection import datum_rows
-from photogram.targets.suggestions import candidate_views, suggest_views
-from photogram.targets.triangulation import distance_uncertainty, triangulate
-from photogram.targets.uncertainty import (
+from photogram.targets import (
     difference,
+    distance_uncertainty,
+    draw_uncertainty_curve,
     projection_uncertainty,
+    read,
+    suggest_views,
+    triangulate,
     uncertainty_against_distance,
     uncertainty_map,
 )
+from photogram.targets.drawing import steps_of_125
+from photogram.targets.housings import housing_of
+from photogram.targets.projection import datum_rows
+from photogram.targets.suggestions import candidate_views
 from photogram.targets.vision import imaged, rays
 
 PIXELS = [[40.0, 40.0], [640.0, 480.0]]

@@ -9,8 +9,7 @@ import pytest
 
 from photogram import Block, Camera, InputError, Result, adjust, adjust_in_parts
 from photogram.distributed import Division
-from photogram.network.geometry import rotation_angles, rotation_matrix
-from photogram.network.passages import Bend, Figure
+from photogram.network import Bend, Figure, rotation_angles, rotation_matrix
 from shared_data import SHARED
 
 GOLDEN = SHARED / "targets" / "splined.json"

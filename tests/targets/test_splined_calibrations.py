@@ -8,16 +8,13 @@ import pytest
 from given_targets import DATA, golden
 from test_splined_adjustment import lens
 
-from photogram import formats
-from photogram.errors import InputError
+from photogram import InputError, formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of
-from photogram.targets import Board, Calibration, Corners, read
-from photogram.targets.appraisal import cross_validate
+from photogram.targets import Board, Calibration, Corners, cross_validate, projection_uncertainty, read
 from photogram.targets.output.mrcal import mrcal_models
 from photogram.targets.output.rig import rig_of
 from photogram.targets.regularisation import regularised, with_knot_sd
 from photogram.targets.tables import spline_lines, splines
-from photogram.targets.uncertainty import projection_uncertainty
 from photogram.targets.vision import composed
 
 

@@ -1,10 +1,9 @@
 """Absolute orientation: the similarity between a model and its control (C&GS Technical Bulletin 19, 1962)."""
 
-from photogram.absolute_orientation.adjust import orient
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv
+from photogram.absolute_orientation.document import read_similarity
 from photogram.absolute_orientation.models import Model, Strip, relative_model, strip_of
-from photogram.absolute_orientation.orientation import Orientation
 from photogram.absolute_orientation.similarity import Similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.absolute_orientation.stream import transform_file
@@ -12,19 +11,20 @@ from photogram.arguments.annotations import check_arguments
 
 __all__ = [
     "Model",
-    "Orientation",
     "Similarity",
     "Stations",
     "Strip",
-    "orient",
     "read_cards",
     "read_csv",
+    "read_similarity",
     "relative_model",
     "strip_of",
     "transform_file",
 ]
 
-check_arguments(globals(), ["read_cards", "read_csv", "relative_model", "strip_of", "transform_file"])
+check_arguments(
+    globals(), ["read_cards", "read_csv", "read_similarity", "relative_model", "strip_of", "transform_file"]
+)
 
 WAYS = {
     "axes_of": ("plot",),

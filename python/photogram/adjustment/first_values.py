@@ -102,8 +102,8 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
 
     Photos whose position or attitude is NaN in the block are started from what is known: rays are intersected
     where poses are given, photos with four known points are resected, observed positions and attitudes
-    (:class:`photogram.network.observations.Position`, `Attitude`) give poses, and photos of which nothing but
-    images is known are oriented relative to each other, chained, and carried onto control, given poses or
+    (:class:`photogram.Position`, :class:`photogram.network.Attitude`) give poses, and photos of which nothing
+    but images is known are oriented relative to each other, chained, and carried onto control, given poses or
     observed positions by a similarity. Every step is a consensus, so that wrong points are borne; a robust
     adjustment ends it. Refraction and unknowns of cameras are left out. Photos on trajectories stay where
     they are given, and help no others: they are no pictures with one pose.

@@ -18,8 +18,9 @@ from photogram.cli.options import Quiet, Strict, example_out, out_option
 from photogram.cli.projects import Additions, Example, project_path, read_project
 
 if TYPE_CHECKING:
-    from photogram.absolute_orientation import Orientation, Similarity
+    from photogram.absolute_orientation import Similarity
     from photogram.absolute_orientation.cards import Deck
+    from photogram.absolute_orientation.orientation import Orientation
     from photogram.io.writing import OutputSet
 
 SHOWN = 40

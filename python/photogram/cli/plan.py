@@ -19,7 +19,7 @@ from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from photogram import Block
-    from photogram.planning import Plan
+    from photogram.planning.networks import Plan
 
 
 @with_job
@@ -61,7 +61,7 @@ def plan(
     location, of photographs, and the gross errors that can be found.
     """
     with job:
-        from photogram.planning import plan as predict
+        from photogram.planning.networks import plan as predict
         from photogram.show.methods import page_of
 
         if packaged:

@@ -5,6 +5,8 @@ calibration = comparator.calibrate(session)
 calibration.correction.apply(xy_um)
 """
 
+from typing import TYPE_CHECKING
+
 from photogram.arguments.annotations import check_arguments
 from photogram.comparator.calibration import Calibration, CaseResult, PlateResult, Pointing, calibrate
 from photogram.comparator.cards import read_cards, to_cards
@@ -20,6 +22,10 @@ from photogram.comparator.readings import Case, Reading, Session, collect_cases
 from photogram.comparator.simulation import Simulation, simulate_calibration
 from photogram.comparator.years import Comparison, RecordedCalibration, RecordedCase, compare
 from photogram.io.places import Place
+from photogram.on_demand import on_demand
+
+if TYPE_CHECKING:
+    from photogram.comparator import pictures as pictures
 
 __all__ = [
     "Calibration",
@@ -81,3 +87,8 @@ check_arguments(
 
 WAYS = {"findings_of": ("tables",), "page_of": ("page",)}
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""
+
+MODULES = ("pictures",)
+"""The package that users know by name: loaded when it is first asked for."""
+
+__getattr__, __dir__ = on_demand(__name__, dict.fromkeys(MODULES, ""))

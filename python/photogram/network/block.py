@@ -116,7 +116,7 @@ class Block(Valued, Brief):
         or any number, where a component is free; the fixed value where it is fixed. None: the initial values.
     observations
         What else was observed: distances, differences of coordinates, heights, positions and attitudes of
-        photos, relative poses, control with full covariance (:mod:`photogram.network.observations`).
+        photos, relative poses, control with full covariance (:mod:`photogram.network`).
     cameras
         Cameras with distortion, or with unknown parameters, all of one image unit; in place of
         `principal_distances`.
@@ -124,11 +124,11 @@ class Block(Valued, Brief):
         (P,) which camera each photo has: an index, or its name; photos with the same one share its unknowns.
         One for all photos; None where there is one camera, or one for each photo.
     mounts
-        Which photos are on a frame with others, and in which pose (:mod:`photogram.network.rigs`).
+        Which photos are on a frame with others, and in which pose (:class:`photogram.network.Mount`).
     timed
-        Photos on trajectories: rolling shutters, line scanners (:mod:`photogram.network.moving_photos`).
+        Photos on trajectories: rolling shutters, line scanners (:class:`photogram.network.Timed`).
     passages
-        What images pass beside pose, point and camera: boards that bend (:mod:`photogram.network.passages`).
+        What images pass beside pose, point and camera: boards that bend (:class:`photogram.network.Figure`).
     frame
         Where on the earth the coordinates are, for maps and other systems; the adjustment does not ask.
 

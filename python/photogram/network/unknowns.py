@@ -403,7 +403,7 @@ class Plane(Unknown):
 
 @dataclass(frozen=True, eq=False)
 class Sensor(Unknown):
-    """The pose of a camera on a frame (see :class:`photogram.network.rigs.Mount`).
+    """The pose of a camera on a frame (see :class:`photogram.network.Mount`).
 
     Parameters
     ----------

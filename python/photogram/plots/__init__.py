@@ -12,12 +12,15 @@ from photogram.plots.network import network
 from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import residuals
 from photogram.plots.tests import tests
+from photogram.plots.trajectories import trajectory
+from photogram.show.pictures import drawn
 
 __all__ = [
     "PICTURES",
     "Plots",
     "correlations",
     "distortion",
+    "drawn",
     "features",
     "figures",
     "films",
@@ -26,4 +29,5 @@ __all__ = [
     "redundancy",
     "residuals",
     "tests",
+    "trajectory",
 ]

@@ -34,7 +34,7 @@ def draw_distortion(
     result, camera
         An adjusted block, and one of its cameras.
     path, ax
-        As of :func:`photogram.results.components_picture.draw_components`; axes for each panel.
+        As of :func:`photogram.results.draw_components`; axes for each panel.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def draw_distortion(
     Raises
     ------
     InputError, ModuleNotFoundError
-        As of :func:`photogram.results.components_picture.draw_components`.
+        As of :func:`photogram.results.draw_components`.
     ValueError
         The camera has no radial terms, or no images.
     """
@@ -63,7 +63,7 @@ def draw_lens_field(
     result, camera
         An adjusted block, and one of its cameras.
     path, ax
-        As of :func:`photogram.results.components_picture.draw_components`.
+        As of :func:`photogram.results.draw_components`.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def draw_lens_field(
     Raises
     ------
     InputError, ModuleNotFoundError
-        As of :func:`photogram.results.components_picture.draw_components`.
+        As of :func:`photogram.results.draw_components`.
     ValueError
         The camera has no such terms, or no images.
     """

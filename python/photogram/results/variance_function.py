@@ -191,7 +191,7 @@ def draw_variance_function(found: VarianceFunction, path: Path | None = None, ax
     found
         A variance function.
     path, ax
-        As of :func:`photogram.results.components_picture.draw_components`.
+        As of :func:`photogram.results.draw_components`.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def draw_variance_function(found: VarianceFunction, path: Path | None = None, ax
     Raises
     ------
     InputError, ModuleNotFoundError
-        As of :func:`photogram.results.components_picture.draw_components`.
+        As of :func:`photogram.results.draw_components`.
     """
     axes: Axes = placed(_sketch(found), path, ax)
     return axes

@@ -42,7 +42,7 @@ class Setting:
     attitude_error, tolerance
         Radians; pixels.
     field_error, roll_known
-        As for `photogram.stellar.night_calibration.Night`.
+        As for `photogram.stellar.Night`.
     """
 
     site: Site

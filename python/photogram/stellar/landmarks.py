@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.stellar.sky import Site
@@ -39,12 +40,17 @@ def landmark(site: Site, azimuth: float, elevation: float, weight: Floats) -> tu
     Raises
     ------
     InputError
-        An elevation that is not between the horizon and the zenith.
+        An elevation that is not between the horizon and the zenith, an azimuth that is not finite, a weight
+        of another shape.
     """
+    weight = shaped("weight", weight, (2, 2))
     if not 0 < elevation < np.pi / 2:
         raise InputError(
             f"an elevation of {np.degrees(elevation):g} degrees is not between the horizon and the zenith"
         )
+    if not np.isfinite(azimuth):
+        raise InputError(f"an azimuth of {azimuth:g} is not finite")
+    azimuth = np.remainder(azimuth, 2 * np.pi)
     steps = _STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     azimuths, elevations = (np.array([azimuth, elevation]) + steps).T
     standard = np.column_stack([np.cos(azimuths), np.sin(azimuths)]) / np.tan(elevations)[:, None]

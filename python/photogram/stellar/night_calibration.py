@@ -36,7 +36,7 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
     Raises
     ------
     InputError
-        No exposure shows enough stars of the catalogue.
+        No exposure shows enough stars of the catalogue; fewer than one thread.
     AdjustmentError
         The stars do not determine the camera.
     """

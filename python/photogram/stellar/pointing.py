@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.stellar.sky import Site
 
 __all__ = [
@@ -32,7 +33,14 @@ def attitude_of(azimuth: float, elevation: float, roll: float = 0.0) -> Floats:
         Of the axis, radians. At 90 degrees exactly, the upper edge points north when the roll is zero.
     roll
         By which the camera is turned clockwise, as its user sees it, from a level horizon; radians.
+
+    Raises
+    ------
+    InputError
+        An angle that is infinite.
     """
+    if math.inf in (abs(azimuth), abs(elevation), abs(roll)):
+        raise InputError(f"azimuth, elevation and roll are {azimuth}, {elevation}, {roll}: one is infinite")
     north, east = -math.cos(elevation) * math.cos(azimuth), -math.cos(elevation) * math.sin(azimuth)
     zenith = math.sin(elevation)
     alpha, omega = math.atan2(north, zenith), math.asin(max(-1.0, min(1.0, east)))

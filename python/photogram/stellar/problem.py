@@ -84,7 +84,7 @@ class Problem(Brief):
         (m,) point numbers, (m,) index of the star, (m,) 0 pre, 1 post, 2 event, (m, 2) plate coordinates of
         the diapositive, (m, 2, 2) weights, (m,) local apparent sidereal time.
     initial
-        (26,) parameters in the order of :data:`photogram.stellar.parameters.NAMES`.
+        (26,) parameters in the order of :data:`photogram.stellar.NAMES`.
     parameter_weights
         (26, 26) weights of these values.
     fixed

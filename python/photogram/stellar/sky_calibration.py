@@ -7,12 +7,14 @@ report's matrix leads from the left-handed north, east, zenith to them.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.arrays import length, shaped
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -38,6 +40,8 @@ __all__ = [
 
 _STILL = Earth()
 _SLACK = math.radians(2.0)
+LARGEST_SD = math.sqrt(sys.float_info.max)
+"""Whose square is a number."""
 _PER_IMAGE = 2000
 """Bytes of memory that an image takes."""
 
@@ -117,9 +121,14 @@ def project_sky(camera: SkyCamera, attitude: Floats, site: Site, places: Floats,
     """Return the pixels (n, 2) of apparent places.
 
     NaN below the horizon, behind the camera, and where distortion folds.
+
+    Raises
+    ------
+    InputError
+        Other than three angles, and two coordinates of each place.
     """
-    standard = site.standard_coordinates(places, time)
-    attitude = np.asarray(attitude, float)
+    standard = site.standard_coordinates(shaped("places", places, (length("places", places), 2)), time)
+    attitude = shaped("attitude", attitude, (3,))
     pixels = _photocore.plate_images(standard, attitude, camera.common[:-4], camera.kind)
     limit = _photocore.radial_domain(camera.facts.model, camera.model_values)
     if limit is not None:
@@ -200,15 +209,19 @@ def calibrate_exposures(
     Raises
     ------
     InputError
-        An exposure without stars; a parameter that does not exist; a standard deviation that is not positive;
-        a prior of another lens.
+        No exposures, or one without stars; a parameter that does not exist; a standard deviation that is not
+        positive, or whose square is none; a prior of another lens; fewer than one thread.
     AdjustmentError
         The stars do not determine the camera, or the memory does not hold the adjustment.
     """
+    if threads is not None and threads < 1:
+        raise InputError(f"{threads} threads are too few")
     unknown = sorted(set(fixed) - set(camera.names))
     if unknown:
         raise InputError(f"there is no camera parameter {', '.join(unknown)}")
-    if not pixel_sd > 0:
+    if not exposures:
+        raise InputError("there are no exposures")
+    if not 0 < pixel_sd < LARGEST_SD:
         raise InputError(f"the standard deviation of an image coordinate is {pixel_sd} pixels")
     if prior is not None and (prior.lens, prior.common_scale) != (camera.lens, common_scale):
         raise InputError(

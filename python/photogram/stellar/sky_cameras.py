@@ -106,7 +106,7 @@ class SkyCamera:
     covariance
         (k, k); zero for what was held, and for fy where there is a `common_scale`.
     lens
-        Name of the lens (`photogram.stellar.lenses.LENSES`).
+        Name of the lens (`photogram.stellar.LENSES`).
     common_scale
         Whether fx is the principal distance of both axes.
 

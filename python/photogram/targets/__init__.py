@@ -16,12 +16,20 @@ if TYPE_CHECKING:
     from photogram.targets.conversion import Conversion, convert_lens
     from photogram.targets.corners import Corners
     from photogram.targets.cross_validation import CrossValidation
+    from photogram.targets.drawing import (
+        draw_cross_validation,
+        draw_difference,
+        draw_uncertainty,
+        draw_uncertainty_curve,
+    )
     from photogram.targets.first_calibration import FirstCalibration, first_values, nominal_camera
     from photogram.targets.grouping import corner_components, residual_groups
     from photogram.targets.maps import UncertaintyCurve, UncertaintyMap
     from photogram.targets.new_views import Candidate, NewView, Suggestions
     from photogram.targets.output.formats import camera_files
+    from photogram.targets.plan_drawing import draw_planned_views
     from photogram.targets.reading import read
+    from photogram.targets.residual_drawing import draw_board_residuals, draw_poorest_views
     from photogram.targets.suggestions import suggest_views
     from photogram.targets.triangulation import Triangulated, distance_uncertainty, triangulate
     from photogram.targets.uncertainty import (
@@ -59,6 +67,13 @@ __all__ = [
     "cross_validate",
     "difference",
     "distance_uncertainty",
+    "draw_board_residuals",
+    "draw_cross_validation",
+    "draw_difference",
+    "draw_planned_views",
+    "draw_poorest_views",
+    "draw_uncertainty",
+    "draw_uncertainty_curve",
     "first_values",
     "nominal_camera",
     "plan_views",
@@ -92,6 +107,13 @@ _HOMES = {
     "CrossValidation": "cross_validation",
     "difference": "uncertainty",
     "distance_uncertainty": "triangulation",
+    "draw_board_residuals": "residual_drawing",
+    "draw_cross_validation": "drawing",
+    "draw_difference": "drawing",
+    "draw_planned_views": "plan_drawing",
+    "draw_poorest_views": "residual_drawing",
+    "draw_uncertainty": "drawing",
+    "draw_uncertainty_curve": "drawing",
     "first_values": "first_calibration",
     "FirstCalibration": "first_calibration",
     "NewView": "new_views",

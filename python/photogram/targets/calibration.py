@@ -73,7 +73,7 @@ class Calibration(Start):
         photo. None: through the poses of the views before and after.
     sd_sensors, sd_bend
         (K, 6) and (2,) standard deviations with which `sensors` and `bend` are known, infinite: free. Of
-        sensors those of :class:`photogram.network.unknowns.Sensor`: its position in the axes of the
+        sensors those of :class:`photogram.network.Sensor`: its position in the axes of the
         reference, rotations about its own axes in radians.
 
     Raises

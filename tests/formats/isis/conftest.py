@@ -7,9 +7,8 @@ import pytest
 
 from example_scripts import load
 from photogram import formats
-from photogram.formats.format import Wishes
-from photogram.formats.isis.reading import read_network
-from photogram.formats.isis.writing import network_text
+from photogram.formats import Wishes
+from photogram.formats.isis import network_text, read_network
 
 
 class Pair:

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from photogram import formats
-from photogram.formats.format import Wishes
-from photogram.formats.isis.reading import read_network
-from photogram.formats.isis.writing import network_text
+from photogram.formats import Wishes
+from photogram.formats.isis import network_text, read_network
 from shared_data import SHARED
 
 LRO = SHARED / "moving" / "lro"

@@ -8,16 +8,12 @@ import pytest
 import support_data
 
 from photogram import adjust, formats
+from photogram.formats import Wishes
 from photogram.formats.adjusted import adjusted
-from photogram.formats.csm.lists import read_support
-from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.csm.reading import read_isd
-from photogram.formats.format import Wishes
-from photogram.formats.isis import FORMAT
+from photogram.formats.csm import SupportedImage, read_support
+from photogram.formats.isis import FORMAT, ControlNetwork, measures_of, network_text, points_of
 from photogram.formats.isis.contents import contents_of
-from photogram.formats.isis.network import ControlNetwork, measures_of, points_of
 from photogram.formats.isis.outcome import Outcome
-from photogram.formats.isis.writing import network_text
 
 
 def moved(document, kilometres, turn=0.0):
@@ -61,7 +57,9 @@ def test_pointing_is_found_by_fixed_points(tmp_path, kind):
         moved(support_data.document(kind), 0.0 if kind == "PUSH_FRAME" else 0.4),
     ]
     paths = [support_data.written(tmp_path, each, f"{k}.json") for k, each in enumerate(documents)]
-    images = [SupportedImage(read_isd(path), f"image {k}", "isis", "isis") for k, path in enumerate(paths)]
+    images = [
+        SupportedImage(read_support(path), f"image {k}", "isis", "isis") for k, path in enumerate(paths)
+    ]
     lines, samples = (each.ravel() for each in np.mgrid[120:381:5j, 20:281:4j])
     path = network(tmp_path, images, images[0].to_ground(lines, samples, 50.0))
     for each, document in zip(paths, documents, strict=True):

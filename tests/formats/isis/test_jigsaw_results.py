@@ -10,16 +10,14 @@ import pytest
 
 from photogram import adjust
 from photogram.formats.adjusted import adjusted
+from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.angles import angle_axes, of_angles, of_quaternions, to_angles, to_quaternions
-from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.csm.reading import read_isd
-from photogram.formats.isis import FORMAT
+from photogram.formats.isis import FORMAT, binary_network, read_network
 from photogram.formats.isis.contents import contents_of
 from photogram.formats.isis.outcome import Outcome
 from photogram.formats.isis.points import full_matrices
-from photogram.formats.isis.reading import is_binary, read_network
-from photogram.formats.isis.writing import binary_network
-from photogram.network.geometry import geocentric_to_geographic
+from photogram.formats.isis.reading import is_binary
+from photogram.network import geocentric_to_geographic
 
 SETTINGS = (
     "CAMSOLVE=accelerations CAMERA_ANGLES_SIGMA=0.05 CAMERA_ANGULAR_VELOCITY_SIGMA=0.01"
@@ -171,13 +169,13 @@ def test_support_data_see_what_the_adjusted_trajectory_sees(pair, tmp_path, way)
     for side in ("left", "right"):
         path = tmp_path / f"{side}.json"
         path.write_bytes(files[f"support/{side}.json"])
-        image = SupportedImage(read_isd(path), side, "isis", "isis")
+        image = SupportedImage(read_support(path), side, "isis", "isis")
         lines, samples = random.uniform(1, [[8000], [4000]], (2, 1000))
         ground = image.to_ground(lines, samples, 300.0)
         places = geocentric_to_geographic(ground, project.block.spheroid)
         seen = result.project(f"SIM/{side}", places) + 0.5
         assert np.abs(seen - np.column_stack([samples, lines])).max() < 0.01
-        before = SupportedImage(read_isd(pair.folder / f"{side}.json"), side, "isis", "isis")
+        before = SupportedImage(read_support(pair.folder / f"{side}.json"), side, "isis", "isis")
         assert np.abs(before.to_image(ground) - np.column_stack([lines, samples])).max() > 5
 
 

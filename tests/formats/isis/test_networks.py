@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from photogram import InputError, adjust, formats
-from photogram.formats.format import Wishes
+from photogram.formats import Wishes
+from photogram.formats.isis import POINT_TYPES
 from photogram.formats.isis.contents import contents_of
-from photogram.formats.isis.network import POINT_TYPES
 from photogram.formats.isis.outcome import Outcome
-from photogram.network.geometry import geographic_to_geocentric
+from photogram.network import geographic_to_geocentric
 
 
 def xyz(project, result):

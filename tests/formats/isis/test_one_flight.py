@@ -8,10 +8,9 @@ import support_data
 from test_frames import moved, network
 
 from photogram import InputError, adjust, formats
+from photogram.formats import Wishes
 from photogram.formats.adjusted import adjusted
-from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.csm.reading import read_isd
-from photogram.formats.format import Wishes
+from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.isis import FORMAT
 from photogram.formats.isis.contents import contents_of
 from photogram.formats.isis.observations import observation_number, one_flight
@@ -58,7 +57,7 @@ def observed(tmp_path):
     documents = [support_data.document(), later(0.3)]
     paths = [support_data.written(tmp_path, each, f"{k}.json") for k, each in enumerate(documents)]
     images = [
-        SupportedImage(read_isd(path), serial, "isis", "isis")
+        SupportedImage(read_support(path), serial, "isis", "isis")
         for path, serial in zip(paths, SERIALS, strict=True)
     ]
     lines, samples = (each.ravel() for each in np.mgrid[120:381:5j, 20:281:4j])
@@ -124,11 +123,11 @@ def test_tables_of_two_flights_are_refused(observed):
 
 def test_tables_of_one_image_stay_as_they_are(observed):
     folder, _ = observed
-    isd = read_isd(folder / "0.json")
+    isd = read_support(folder / "0.json")
     both = one_flight([isd])
     np.testing.assert_array_equal(both.position.places, isd.position.places)
     np.testing.assert_array_equal(both.pointing.matrices, isd.pointing.matrices)
-    joined = one_flight([isd, read_isd(folder / "1.json")])
+    joined = one_flight([isd, read_support(folder / "1.json")])
     assert (np.diff(joined.position.times) > 0).all()
     assert len(joined.position.times) > len(isd.position.times)
 

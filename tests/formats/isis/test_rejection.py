@@ -10,12 +10,10 @@ from typer.testing import CliRunner
 
 from photogram import adjust, formats
 from photogram.cli import app
-from photogram.formats.csm.photos import SupportedImage
-from photogram.formats.csm.reading import read_isd
-from photogram.formats.format import Wishes
-from photogram.formats.isis.reading import read_network
+from photogram.formats import Wishes
+from photogram.formats.csm import SupportedImage, read_support
+from photogram.formats.isis import network_text, read_network
 from photogram.formats.isis.rejection import flagged, rejection_limit
-from photogram.formats.isis.writing import network_text
 
 WORDS = "CAMSOLVE=angles OVEREXISTING=yes CAMERA_ANGLES_SIGMA=1 OUTLIER_REJECTION=yes"
 BAD = (4, 31)
@@ -59,7 +57,9 @@ def three(tmp_path):
     """Return a folder with a network of three images, two measures of which are wrong by some pixels."""
     documents = [moved(support_data.document("FRAME"), kilometres) for kilometres in (0.0, 0.3, 0.6)]
     paths = [support_data.written(tmp_path, each, f"{k}.json") for k, each in enumerate(documents)]
-    images = [SupportedImage(read_isd(path), f"image {k}", "isis", "isis") for k, path in enumerate(paths)]
+    images = [
+        SupportedImage(read_support(path), f"image {k}", "isis", "isis") for k, path in enumerate(paths)
+    ]
     lines, samples = (each.ravel() for each in np.mgrid[120:300:5j, 60:221:5j])
     path = network(tmp_path, images, images[1].to_ground(lines, samples, 50.0))
     own = read_network(path)

@@ -105,7 +105,7 @@ def accuracy(found: float, survey: float, freedom: float, count: int) -> Accurac
 
     `found` and `survey` are RMSE_1 of the differences and RMSE_2 of the check survey in the linear unit:
     horizontal ones radial, both axes in one figure. `freedom` are effective degrees of freedom of RMSE_1, of
-    the joint covariance of its rows (:func:`photogram.statistics.freedom.effective_freedom`).
+    the joint covariance of its rows (:func:`photogram.statistics.effective_freedom`).
     """
     if not survey >= 0:
         raise InputError(f"the survey's root mean square error is not negative: {survey:g}")

@@ -37,7 +37,7 @@ class Wanted:
     name
         As it was asked for: `point C08 z`.
     items
-        What it is a function of: see :class:`photogram.results.covariance.Covariances`.
+        What it is a function of: see :class:`photogram.results.Covariances`.
     function
         Takes an array for each item; complex ones too.
     unit
