@@ -164,6 +164,37 @@ pub(super) fn add_right<S: Simd>(
     }
 }
 
+/// Adds the sum over rows of x[row] times the start of the row, for each of two x, to sums.
+#[inline(always)]
+pub(super) fn add_rows<S: Simd>(
+    simd: S,
+    sums: &mut [[S::f64s; LANES]; 2],
+    rows: &[f64],
+    stride: usize,
+    x: [&[f64]; 2],
+) {
+    for (i, row) in rows.windows(LANES).step_by(stride).take(x[0].len()).enumerate() {
+        let vectors = S::as_simd_f64s(row).0;
+        for c in 0..2 {
+            let factor = simd.splat_f64s(x[c][i]);
+            for k in 0..LANES / S::F64_LANES {
+                sums[c][k] = simd.mul_add_f64s(vectors[k], factor, sums[c][k]);
+            }
+        }
+    }
+}
+
+/// Copies a row of a block; the common sizes without a call.
+#[inline(always)]
+pub(super) fn copy_few(from: &[f64], to: &mut [f64]) {
+    match from.len() {
+        6 => to[..6].copy_from_slice(&from[..6]),
+        8 => to[..8].copy_from_slice(&from[..8]),
+        9 => to[..9].copy_from_slice(&from[..9]),
+        _ => to.copy_from_slice(from),
+    }
+}
+
 /// The product of two vectors.
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -1,14 +1,11 @@
 //! Cofactors of local blocks and of their equations, from the inverse over everything that they are tied to.
 
-mod once;
-
-use once::{OfLocal, OfShared};
-use pulp::Simd;
-use smallvec::SmallVec;
+use pulp::{NullaryFnOnce, Simd};
+use smallvec::{SmallVec, smallvec};
 
 use crate::normals::batch::{Batch, Part, Slot};
 use crate::normals::layout::Layout;
-use crate::normals::vectorised::{Kernel, LANES, Rows, dot, run, size};
+use crate::normals::vectorised::{Kernel, LANES, Rows, add_rows, copy_few, dot, run, size};
 
 /// The cofactors of the local blocks assembled in one supernode, and of their equations, in the order of the incidence.
 #[derive(Default)]
@@ -384,33 +381,56 @@ impl Others {
     }
 }
 
-/// The places of the lanes.
-const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+/// Compiled once for retained blocks of all sizes: Q_ll of a local block of a batch, with H and H Q.
+struct OfLocal<'a, S, const L: usize> {
+    simd: S,
+    others: &'a mut Others,
+    batch: &'a Batch,
+    t: usize,
+    found: &'a mut AtNode,
+}
 
-/// Adds the sum over rows of x[row] times the start of the row, for each of two x, to sums.
-#[inline(always)]
-fn add_rows<S: Simd>(simd: S, sums: &mut [[S::f64s; LANES]; 2], rows: &[f64], stride: usize, x: [&[f64]; 2]) {
-    for (i, row) in rows.windows(LANES).step_by(stride).take(x[0].len()).enumerate() {
-        let vectors = S::as_simd_f64s(row).0;
-        for c in 0..2 {
-            let factor = simd.splat_f64s(x[c][i]);
-            for k in 0..LANES / S::F64_LANES {
-                sums[c][k] = simd.mul_add_f64s(vectors[k], factor, sums[c][k]);
-            }
+impl<S: Simd, const L: usize> NullaryFnOnce for OfLocal<'_, S, L> {
+    type Output = [[f64; L]; L];
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let Self { simd, others, batch, t, found } = self;
+        others.reduce::<L>(batch, t);
+        others.multiply::<S, L>(simd);
+        others.own::<S, L>(simd, batch, t, found)
+    }
+}
+
+/// The same: what the coefficients of shared blocks make of the leverages of two rows of a group.
+struct OfShared<'a, 'b, S: Simd, const L: usize> {
+    simd: S,
+    others: &'a Others,
+    batch: &'b Batch,
+    group: Group<'b>,
+    picked: [usize; 2],
+    local: [&'a [f64; L]; 2],
+    retained: Tied<'b>,
+    form: &'a mut [[S::f64s; 2]; 2],
+}
+
+impl<S: Simd, const L: usize> NullaryFnOnce for OfShared<'_, '_, S, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { simd, others, batch, group, picked, local, retained, form } = self;
+        let mut before: SmallVec<[_; 4]> = smallvec![retained];
+        for part in batch.parts(group.p) {
+            let shared = others.shared(batch, group, picked, part);
+            others.tied(simd, form, local, &before, shared);
+            before.push(shared);
         }
     }
 }
 
-/// Copies a row of a block; the common sizes without a call.
-#[inline(always)]
-fn copy_few(from: &[f64], to: &mut [f64]) {
-    match from.len() {
-        6 => to[..6].copy_from_slice(&from[..6]),
-        8 => to[..8].copy_from_slice(&from[..8]),
-        9 => to[..9].copy_from_slice(&from[..9]),
-        _ => to.copy_from_slice(from),
-    }
-}
+/// The places of the lanes.
+const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 struct Find<'a> {
     others: &'a mut Others,
