@@ -54,8 +54,14 @@ class UnitWeight:
         return statistic / dimension / left if left > 0 else math.inf
 
     def odds(self, first: tuple[float, int], second: tuple[float, int]) -> float:
-        """Return the odds of one group against another: T and m' of each (Akaike weights)."""
+        """Return the odds of one group against another: T and m' of each (Akaike weights).
+
+        T is that of linear equations, which an error of many standard deviations bends: its third power is in
+        the difference of two that explain the same.
+        """
         (t, m), (other, n) = first, second
+        bent = BENT * max(t, other) ** 1.5
+        other = t + math.copysign(max(abs(other - t) - bent, 0.0), other - t)
         if self.known:
             exponent = (t - other) / 2
         else:
@@ -239,5 +245,7 @@ class Conditional:
         self.v[flat, places[there]] = 0.0
 
 
+BENT = 2e-5
+"""What the curvature of the equations may make of the difference of two T, in T^(3/2)."""
 RIVAL = 20.0
 """Odds from which on another group is no rival."""
