@@ -18,8 +18,6 @@ from photogram.results.snooping_result import Snooped
 from photogram.statistics.likelihood import Judged, judged
 from photogram.statistics.snooping.taking_out import Settings
 
-LEVEL = 0.01
-"""Chance that snooping takes anything out of a network without gross errors."""
 LEAST_GIVEN = 1e-5
 """Redundancy above which control, stations and distances are tested.
 
@@ -68,7 +66,7 @@ class Adjuster:
         Raises what :func:`photogram.snoop` raises.
         """
         given = {"unit_variance": "constrained", "threads": None, **self.options}
-        settings = Settings(level=LEVEL, known=False, least_given=LEAST_GIVEN)
+        settings = Settings(known=False, least_given=LEAST_GIVEN)
         return snooped_network(block, settings, parts=True, progress=None, **given)
 
     def otherwise(self, **options: Any) -> Adjuster:

@@ -7,23 +7,18 @@ import math
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.diagnosis.adjusting import LEAST_GIVEN
 from photogram.diagnosis.findings import Finding, Level, Listing, Section, small_unit
-from photogram.diagnosis.robust import mad_sd
+from photogram.diagnosis.robust import critical, mad_sd
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
 from photogram.results.suspects import observations_of_core
 from photogram.show.angles import ARCSEC
-from photogram.statistics.distributions import critical_chi_square
+from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.log import Removal
 
-TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
-"""Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
-
-Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
-value still means something.
-"""
 BLUNDER = 3.0
 TWENTIETH = 1.96
 SURE = 1e-4
@@ -52,7 +47,7 @@ def tests(result: Result) -> dict[str, Floats]:
     return {
         "image": np.nan_to_num(images),
         **{
-            name: np.where(redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(values)), 0.0)
+            name: np.where(redundancy > LEAST_GIVEN, np.nan_to_num(np.abs(values)), 0.0)
             for name, (redundancy, values) in others.items()
         },
     }
@@ -107,8 +102,8 @@ class _Told:
 
     def __init__(self, found: Snooped, block: Block, last: Result) -> None:
         self.suspects, self.block = found.suspects, block
-        self.tests = found.outcome.tests
-        self.spread = max(mad_sd(last.standardized), _tail(last))
+        count = sum(int((each > 0).sum()) for each in tests(last).values())
+        self.limit = critical(count, SURE) * max(mad_sd(last.standardized), _tail(last))
 
     def finding(self, entry: Removal) -> Finding:
         """Return the finding on anything but control."""
@@ -144,8 +139,7 @@ class _Told:
         return int(self.suspects.subjects[group])
 
     def _level(self, entry: Removal) -> Level:
-        limit = critical_chi_square(SURE / max(self.tests, 1), max(entry.dimension, 1))
-        return "grave" if entry.statistic > limit * self.spread**2 else "look"
+        return "grave" if math.sqrt(entry.statistic) > self.limit else "look"
 
     def _rivals(self, entry: Removal, kind: str) -> list[int]:
         """Return groups of a kind that may hold the error instead."""
