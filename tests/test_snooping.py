@@ -462,3 +462,34 @@ def test_what_the_rest_says_of_a_component_is_of_that_component():
     prediction = Prediction(9.0, (59, 60, 61), (4.0, -7.0, -4792.0), (0.4, 7.0, 60.0))
     found = with_prediction(SimpleNamespace(predicted={0: (prediction, -3.0)}, log=[entry]), 0)
     assert found["prediction_error"] == (-4792.0,)
+
+
+@pytest.mark.parametrize("unit_weight", ["known", "unknown"])
+def test_loose_weights_of_photos_cost_no_good_image(unit_weight):
+    # Their standard deviations are those of the datum: rounds that end early would rest on nothing.
+    block = photogram.simulate(points_per_photo=40, seed=1).block
+    rays = np.bincount(block.image_points)
+    rows = np.flatnonzero(rays[block.image_points] >= 4)[[20, 120]]
+    xy = block.image_xy.copy()
+    xy[rows, 1] += [0.2, -0.3]
+    loose = block.replace(
+        image_xy=xy,
+        point_positions=np.full_like(block.point_positions, np.nan),
+        point_sd=np.array(np.inf),
+        photo_position_sd=np.array(60000.0),
+        photo_attitude_sd=np.array(np.pi / 2),
+    )
+    found = photogram.snoop(loose, unit_weight=unit_weight)
+    names = {
+        f"image of point {block.point_ids[block.image_points[row]]} on photo"
+        f" {block.photo_ids[block.image_photos[row]]}"
+        for row in rows.tolist()
+    }
+    assert {entry.name for entry in found.removed} == names
+
+
+def test_what_cannot_be_tested_says_so_with_any_unit_variance():
+    block = photogram.simulate(points_per_photo=40, seed=1).block
+    xy = np.random.default_rng(2).uniform(-100, 100, block.image_xy.shape)
+    with pytest.raises(photogram.AdjustmentError, match="cannot be tested"):
+        photogram.snoop(block.replace(image_xy=xy), unit_variance="redundancy")

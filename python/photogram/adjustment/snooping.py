@@ -205,9 +205,10 @@ def _snoop_block(
         outcome = snooped(trial, settings, afresh)
     except (LostSupportError, _photocore.BlockError):
         # It says by name what is not determined, or goes on where points have to leave.
-        first = adjusted(block, covariance=False)
+        covariance = unit_variance == "redundancy"
+        first = adjusted(block, covariance=covariance)
         if not first.converged and settings.robust is not False:
-            first = adjusted(block, covariance=False, loss="huber")
+            first = adjusted(block, covariance=covariance, loss="huber")
         trial, outcome = _snooped_from(first, settings, threads, parts=parts)
     cleaned, options = _without(block, trial, outcome.out), core_options(unit_variance, None)
     result = adjusted_from(cleaned, options, threads=threads, progress=progress)

@@ -18,7 +18,14 @@ import numpy as np
 from photogram.adjustment.resection import Observed, solve
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.findings import Section, note, note_all
-from photogram.diagnosis.hypotheses import TURNS, Hypothesis, attitude_readings, hypotheses
+from photogram.diagnosis.hypotheses import (
+    TURNS,
+    Hypothesis,
+    attitude_readings,
+    hypotheses,
+    images_turned,
+    turn_of,
+)
 from photogram.diagnosis.regression import (
     LEAST,
     MOST,
@@ -205,8 +212,9 @@ def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
         looked = view(block, own)
         given = float(misfits(looked, own)[0])
         fitting = []
-        for name, (turn, text) in TURNS.items():
-            change = partial(_turned, photo=block.photo_ids[photo], turn=np.array(turn, dtype=np.float64))
+        for name, (_, text) in TURNS.items():
+            photo_alone = np.arange(len(block.photo_ids)) == photo
+            change = partial(images_turned, photos=photo_alone, turn=turn_of(name))
             left = float(misfits(change(looked), own)[0])
             if left < PASSES * given and left < SUSPICION:
                 fitting.append((left, Hypothesis(name, text, change)))
@@ -215,12 +223,6 @@ def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
             by_names.setdefault(names, (fitting, given, []))[2].append(block.photo_ids[photo])
     for fitting, given, photo_ids in by_names.values():
         yield Verdict(fitting, given, photo_ids)
-
-
-def _turned(block: Block, photo: str, turn: Floats) -> Block:
-    """Return a block with the images of one photo turned or mirrored."""
-    own = (block.image_photos == block.photo_ids.index(photo))[:, np.newaxis]
-    return block.replace(image_xy=np.where(own, block.image_xy @ turn, block.image_xy))
 
 
 def _latitudes(block: Block) -> list[Message]:

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.regression import Regression, given_points
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.attitudes import Attitudes, Representation
@@ -61,6 +61,17 @@ Change = Callable[[Block], Block]
 """Makes of a block as given the one that was meant."""
 
 
+def turn_of(name: str) -> Floats:
+    """(2, 2) V of one of the turns."""
+    return np.array(TURNS[name][0], dtype=np.float64)
+
+
+def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
+    """Return a block with the images of (P,) some photos turned back: V' observed."""
+    own = photos[block.image_photos][:, np.newaxis]
+    return block.replace(image_xy=np.where(own, block.image_xy @ turn, block.image_xy))
+
+
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A mistake that may have been made.
@@ -85,9 +96,9 @@ class Hypothesis:
 
 def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Hypothesis]:
     """Propose mistakes for a block; `seen` says how its images and their predictions differ."""
-    for name, (turn, text) in TURNS.items():
-        # predicted = V' observed
-        yield Hypothesis(name, text, partial(_of_images, shift=np.zeros(2), linear=np.array(turn, float)))
+    every = np.ones(len(block.photo_ids), dtype=bool)
+    for name, (_, text) in TURNS.items():
+        yield Hypothesis(name, text, partial(images_turned, photos=every, turn=turn_of(name)))
     composed = None if seen is None else image_hypothesis(block, seen)
     if composed is not None:
         yield composed

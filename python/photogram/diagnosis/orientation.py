@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.findings import Finding, Section, Words
+from photogram.diagnosis.hypotheses import images_turned, turn_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import Intersection, Rays, frame_radius, meet
@@ -26,10 +27,10 @@ MOST = 20
 """Photos that are turned one by one, at most."""
 TURNS = {"by 180 degrees": math.pi, "by 90 degrees": math.pi / 2, "by -90 degrees": -math.pi / 2}
 MIRRORS = {
-    "x has the wrong sign": np.array([[-1.0, 0.0], [0.0, 1.0]]),
-    "y has the wrong sign": np.array([[1.0, 0.0], [0.0, -1.0]]),
-    "x and y are exchanged": np.array([[0.0, 1.0], [1.0, 0.0]]),
-    "x and y are exchanged, with wrong signs": np.array([[0.0, -1.0], [-1.0, 0.0]]),
+    "x has the wrong sign": turn_of("mirrored"),
+    "y has the wrong sign": turn_of("y down"),
+    "x and y are exchanged": turn_of("exchanged"),
+    "x and y are exchanged, with wrong signs": turn_of("exchanged and turned"),
 }
 """The four reflections that keep a frame in place, by what brings them about."""
 
@@ -189,11 +190,6 @@ def _sign_changed(block: Block, photos: Bools) -> Block:
     return block.replace(principal_distances=changed, cameras=(), photo_cameras=None)
 
 
-def _mirrored(block: Block, photos: Bools, mirror: Floats) -> Block:
-    images = photos[block.image_photos][:, np.newaxis]
-    return block.replace(image_xy=np.where(images, block.image_xy @ mirror.T, block.image_xy))
-
-
 def _whole_block(block: Block, before: float, words: Words, explanations: list[Finding]) -> Block:
     """Look for one explanation for all photos, or for all of one principal distance."""
     trials = _trials(block, words)
@@ -244,7 +240,7 @@ def _trials(block: Block, words: Words) -> list[_Trial]:
             trials.append(_Trial("kappa", text, names, _turned(block, photos, TURNS[turn])))
         for what, mirror in MIRRORS.items():
             text = f"the plates of {name} are mirrored: {what}; put right, the rays meet."
-            trials.append(_Trial("mirrored", text, names, _mirrored(block, photos, mirror)))
+            trials.append(_Trial("mirrored", text, names, images_turned(block, photos, mirror)))
     text = f"the angles are of the other sense ({words.sense}): taken so, the rays meet."
     other = block.replace(photo_to_ground=not block.photo_to_ground)
     return [*trials, _Trial("sense-of-rotation", text, list(block.photo_ids), other)]
@@ -295,7 +291,7 @@ def _photo_trials(block: Block) -> list[_PhotoTrial]:
         text = (
             f"the plate of photo {{}} is mirrored: {what}; put right, its rays meet those of the other photos"
         )
-        trials.append(_PhotoTrial("mirrored", text, partial(_mirrored, block, mirror=mirror)))
+        trials.append(_PhotoTrial("mirrored", text, partial(images_turned, block, turn=mirror)))
     return trials
 
 

@@ -6,26 +6,20 @@ error nor those of others left out with it are in it.
 
 from __future__ import annotations
 
-import math
 from itertools import combinations
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.robust import normal_of_chi_square
 from photogram.diagnosis.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.results.result import Result
+from photogram.statistics.exchanges import are_exchanged
+from photogram.statistics.likelihood import judged
 
 FEWEST = 3
 """Control points that tell which two of them are exchanged."""
-BETTER, RUNNER_UP = 25.0, 10.0
-"""How many times the sum of squares must go down, and the log likelihood ratio to the next best."""
-FITS = 3.0902
-"""Normal value of the chance of 0.001 by which coordinates that are right may disagree with a prediction."""
-CHANCE = 1e-4
-"""Chance that one of the pairs that are tried agrees better when exchanged, though it is not exchanged."""
 
 
 def freed(block: Block, points: Indices) -> Block:
@@ -73,29 +67,26 @@ def tests_of_predictions(
 def exchanged_pair(result: Result, given: Block, points: Indices, spread: float) -> tuple[int, int] | None:
     """Return the two points that agree with each other's predictions, not with their own, if there are two.
 
-    Accepted when the exchanged coordinates pass their test, and chi-square goes down by more than
-    2 ln(pairs / :data:`CHANCE`). Correlations between the predictions of two points are left out. Parameters
-    are those of :func:`tests_of_predictions`.
+    By :func:`are_exchanged`; correlations between the predictions of two points are left out. Parameters are
+    those of :func:`tests_of_predictions`.
     """
     pairs = list(combinations(points.tolist(), 2))
     best: tuple[float, int, int] | None = None
     for one, other in pairs:
         own, freedom = _disagreement(result, given, [one, other], [one, other], spread)
         swapped, _ = _disagreement(result, given, [one, other], [other, one], spread)
-        better = own - swapped > 2 * math.log(len(pairs) / CHANCE)
-        if freedom and better and normal_of_chi_square(swapped, freedom) < FITS:
-            gain = own - swapped
-            if best is None or gain > best[0]:
-                best = gain, one, other
+        gain = own - swapped
+        if are_exchanged(own, swapped, freedom, pairs=len(pairs)) and (best is None or gain > best[0]):
+            best = gain, one, other
     return None if best is None else (best[1], best[2])
 
 
 def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
     """Return the two control points that are exchanged by what the initial stations say, if there are two.
 
-    For blocks that do not converge and have too few control points for predictions. Exchanging the names
-    must bring control and intersections together 25 times better, and far better than exchanging any other
-    two; a common shift is allowed for.
+    For blocks that do not converge and have too few control points for predictions. Coarse stations have no
+    covariances: exchanging the names must explain what control and intersections differ by, and exchanging
+    any other two must not (:func:`judged`); a common shift is allowed for.
     """
     rays = Rays.of(View.of(block).seen)
     met = rays.intersect().positions
@@ -112,11 +103,10 @@ def exchanged_where_rays_meet(block: Block) -> tuple[int, int] | None:
     own = np.diag(squares)
     after = own.sum() - own[:, np.newaxis] - own + squares + squares.T
     after = after[np.triu_indices(len(points), 1)]
-    freedom, order = 2 * len(points) - 2, np.argsort(after, kind="stable")
-    best, next_best = np.maximum(after[order[:2]], np.finfo(np.float64).tiny)
-    if own.sum() < BETTER * best or freedom * math.log(next_best / best) < RUNNER_UP:
+    verdict = judged(float(own.sum()), after.tolist(), 2 * len(points) - 2)
+    if verdict is None or not verdict.accepted:
         return None
-    one, other = (index[order[0]] for index in np.triu_indices(len(points), 1))
+    one, other = (index[verdict.best[0]] for index in np.triu_indices(len(points), 1))
     return int(points[one]), int(points[other])
 
 

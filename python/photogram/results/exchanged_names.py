@@ -6,7 +6,7 @@ have put them. Images i and j of a photo are exchanged when T of both points as 
 
     T(exchanged) + 2 ln(k / 0.0001),    T(exchanged) < 3 max(1, s^2) chi2(0.999; m)
 
-for k pairs that are looked at and m degrees of freedom: the factor 3 stands for what photos are uncertain by.
+(:mod:`photogram.statistics.exchanges`): the factor 3 stands for what photos are uncertain by.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, meet
-from photogram.statistics.distributions import critical_chi_square
+from photogram.statistics.exchanges import are_exchanged
 
 MOST = 40
 """Images of a photo that are out; with more of them it is the photo."""
-LEVEL, CHANCE = 0.001, 1e-4
 UNCERTAIN = 3.0
 """By how much photos, which are taken for known, may raise T."""
 STEPS = 4
@@ -100,12 +99,9 @@ def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Ex
         as_named = found[i, i][0] + found[j, j][0]
         left = found[i, j][0] + found[j, i][0]
         dimension = found[i, j][1] + found[j, i][1]
-        if not (math.isfinite(left) and dimension > 0):
-            continue
-        limit = UNCERTAIN * max(variance, 1.0) * critical_chi_square(LEVEL, dimension)
         better = all(found[a, b][0] < found[a, a][0] for a, b in ((i, j), (j, i)))
-        gain = 2 * math.log(len(pairs) / CHANCE) * max(variance, 1.0)
-        if better and left < limit and as_named - left > gain:
+        spread = {"variance": max(variance, 1.0), "uncertain": UNCERTAIN}
+        if better and are_exchanged(as_named, left, dimension, pairs=len(pairs), **spread):
             one, other = sorted((int(plain.image_points[i]), int(plain.image_points[j])))
             photo = int(plain.image_photos[i])
             passing.setdefault((one, other), []).append((left, as_named, dimension, photo))

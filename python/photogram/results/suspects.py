@@ -36,6 +36,8 @@ ROUGH = 2.0
 rounds that follow start there, and the last takes nothing out: what it decides on is as good as exact."""
 EXACT = 1e-7
 """The same where R of all rows is used: a small network."""
+LOOSE = 0.1
+"""Standard deviation of positions, in the extent of the block, that hardly gives it a datum."""
 
 
 def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:
@@ -48,9 +50,21 @@ def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = 
         core=core,
         suspects=block_suspects(block, core.suspects, parts=parts),
         supported=np.asarray(np.isfinite(deviations).all(axis=1) | on_shared),
-        rough=ROUGH,
+        rough=EXACT if _datum_is_loose(block) else ROUGH,
         exact=EXACT,
     )
+
+
+def _datum_is_loose(block: Block) -> bool:
+    """Whether nothing but loose weights of photos places a block.
+
+    Standard deviations of its unknowns are those of the datum then: a step may be small beside them and leave
+    partials that contradict the cofactors by hundreds.
+    """
+    position_sd = block.photo_position_sd[:, :2]
+    extent = np.ptp(block.photo_positions[:, :2], axis=0).max(initial=0.0)
+    firm = np.isfinite(block.point_sd).any() or (position_sd < LOOSE * extent).any()
+    return bool(np.isfinite(position_sd).any() and not firm)
 
 
 def observations_of_core(block: Block) -> list[Observation]:

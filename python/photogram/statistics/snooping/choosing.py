@@ -97,6 +97,8 @@ class Choosing:
         How many groups are out already.
     ahead
         Whether to look for groups that hide each other where none is significant.
+    alone
+        (G,) groups whose errors show in the residuals of others, near and far: each has a round of its own.
     """
 
     trial: Trial
@@ -107,6 +109,7 @@ class Choosing:
     level: Level
     out: int
     ahead: bool
+    alone: Bools
 
     @property
     def suspects(self) -> Suspects:
@@ -196,8 +199,12 @@ class Choosing:
         found = self._on_points(candidates)
         found.sort(key=lambda choice: (choice.chosen.log_probability, -choice.chosen.statistic, choice.group))
         load = _Load(self.suspects, self.tests)
-        kept = []
+        kept: list[Choice] = []
         for choice in found:
+            if self.alone[choice.group]:
+                if not kept:
+                    return [choice]
+                continue
             critical = _critical(self.unit, choice.chosen.dimension, limit) * self.scales[choice.group]
             if load.leaves(choice, critical):
                 load.add(choice)
