@@ -493,3 +493,19 @@ def test_what_cannot_be_tested_says_so_with_any_unit_variance():
     xy = np.random.default_rng(2).uniform(-100, 100, block.image_xy.shape)
     with pytest.raises(photogram.AdjustmentError, match="cannot be tested"):
         photogram.snoop(block.replace(image_xy=xy), unit_variance="redundancy")
+
+
+@pytest.mark.parametrize("size", [-1.0, -3.0])
+def test_one_ray_of_three_in_a_row_is_never_named_alone(size):
+    # All three explain the same; what tells them apart is what so large an error makes of linear equations.
+    block = photogram.simulate(
+        strips=4, photos_per_strip=6, points_per_photo=53, side_overlap=0.3, control_sd=0.5, seed=3001
+    ).block
+    photos, point = ["0403", "0404", "0405"], block.point_ids.index("P000241")
+    rows = np.flatnonzero(block.image_points == point)
+    assert [block.photo_ids[photo] for photo in block.image_photos[rows]] == photos
+    xy = block.image_xy.copy()
+    xy[rows[1], 0] += size
+    removed, *_ = photogram.snoop(block.replace(image_xy=xy)).removed
+    named = {removed.name, *(rival.name for rival in removed.in_dispute)}
+    assert named == {f"image of point P000241 on photo {photo}" for photo in photos}
