@@ -10,20 +10,11 @@ from typing import Any
 import numpy as np
 
 from photogram.adjustment.adjustment import adjust
-from photogram.adjustment.snooping import snooped_network
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
 from photogram.results.result import Result
-from photogram.results.snooping_result import Snooped
 from photogram.statistics.likelihood import Judged, judged
-from photogram.statistics.snooping.taking_out import Settings
 
-LEAST_GIVEN = 1e-5
-"""Redundancy above which control, stations and distances are tested.
-
-Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
-value still means something.
-"""
 KEPT = 2
 """Adjustments that are remembered."""
 
@@ -59,15 +50,6 @@ class Adjuster:
         """Adjust a block; None where that cannot be done, or does not converge."""
         found = self.tried(block)
         return found if found is not None and found.converged else None
-
-    def snooped(self, block: Block) -> Snooped:
-        """Take gross errors out of a block whose standard deviations may be wrong by a common factor.
-
-        Raises what :func:`photogram.snoop` raises.
-        """
-        given = {"unit_variance": "constrained", "threads": None, **self.options}
-        settings = Settings(known=False, least_given=LEAST_GIVEN)
-        return snooped_network(block, settings, parts=True, progress=None, **given)
 
     def otherwise(self, **options: Any) -> Adjuster:
         """Return one with other options."""

@@ -125,7 +125,7 @@ class ReliabilitySummary:
     @property
     def testable(self) -> Bools:
         """(G,) which groups have a direction whose errors show notably in their own residuals."""
-        return self.tests.testable(self.suspects.row_starts, TESTABLE)
+        return self.tests.testable(self.suspects.row_starts)
 
     def table(self) -> pd.DataFrame:
         """Return the weakest observations as a data frame."""

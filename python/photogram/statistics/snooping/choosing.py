@@ -97,8 +97,6 @@ class Choosing:
         How many groups are out already.
     ahead
         Whether to look for groups that hide each other where none is significant.
-    alone
-        (G,) groups whose errors show in the residuals of others, near and far: each has a round of its own.
     """
 
     trial: Trial
@@ -109,7 +107,6 @@ class Choosing:
     level: Level
     out: int
     ahead: bool
-    alone: Bools
 
     @property
     def suspects(self) -> Suspects:
@@ -199,12 +196,8 @@ class Choosing:
         found = self._on_points(candidates)
         found.sort(key=lambda choice: (choice.chosen.log_probability, -choice.chosen.statistic, choice.group))
         load = _Load(self.suspects, self.tests)
-        kept: list[Choice] = []
+        kept = []
         for choice in found:
-            if self.alone[choice.group]:
-                if not kept:
-                    return [choice]
-                continue
             critical = _critical(self.unit, choice.chosen.dimension, limit) * self.scales[choice.group]
             if load.leaves(choice, critical):
                 load.add(choice)

@@ -15,8 +15,6 @@ class Rival:
 
     Attributes
     ----------
-    group
-        Its number among all groups.
     name
         What it is called.
     statistic, dimension
@@ -25,7 +23,6 @@ class Rival:
         That of the two the chosen one errs, to one.
     """
 
-    group: int
     name: str
     statistic: float
     dimension: int

@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.statistics.reliability import TESTABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,13 +165,10 @@ class Tests:
     error: Floats
     error_sd: Floats
 
-    def testable(self, row_starts: Indices, least: Floats | float) -> Bools:
-        """Return (G,) which groups have a direction whose errors show notably in their own residuals.
-
-        `least`: redundancy above which they do, of all groups or of each.
-        """
+    def testable(self, row_starts: Indices) -> Bools:
+        """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
         largest = np.maximum.reduceat(np.nan_to_num(self.redundancy), row_starts[:-1])
-        return np.asarray(self.active & (self.rank > 0) & (largest > least))
+        return np.asarray(self.active & (self.rank > 0) & (largest > TESTABLE))
 
 
 @dataclass(frozen=True)

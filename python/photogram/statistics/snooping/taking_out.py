@@ -11,7 +11,6 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
-from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.choosing import Choice, Choosing, Level
 from photogram.statistics.snooping.conditioning import UnitWeight
 from photogram.statistics.snooping.log import Removal, Rival, Round
@@ -42,8 +41,6 @@ class Settings:
         Whether to start robustly; None where many observations are wrong.
     max_rounds
         Rounds at the most.
-    least_given
-        Redundancy above which what is no image (control, stations, distances) is tested.
     """
 
     level: float = LEVEL
@@ -51,7 +48,6 @@ class Settings:
     known: bool = True
     robust: bool | None = None
     max_rounds: int = 20
-    least_given: float = TESTABLE
 
 
 RESCUES = 5
@@ -106,7 +102,6 @@ class TakingOut:
             level=self.level,
             out=out,
             ahead=ahead,
-            alone=self.elsewhere(),
         )
 
     def note_round(
@@ -142,15 +137,7 @@ class TakingOut:
 
     def testable(self) -> Bools:
         """Return (G,) which groups have a direction whose errors show notably in their own residuals."""
-        least = np.where(self.suspects.kinds == 0, TESTABLE, self.settings.least_given)
-        return self.tests.testable(self.suspects.row_starts, least)
-
-    def elsewhere(self) -> Bools:
-        """Return (G,) which groups are tested though their errors hardly show in their own residuals.
-
-        Such an error shows in the residuals of others, near and far.
-        """
-        return np.asarray(self.testable() & ~self.tests.testable(self.suspects.row_starts, TESTABLE))
+        return self.tests.testable(self.suspects.row_starts)
 
     def as_it_was(self, group: int, tests: Tests) -> Removal:
         """Return the entry of a group that goes without a test of its own."""
@@ -177,7 +164,7 @@ class TakingOut:
             own = choice.chosen
             deviations = self.trial.deviations[own.rows]
             rivals = tuple(
-                Rival(group, self.suspects.name(group), statistic, dimension, odds)
+                Rival(self.suspects.name(group), statistic, dimension, odds)
                 for group, statistic, dimension, odds in own.rivals
             )
             entries.append(

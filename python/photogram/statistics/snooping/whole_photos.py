@@ -26,8 +26,8 @@ def take_bad_photos_out(work: TakingOut) -> None:
     """Take out as one group each photo whose images all disagree: those of another exposure, wrong names.
 
     Such a photo spoils all around it, so that nothing can be told of single images. The median of its
-    test values stands out: a few gross errors do not move it. Where that is by its observed station, or by
-    control whose errors show elsewhere, the photo stays, and what it is by is left to its own test.
+    test values stands out: a few gross errors do not move it. Where that is by its observed station, the
+    photo stays, and the station is left to its own test.
     """
     for _ in range(BAD_PHOTOS):
         middles = _middles(work)
@@ -37,7 +37,6 @@ def take_bad_photos_out(work: TakingOut) -> None:
         single = middles[worst] < EVEN * _largest(work, worst)
         if (
             single
-            or middles[worst] < _sizes(work)[work.elsewhere()].max(initial=0.0)
             or not middles[worst] > FAR * max(usual, 1.0)
             or _is_by_station(work, worst, middles[worst])
         ):
@@ -135,19 +134,14 @@ def _largest(work: TakingOut, photo: int) -> float:
     """Return the largest test value of the images of a photo, in standard deviations."""
     own = work.suspects.on_photo(photo)
     own = own[(work.suspects.kinds[own] == 0) & work.testable()[own]]
-    return float(_sizes(work)[own].max(initial=0.0))
-
-
-def _sizes(work: TakingOut) -> Floats:
-    """(G,) test values, in standard deviations."""
-    return np.asarray(np.sqrt(work.tests.statistic / np.maximum(work.tests.rank, 1)))
+    return float(np.sqrt(work.tests.statistic[own] / work.tests.rank[own]).max(initial=0.0))
 
 
 def _middles(work: TakingOut) -> Floats:
     """Return the median of the test values of the images of each photo, in standard deviations."""
-    suspects = work.suspects
+    suspects, tests = work.suspects, work.tests
     tested = (suspects.kinds == 0) & work.testable()
-    size = _sizes(work)
+    size = np.sqrt(tests.statistic / np.maximum(tests.rank, 1))
     photos = int(suspects.photos.max(initial=-1)) + 1
     found: Floats = np.full(photos, math.nan)
     for photo in range(photos):
