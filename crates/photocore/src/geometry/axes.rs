@@ -7,11 +7,14 @@ pub type Vector3 = nalgebra::Vector3<f64>;
 /// A matrix in cartesian axes.
 pub type Matrix3 = nalgebra::Matrix3<f64>;
 
-/// Sweeps of an eigenvalue decomposition at the most: more where a matrix is not finite.
+/// Sweeps of an eigenvalue decomposition at the most.
 const SWEEPS: usize = 1000;
 
 /// Eigenvalues of a symmetric matrix, the largest first, and its unit eigenvectors as columns; None where it is not finite.
 pub(crate) fn principal_axes(matrix: &Matrix3) -> Option<(Vector3, Matrix3)> {
+    if !matrix.iter().all(|element| element.is_finite()) {
+        return None;
+    }
     let eigen = matrix.try_symmetric_eigen(f64::EPSILON, SWEEPS)?;
     let values = eigen.eigenvalues;
     let falling = order(3, &|a, b| values[b].total_cmp(&values[a]));
