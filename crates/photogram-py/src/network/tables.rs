@@ -69,14 +69,12 @@ impl Told {
 }
 
 /// Fills a column with one part of everything that takes part, and `missing` of all else, on one of the threads.
-fn fill<'s, T: Sync, P: Copy + Send>(
+fn fill<'s, T: Sync, P: Copy + Send + 's>(
     scope: &Scope<'s>,
     column: &'s mut Vec<P>,
     all: &'s [Option<T>],
     missing: P,
     part: impl Fn(&T) -> P + Send + 's,
-) where
-    P: 's,
-{
+) {
     scope.spawn(move |_| *column = all.iter().map(|own| own.as_ref().map_or(missing, &part)).collect());
 }
