@@ -185,7 +185,7 @@ pub fn over_plane(pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
     homography(pairs).map_or(vec![], |h| poses(&h, pairs))
 }
 
-/// H with u2 x (H u1) = 0 and unit middle singular value.
+/// H with u2 x (H u1) = 0, of any size.
 fn homography(pairs: &[[Vector3; 2]; 4]) -> Option<Matrix3> {
     let mut equations = Equations::zeros();
     for (pair, [first, second]) in pairs.iter().enumerate() {
@@ -196,16 +196,18 @@ fn homography(pairs: &[[Vector3; 2]; 4]) -> Option<Matrix3> {
     }
     let rows = right_vectors(equations)?;
     let h = Matrix3::from_fn(|i, j| rows[(8, 3 * i + j)]);
-    let middle = principal_axes(&h.tr_mul(&h))?.0[1].sqrt();
     let forward: f64 = pairs.iter().map(|[first, second]| second.dot(&(h * first))).sum();
-    (middle > 0.0).then(|| h * forward.signum() / middle)
+    Some(h * forward.signum())
 }
 
 fn poses(h: &Matrix3, pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
     let Some((squares, axes)) = principal_axes(&h.tr_mul(h)) else { return vec![] };
     let [v1, v2, v3] = [0, 1, 2].map(|k| Vector3::from(axes.column(k)));
-    let (large, small) = (squares[0], squares[2]);
-    if large - small < NO_BASE {
+    // The middle singular value is to be one.
+    let h = h / squares[1].sqrt();
+    let (large, small) = (squares[0] / squares[1], squares[2] / squares[1]);
+    let has_base = squares[1] > 0.0 && large - small >= NO_BASE;
+    if !has_base {
         return vec![];
     }
     let (p, q) = ((1.0 - small).max(0.0).sqrt(), (large - 1.0).max(0.0).sqrt());
