@@ -21,6 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
 
+LARGEST_SD = math.sqrt(sys.float_info.max)
+"""Standard deviations beyond have no variance."""
 _SYMMETRIC = 1e-9
 """What a covariance matrix may be unsymmetric by, relative to its diagonal."""
 _ROUNDING = 1e-6

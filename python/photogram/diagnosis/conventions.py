@@ -208,13 +208,12 @@ def _single(block: Block, photos: Indices) -> Iterator[Verdict]:
     """Try photos one by one, the others being right."""
     by_names: dict[tuple[str, ...], tuple[list[tuple[float, Hypothesis]], float, list[str]]] = {}
     for photo in photos.tolist():
-        own = np.array([photo])
+        own, alone = np.array([photo]), np.arange(len(block.photo_ids)) == photo
         looked = view(block, own)
         given = float(misfits(looked, own)[0])
         fitting = []
         for name, (_, text) in TURNS.items():
-            photo_alone = np.arange(len(block.photo_ids)) == photo
-            change = partial(images_turned, photos=photo_alone, turn=turn_of(name))
+            change = partial(images_turned, photos=alone, turn=turn_of(name))
             left = float(misfits(change(looked), own)[0])
             if left < PASSES * given and left < SUSPICION:
                 fitting.append((left, Hypothesis(name, text, change)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import is_covariance, number, one_of, shaped, shown, text
+from photogram.arguments.arrays import LARGEST_SD, is_covariance, number, one_of, shaped, shown, text
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -25,8 +24,6 @@ Weights = Literal["corrected", "measured"]
 
 _MEASURED = "_measured"
 """What the core calls backward cameras whose residuals lie in the measured image."""
-_SQUARED = math.sqrt(sys.float_info.max)
-"""Standard deviations beyond have no variance."""
 
 ImageUnit = Literal["mm", "px"]
 """What image coordinates are measured in."""
@@ -273,7 +270,7 @@ class Camera(Valued, Brief):
         for name, value in given.items():
             if not value >= 0:
                 raise InputError(f"sd of {name} of the camera {self.title} is no standard deviation: {value}")
-            if _SQUARED < value < math.inf:
+            if LARGEST_SD < value < math.inf:
                 raise InputError(
                     f"sd of {name} of the camera {self.title} is too large for a variance: {value};"
                     " infinity leaves the parameter free"

@@ -100,8 +100,9 @@ def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Ex
         left = found[i, j][0] + found[j, i][0]
         dimension = found[i, j][1] + found[j, i][1]
         better = all(found[a, b][0] < found[a, a][0] for a, b in ((i, j), (j, i)))
-        spread = {"variance": max(variance, 1.0), "uncertain": UNCERTAIN}
-        if better and are_exchanged(as_named, left, dimension, pairs=len(pairs), **spread):
+        if better and are_exchanged(
+            as_named, left, dimension, pairs=len(pairs), variance=max(variance, 1.0), uncertain=UNCERTAIN
+        ):
             one, other = sorted((int(plain.image_points[i]), int(plain.image_points[j])))
             photo = int(plain.image_photos[i])
             passing.setdefault((one, other), []).append((left, as_named, dimension, photo))

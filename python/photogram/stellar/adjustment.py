@@ -13,6 +13,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.stellar import report_iteration, strict
 from photogram.stellar.movement import combine, movement, pairs_to_combine
+from photogram.stellar.options import core_threads
 from photogram.stellar.outliers import culprits, harm, outliers
 from photogram.stellar.parameters import GROUPS, INDEX
 from photogram.stellar.problem import Problem, degrees_of_freedom
@@ -51,8 +52,7 @@ def calibrate(
     KeyboardInterrupt
         Ctrl-C.
     """
-    if threads is not None and threads < 1:
-        raise InputError(f"{threads} threads are too few")
+    core_threads(threads)  # refused here, whatever iterates
     iterate = (
         report_iteration.iterate
         if problem.options.as_published

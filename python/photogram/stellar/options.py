@@ -17,6 +17,13 @@ _STEPS = 10_000
 """Of a curve: a table and a page have a row for each."""
 
 
+def core_threads(threads: int | None) -> int:
+    """Return the number of threads for the core; 0 leaves it to the core."""
+    if threads is not None and threads < 1:
+        raise InputError(f"{threads} threads are too few")
+    return threads or 0
+
+
 @dataclass(frozen=True)
 class Options:
     """How to adjust, and what to compute.

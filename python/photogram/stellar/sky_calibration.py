@@ -7,20 +7,20 @@ report's matrix leads from the left-handed north, east, zenith to them.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import length, shaped
+from photogram.arguments.arrays import LARGEST_SD, length, shaped
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import available_memory
 from photogram.messages import listed
 from photogram.stellar.catalogue import Catalogue
+from photogram.stellar.options import core_threads
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.problem import weight_root
@@ -40,8 +40,6 @@ __all__ = [
 
 _STILL = Earth()
 _SLACK = math.radians(2.0)
-LARGEST_SD = math.sqrt(sys.float_info.max)
-"""Whose square is a number."""
 _PER_IMAGE = 2000
 """Bytes of memory that an image takes."""
 
@@ -214,8 +212,7 @@ def calibrate_exposures(
     AdjustmentError
         The stars do not determine the camera, or the memory does not hold the adjustment.
     """
-    if threads is not None and threads < 1:
-        raise InputError(f"{threads} threads are too few")
+    processors = core_threads(threads)
     unknown = sorted(set(fixed) - set(camera.names))
     if unknown:
         raise InputError(f"there is no camera parameter {', '.join(unknown)}")
@@ -237,7 +234,7 @@ def calibrate_exposures(
     core = _core(images, exposures, camera, place, free, prior, pixel_sd)
     try:
         found = core.adjust(
-            unit=1.0, fraction=1e-5, max_iterations=100, covariance=True, threads=threads or 0, progress=None
+            unit=1.0, fraction=1e-5, max_iterations=100, covariance=True, threads=processors, progress=None
         )
     except _photocore.StellarError as error:
         undetermined = _undetermined(error, camera, len(exposures))
