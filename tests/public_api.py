@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 LIST = Path(__file__).with_name("public_api.txt")
 
@@ -51,16 +52,22 @@ def members(name: str, kind: type) -> Iterator[str]:
 def packages(name: str = "photogram") -> Iterator[str]:
     """Return the names of a public package and of those in it."""
     yield name
-    for inner in getattr(import_module(name), "MODULES", ()):
+    home = import_module(name)
+    for inner in {*home.__all__} - {*names(home)}:
         yield from packages(f"{name}.{inner}")
+
+
+def names(package: ModuleType) -> list[str]:
+    """Return the public names of a package that are no packages themselves."""
+    return [name for name in sorted(package.__all__) if not inspect.ismodule(getattr(package, name))]
 
 
 def lines() -> list[str]:
     """Return the whole list."""
     found = []
-    for module in packages():
+    for module in sorted(packages()):
         home = import_module(module)
-        for own in sorted(home.__all__):
+        for own in names(home):
             value, name = getattr(home, own), f"{module}.{own}"
             if inspect.isclass(value):
                 found += [f"{name}{arguments(value)}", *members(name, value)]

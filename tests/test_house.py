@@ -38,7 +38,7 @@ FLOORS = (
     ("memory",),
     ("errors",),
     ("messages",),
-    ("on_demand", "lazy_dataclasses"),
+    ("lazy_dataclasses",),
 )
 """From the top down, as CONTRIBUTING has them: a file knows its own folder and floors below."""
 

@@ -1,17 +1,8 @@
 """Adjustment of blocks and of single photos by least squares."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from photogram.on_demand import on_demand
-
-if TYPE_CHECKING:
-    from photogram.adjustment.adjustment import AsPublished, Ordering, Progress, UnitVariance, adjust
-
-__all__ = ["AsPublished", "Ordering", "Progress", "UnitVariance", "adjust"]
+import lazy_loader
 
 WAYS = {"findings_of": ("findings",)}
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 
-__getattr__, __dir__ = on_demand(__name__, dict.fromkeys(__all__, "adjustment"))
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

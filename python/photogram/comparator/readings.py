@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.grid import Grid
 from photogram.errors import InputError
-from photogram.io.places import Place
+from photogram.io.places import Place as Place
 from photogram.messages import Message
 from photogram.show.summary import Brief
 

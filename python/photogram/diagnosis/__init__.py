@@ -1,17 +1,8 @@
 """Mistakes in the data of a network: one module for each thing that is looked at."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from photogram.on_demand import on_demand
-
-if TYPE_CHECKING:
-    from photogram.diagnosis.findings import Diagnosis, Finding, Section
-
-__all__ = ["Diagnosis", "Finding", "Section"]
+import lazy_loader
 
 WAYS = {"page_of": ("page",)}
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 
-__getattr__, __dir__ = on_demand(__name__, dict.fromkeys(__all__, "findings"))
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

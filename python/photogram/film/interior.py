@@ -13,7 +13,8 @@ from photogram.arguments.arrays import frozen, numbers, one_of, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.film_reduction import Affine, affine_form
+from photogram.network.film_reduction import Affine as Affine
+from photogram.network.film_reduction import affine_form
 from photogram.network.films import (
     Film,
     FilmBend,

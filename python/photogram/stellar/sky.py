@@ -14,7 +14,7 @@ from photogram.arguments.arrays import shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.show.angles import ARCSEC
+from photogram.show.angles import ARCSEC as ARCSEC
 
 TAU: tuple[float, float, float, float] = (1050.6103, 706.11502, 262.06086, 142.67293)
 """Coefficients of refraction in seconds of arc, the report's fit to Garfinkel's tables."""

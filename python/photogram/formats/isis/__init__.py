@@ -3,40 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import lazy_loader
 
 from photogram.formats.format import Format, later
-from photogram.formats.isis.reading import is_network
+from photogram.formats.isis.reading import TITLE, is_network
 from photogram.io.files import reading
-from photogram.on_demand import on_demand
 
-if TYPE_CHECKING:
-    from photogram.formats.isis.network import POINT_TYPES, ControlNetwork, measures_of, points_of
-    from photogram.formats.isis.reading import read_network
-    from photogram.formats.isis.writing import binary_network, network_text
-
-__all__ = [
-    "POINT_TYPES",
-    "ControlNetwork",
-    "binary_network",
-    "measures_of",
-    "network_text",
-    "points_of",
-    "read_network",
-]
-
-_HOMES = {
-    "binary_network": "writing",
-    "ControlNetwork": "network",
-    "measures_of": "network",
-    "network_text": "writing",
-    "POINT_TYPES": "network",
-    "points_of": "network",
-    "read_network": "reading",
-}
-"""The module of each name, loaded when it is first asked for."""
-
-TITLE = "control network (ISIS)"
 HEAD = 1 << 16
 """Bytes that tell a network."""
 
@@ -57,4 +30,4 @@ FORMAT = Format(
     adjusting=later(f"{__name__}.rejection", "rejecting"),
 )
 
-__getattr__, __dir__ = on_demand(__name__, _HOMES)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -17,6 +17,7 @@ from photogram.io.files import read_bytes, reading
 from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.lazy_dataclasses import dataclass
 
+TITLE = "control network (ISIS)"
 LABEL_BYTES = 65536
 """Bytes of the label of a binary network; zeros follow what it says."""
 _FIRST_OBJECT = re.compile(rb"\s*(?:(?:#|/\*)[^\n]*\n\s*)*object\s*=\s*(\w+)", re.IGNORECASE)

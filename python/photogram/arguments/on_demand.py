@@ -1,0 +1,36 @@
+"""Names of packages that are loaded when they are first asked for, and then check their arguments."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Collection
+
+import lazy_loader
+
+from photogram.arguments.annotations import check_arguments
+
+
+def attach_checked(
+    package: str, file: str, given: Collection[str] = ()
+) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """Return `__getattr__`, `__dir__` and `__all__` of a package, as `lazy_loader.attach_stub` does.
+
+    Functions check their arguments.
+
+    Parameters
+    ----------
+    package, file
+        Its `__name__` and `__file__`: beside this is the list of names.
+    given
+        Classes that users make: they check what they are made of. Others are made by functions.
+    """
+    load, listed, public = lazy_loader.attach_stub(package, file)
+
+    def load_checked(name: str) -> object:
+        loaded = load(name)
+        names = vars(sys.modules[package])
+        if name in given or (name.islower() and callable(loaded)):
+            check_arguments(names, [name])
+        return names[name]
+
+    return load_checked, listed, public

@@ -1,0 +1,12 @@
+from .cameras import Camera as Camera
+from .common import Common as Common
+from .diagnostics import ErrorWarning as ErrorWarning
+from .diagnostics import error_warnings as error_warnings
+from .frames import Frame as Frame
+from .ground import GroundPoint as GroundPoint
+from .images import ImageFrame as ImageFrame
+from .limits import Limits as Limits
+from .printout.listing import listing as listing
+from .project import Project as Project
+from .project import read_project as read_project
+from .project import write_project as write_project
