@@ -27,7 +27,8 @@ from photogram.film.lens_table import (
     of_semi_diagonals,
 )
 from photogram.film.marks import DataStrip, by_side, turned, turned_name
-from photogram.io.delimited import ColumnTable, read_columns
+from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import read_columns
 from photogram.io.toml import TomlFile, day_of
 from photogram.io.toml_tables import Table, read_document
 from photogram.messages import listed, quoted

@@ -19,7 +19,8 @@ from photogram.formats.column_words import (
     unit_of,
     words_of,
 )
-from photogram.io.delimited import FALSE, NAMELESS, TRUE, ColumnTable
+from photogram.io.column_table import FALSE, TRUE, ColumnTable
+from photogram.io.delimited import NAMELESS
 from photogram.io.numbers import finite_number
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed, quoted

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from photogram.formats.cards import filled_lines
 from photogram.formats.project import Project
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.io.files import read_lines
 from photogram.io.json import read_json
 from photogram.io.numbers import finite_number

@@ -19,7 +19,7 @@ from photogram.formats.models import intersected
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.messages import Message, quoted
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity

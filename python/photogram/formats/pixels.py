@@ -16,8 +16,9 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import camera_table, known_cameras
 from photogram.formats.project import Project, assembled
+from photogram.io.column_table import ColumnTable
 from photogram.io.csv_text import csv_text
-from photogram.io.delimited import ColumnTable, read_columns
+from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
 from photogram.messages import Message, quoted
 

@@ -22,7 +22,7 @@ from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Frame, Project, Repeated
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.motion import timed_photos

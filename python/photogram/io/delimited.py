@@ -9,23 +9,21 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.column_table import ColumnTable, Names, merged
 from photogram.io.files import read_text
-from photogram.io.numbers import Marks, finite_number, marks_of
 from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import replace
 from photogram.messages import listed, quoted
 
 LARGE = 1 << 20
@@ -40,312 +38,6 @@ _SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)
 """What Excel writes before a table."""
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
-TRUE, FALSE = (
-    frozenset({"true", "yes", "on", "1", "t", "y"}),
-    frozenset({"false", "no", "off", "0", "f", "n"}),
-)
-
-
-@dataclass(frozen=True)
-class Names:
-    """A column of names: each name once, in the order in which they come, and which one each row has."""
-
-    names: list[str]
-    rows: Indices
-
-
-@dataclass(frozen=True)
-class ColumnTable:
-    """A table whose columns are asked for by name.
-
-    Attributes
-    ----------
-    path
-        The file.
-    head
-        The record that names the columns.
-    columns
-        Their names, in small letters.
-    count
-        How many rows there are.
-    cells
-        Columns of text.
-    ready
-        Columns that were read as numbers or names already.
-    records
-        Number of the record of each row.
-    numeric
-        Columns whose cells together show how the table writes numbers.
-    own
-        What the file calls the columns, in small letters; empty for one that it does not name.
-    """
-
-    path: Path
-    head: Place
-    columns: tuple[str, ...]
-    count: int
-    cells: Mapping[str, Sequence[str]]
-    records: Sequence[int]
-    delimiter: str = ","
-    ready: Mapping[str, Floats | Names] = field(default_factory=dict)
-    numeric: frozenset[str] = frozenset()
-    own: tuple[str, ...] = ()
-
-    def __contains__(self, column: str) -> bool:
-        return column in self.columns
-
-    @property
-    def headings(self) -> list[tuple[str, str]]:
-        """What each column is called here, and in the file, as far as it names them."""
-        return list(zip(self.columns, self.own or self.columns, strict=True))
-
-    @cached_property
-    def _lines(self) -> list[str]:
-        return [] if self.path.suffix == ".parquet" else read_text(self.path).split("\n")
-
-    @cached_property
-    def _marks(self) -> Marks:
-        numbers = [cells for name, cells in self.cells.items() if name in self.numeric]
-        return marks_of((cell for column in numbers for cell in column), self.delimiter)
-
-    def place(self, row: int) -> Place:
-        """Return where a row stands."""
-        record = self.records[row]
-        text = self._lines[record - 1] if record <= len(self._lines) else None
-        return Place(self.path, record, text)
-
-    def error(self, row: int, message: str) -> InputError:
-        """Return an error that names the place of a row."""
-        return self.place(row).error(message)
-
-    def renamed(self, names: Mapping[str, str]) -> ColumnTable:
-        """Return the table with other names of some columns."""
-        columns = tuple(names.get(column, column) for column in self.columns)
-        cells = {names.get(column, column): own for column, own in self.cells.items()}
-        ready = {names.get(column, column): own for column, own in self.ready.items()}
-        return replace(self, columns=columns, cells=cells, ready=ready)
-
-    def some(self, rows: Sequence[int]) -> ColumnTable:
-        """Return the table with some of its rows, in this order."""
-        cells = {column: [own[row] for row in rows] for column, own in self.cells.items()}
-        ready = {
-            column: Names(own.names, own.rows[rows]) if isinstance(own, Names) else own[rows]
-            for column, own in self.ready.items()
-        }
-        records = [self.records[row] for row in rows]
-        return replace(self, count=len(rows), cells=cells, ready=ready, records=records)
-
-    def with_texts(self, column: str, texts: Sequence[str]) -> ColumnTable:
-        """Return the table with other texts in a column."""
-        ready = {name: own for name, own in self.ready.items() if name != column}
-        return replace(self, cells={**self.cells, column: texts}, ready=ready)
-
-    def require(self, *columns: str) -> None:
-        """Refuse a table without these columns.
-
-        Raises
-        ------
-        InputError
-            Those that are missing, beside those that are there.
-        """
-        if missing := [column for column in columns if column not in self.columns]:
-            what = "the column {} is missing" if len(missing) == 1 else "the columns {} are missing"
-            raise self.head.error(f"{what.format(listed(missing))}; there are {listed(list(self.columns))}")
-
-    def names(self, column: str) -> Names:
-        """Return a column of names, without blanks at both ends.
-
-        Raises
-        ------
-        InputError
-            A cell that is empty or says NaN, names that differ by inner blanks or by case alone.
-        """
-        found = self.ready.get(column)
-        if not isinstance(found, Names):
-            found = _factorised(self._cells(column))
-        if _all_apart(found.names):
-            return found
-        for name in found.names:
-            if not name or name.lower() == "nan":
-                row = int(np.flatnonzero(found.rows == found.names.index(name))[0])
-                raise self.error(
-                    row, f"column {column}: {'is empty' if not name else f'{name!r} is no name'}"
-                )
-        self._check_alike(column, found)
-        return found
-
-    def _check_alike(self, column: str, found: Names) -> None:
-        seen: dict[str, int] = {}
-        for place, name in enumerate(found.names):
-            plain = "".join(name.split()).casefold()
-            other = seen.setdefault(plain, place)
-            if other != place:
-                row = int(np.flatnonzero(found.rows == place)[0])
-                raise self.error(
-                    row,
-                    f"column {column}: {quoted(name)} differs from {quoted(found.names[other])} by blanks or"
-                    " case alone",
-                )
-
-    def names_once(self, column: str) -> list[str]:
-        """Return a column of names as :meth:`names` has them, none of which may stand in two rows.
-
-        Raises
-        ------
-        InputError
-            As of :meth:`names`; a name that is there twice.
-        """
-        found, texts = self.names(column), self.texts(column)
-        if len(found.names) < self.count:
-            _, first = np.unique(found.rows, return_index=True)
-            row = int(np.setdiff1d(np.arange(self.count), first)[0])
-            raise self.error(row, f"the {column} {quoted(texts[row])} is there twice")
-        return texts
-
-    def texts(self, column: str, default: str = "") -> list[str]:
-        """Return a column of text, without blanks at both ends; empty cells have the default."""
-        found = self.ready.get(column)
-        if isinstance(found, Names):
-            return [found.names[row] or default for row in found.rows]
-        if column not in self.columns:
-            return [default] * self.count
-        return [cell or default for cell in self._cells(column)]
-
-    def _cells(self, column: str) -> Sequence[str]:
-        """Return the cells of a column of text: none are numbers of a Parquet file, unless all are empty."""
-        numbers = self.ready.get(column)
-        if numbers is None:
-            return self.cells[column]
-        if not np.isnan(numbers).all():  # type: ignore[arg-type]
-            raise self.head.error(
-                f"the column {column} holds numbers with decimals: names and words are text or whole numbers"
-            )
-        return [""] * self.count
-
-    def numbers(
-        self,
-        column: str,
-        default: float = math.nan,
-        *,
-        infinite: bool = False,
-        read: Callable[[str], float] | None = None,
-    ) -> Floats:
-        """Return (rows,) a column of numbers.
-
-        Parameters
-        ----------
-        column
-            Its name.
-        default
-            For empty cells, and where the column is missing.
-        infinite
-            Whether `inf` is a number here.
-        read
-            Reads a cell in place of a plain number.
-
-        Raises
-        ------
-        InputError
-            A cell that is no such number; names file, record and column.
-        """
-        found = self.ready.get(column)
-        if isinstance(found, np.ndarray):
-            return self._known(column, found, default, infinite=infinite, read=read)
-        if column not in self.columns:
-            return np.full(self.count, default)
-        convert = finite_number if read is None else read
-        marks = self._marks if column in self.numeric else marks_of(self.cells[column], self.delimiter)
-        values = np.empty(self.count)
-        for row, cell in enumerate(self.texts(column)):
-            if not cell:
-                values[row] = default
-                continue
-            if infinite and cell.lower() in ("inf", "+inf", "infinity"):
-                values[row] = math.inf
-                continue
-            try:
-                values[row] = convert(marks.plain(cell))
-            except ValueError as error:
-                raise self.error(row, f"column {column}: {error}") from None
-        return values
-
-    def _known(
-        self,
-        column: str,
-        found: Floats,
-        default: float,
-        *,
-        infinite: bool,
-        read: Callable[[str], float] | None,
-    ) -> Floats:
-        """Return numbers that the file has as such, as :meth:`numbers` has them; NaN stands for empty."""
-        if not infinite and np.isinf(found).any():
-            raise self.error(int(np.argmax(np.isinf(found))), f"column {column}: is not a finite number")
-        if read is not None:
-            return np.array([default if np.isnan(each) else read(repr(each)) for each in found.tolist()])
-        return found if np.isnan(default) else np.where(np.isnan(found), default, found)
-
-    def vectors(
-        self,
-        columns: Sequence[str],
-        default: float = math.nan,
-        *,
-        infinite: bool = False,
-        read: Callable[[str], float] | None = None,
-    ) -> Floats:
-        """Return (rows, k) k columns of numbers; see :meth:`numbers`."""
-        found = [self.numbers(each, default, infinite=infinite, read=read) for each in columns]
-        return np.stack(found, axis=1)
-
-    def given(self, columns: Sequence[str], why: str = "is empty") -> Floats:
-        """Return (rows, k) k columns of numbers, none of which may be missing; see :meth:`check_given`."""
-        found = self.vectors(columns)
-        self.check_given(found, columns, why)
-        return found
-
-    def check_given(self, values: Floats, columns: Sequence[str], why: str = "is empty") -> None:
-        """Refuse NaN among (rows, k) numbers of some columns.
-
-        Raises
-        ------
-        InputError
-            There is one; names file, record and column.
-        """
-        missing = np.argwhere(np.isnan(values))
-        if len(missing):
-            row, column = missing[0].tolist()
-            raise self.error(row, f"column {columns[column]}: {why}")
-
-    def words(self, column: str, known: Sequence[str], default: str | None = None) -> list[str]:
-        """Return a column of some known words in small letters; empty cells have the default, or the first.
-
-        Raises
-        ------
-        InputError
-            Another word.
-        """
-        found = [each.lower() for each in self.texts(column, known[0] if default is None else default)]
-        for row, word in enumerate(found):
-            if word not in known:
-                raise self.error(row, f"column {column}: {quoted(word)} is none of {', '.join(known)}")
-        return found
-
-    def flags(self, column: str) -> Bools:
-        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true.
-
-        Raises
-        ------
-        InputError
-            Another word.
-        """
-        values = np.ones(self.count, dtype=bool)
-        if column in self.columns:
-            for row, cell in enumerate(self.texts(column)):
-                word = cell.lower()
-                if word and word not in TRUE | FALSE:
-                    raise self.error(row, f"column {column}: {quoted(cell)} is neither true nor false")
-                values[row] = not word or word in TRUE
-        return values
 
 
 def read_columns(
@@ -651,7 +343,7 @@ def _by_pandas(
             codes, texts = pd.factorize(frame[each])
             if (codes < 0).any():
                 return None
-            ready[each] = _merged(codes.astype(np.int64), [str(text).strip() for text in texts])
+            ready[each] = merged(codes.astype(np.int64), [str(text).strip() for text in texts])
     if empty and not _empty_cells(body, delimiter, count, len(columns)):
         return None
     records = range(head.record + 1, head.record + 1 + count)
@@ -662,30 +354,6 @@ def _empty_cells(body: str, delimiter: str, count: int, width: int) -> bool:
     """Whether all that pandas has no number of must be empty cells: no row is short, and none says NaN."""
     whole = '"' not in body and body.count(delimiter) == count * (width - 1)
     return whole and "nan" not in body.casefold()
-
-
-def _all_apart(names: Sequence[str]) -> bool:
-    """Whether names are surely all right: without blanks, and different when case is put aside."""
-    text = "\n".join(names).casefold()
-    words = text.split()
-    if len(words) < len(names) or text.count("\n") >= len(names):
-        return False
-    different = set(words)
-    return len(different) == len(names) == len(words) and "nan" not in different
-
-
-def _merged(codes: Indices, texts: list[str]) -> Names:
-    """Return names of which those that were alike but for blanks at their ends are one."""
-    if len(set(texts)) == len(texts):
-        return Names(texts, codes)
-    found = _factorised(texts)
-    return Names(found.names, found.rows[codes])
-
-
-def _factorised(cells: Sequence[str]) -> Names:
-    places: dict[str, int] = {}
-    rows = np.fromiter((places.setdefault(cell, len(places)) for cell in cells), np.int64, len(cells))
-    return Names(list(places), rows)
 
 
 def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> ColumnTable:
@@ -717,7 +385,7 @@ def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> Column
             if (codes < 0).any():
                 texts.append("")
                 codes = np.where(codes < 0, len(texts) - 1, codes)
-            ready[name] = _merged(codes, texts)
+            ready[name] = merged(codes, texts)
         elif pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
             ready[name] = column.to_numpy().astype(float)
         else:

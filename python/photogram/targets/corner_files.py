@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import read_columns, read_rows
 from photogram.io.files import read_beginning, reading
 from photogram.io.numbers import finite_number
 from photogram.lazy_dataclasses import dataclass

@@ -11,7 +11,7 @@ from photogram.formats.dbat.tables import take_images, take_photos, take_points,
 from photogram.formats.format import Wishes
 from photogram.formats.project import Options, Size
 from photogram.formats.xml_stream import Element, read_stream
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.io.places import at_place
 from photogram.messages import Message, quoted
 

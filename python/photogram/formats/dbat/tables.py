@@ -10,7 +10,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.dbat.content import Content
-from photogram.io.delimited import NAMELESS, ColumnTable, read_columns, read_rows
+from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import NAMELESS, read_columns, read_rows
 from photogram.io.numbers import whole_number
 
 _KNOWN = {

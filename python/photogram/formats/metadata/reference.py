@@ -26,7 +26,8 @@ from photogram.formats.metadata.record import (
     usable_deviations,
 )
 from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
-from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import read_columns, read_rows
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.schema import BENDS, PITCHES, deviation_columns
 from photogram.formats.plain.tables import Tables
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.passages import Bend, Figure
 from photogram.targets.board import Board, BoardKind, Shape

@@ -18,7 +18,7 @@ from photogram.formats.plain.covariances import read_covariances
 from photogram.formats.plain.exposure import LINE, OF_LINES, line_sensors, shutters
 from photogram.formats.plain.tables import Tables, columns_of
 from photogram.formats.project import Size
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import quoted

@@ -15,7 +15,7 @@ from photogram.film.distances import with_datum
 from photogram.film.validity import age_remark, changed_remark, valid_certificate
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.tables import Tables
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.io.toml import day_of
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, quoted

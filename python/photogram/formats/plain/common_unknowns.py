@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.io.delimited import FALSE, TRUE, ColumnTable
+from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.unknowns import Unknown
 

@@ -12,7 +12,7 @@ from photogram.arguments.types import Floats
 from photogram.formats.plain.common_unknowns import made, word_of
 from photogram.formats.plain.rigs import Rigs
 from photogram.formats.plain.tables import DEGREE, Tables
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed, quoted
 from photogram.network.block import Block

@@ -15,7 +15,7 @@ from photogram.formats.images import from_tables, in_unit, to_tables
 from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import Direction, LineSensor, Shutter

@@ -15,7 +15,7 @@ from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.scanners import Machine
 from photogram.formats.plain.tables import Tables, indices_of
-from photogram.io.delimited import FALSE, TRUE, ColumnTable
+from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
 

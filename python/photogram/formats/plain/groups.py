@@ -14,7 +14,7 @@ from photogram.formats.plain.common_unknowns import called, word_of
 from photogram.formats.plain.schema import AXES, BIAS, OPK, SD_ROTATIONS, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, columns_of
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Rate, Velocity

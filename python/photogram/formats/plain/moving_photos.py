@@ -18,7 +18,7 @@ from photogram.formats.plain.schema import RATE, VELOCITY, deviation_columns
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, columns_of, indices_of, named_of
 from photogram.formats.rigging import Rig
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import replace
 from photogram.messages import quoted
 from photogram.network.block import Block

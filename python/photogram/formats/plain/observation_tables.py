@@ -25,7 +25,7 @@ from photogram.formats.plain.tables import (
     vectors_of,
 )
 from photogram.formats.plain.transform import Transform
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.observations import (

@@ -50,7 +50,7 @@ from photogram.formats.plain.tables import (
 from photogram.formats.plain.trajectories import read_smoothness
 from photogram.formats.plain.transform import Transform
 from photogram.formats.rigging import Rig
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.observations import Attitude, Observation, Position, Rate, Relative, Velocity

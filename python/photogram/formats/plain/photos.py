@@ -16,7 +16,7 @@ from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, SD_AXES, dev
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import listed, quoted
 from photogram.network.observations import Attitude, Observation

@@ -47,7 +47,7 @@ from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.plain.transform import Transform
 from photogram.formats.project import Project, Unused, assembled
 from photogram.formats.rigging import Stand, mounted
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Timed

@@ -15,7 +15,7 @@ from photogram.formats.plain.schema import AXES, OPK, POSE, ROTATIONS, deviation
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of
 from photogram.formats.rigging import FrameOf, Rig
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation

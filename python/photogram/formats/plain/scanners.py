@@ -14,7 +14,7 @@ from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.covariances import Covariances
 from photogram.formats.plain.schema import CURVES, DEVICE, FILM_MODELS, GRID
 from photogram.formats.plain.tables import Tables
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, nearest, quoted
 from photogram.network.films import PATTERNS, Pattern, Readings, Reseau, Roll, Scanner, ScannerCurve, Weights

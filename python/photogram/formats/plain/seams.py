@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from photogram.formats.plain.tables import Tables
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass, field, fields, replace
 from photogram.network.moving_photos import Timed
 from photogram.network.rigs import Mount

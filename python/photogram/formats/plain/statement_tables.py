@@ -9,7 +9,7 @@ from typing import Any
 from photogram.errors import InputError
 from photogram.formats.plain.schema import ENDS
 from photogram.formats.plain.tables import Tables, indices_of
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.io.toml import TomlFile
 from photogram.messages import counted, quoted
 from photogram.results.statement.request import Asked

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from photogram.formats.plain.tables import Tables, indices_of
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted, quoted
 from photogram.network.block import Block

@@ -17,7 +17,8 @@ from photogram.formats.plain.common_unknowns import Shared
 from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns
 from photogram.formats.plain.settings import Settings
 from photogram.formats.rotations import Y_DOWN, is_rotation
-from photogram.io.delimited import ColumnTable, read_columns, read_rows
+from photogram.io.column_table import ColumnTable
+from photogram.io.delimited import read_columns, read_rows
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, quoted

@@ -11,7 +11,7 @@ from photogram.errors import InputError
 from photogram.formats.columns import is_geographic
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Frame
-from photogram.io.delimited import ColumnTable
+from photogram.io.column_table import ColumnTable
 from photogram.messages import Message
 
 _HINT = "; are east and north exchanged (--columns x=..,y=..), or is a zone before the eastings?"
