@@ -20,7 +20,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.adjusting import Adjuster
-from photogram.diagnosis.editing import tests
+from photogram.diagnosis.blunders import tests
 from photogram.diagnosis.findings import Explained
 from photogram.diagnosis.hypotheses import FOOT
 from photogram.diagnosis.predictions import freed

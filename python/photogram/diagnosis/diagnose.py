@@ -18,10 +18,11 @@ from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import shown
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosis_of
+from photogram.diagnosis.blunders import BESIDE
 from photogram.diagnosis.control import control
 from photogram.diagnosis.control_sets import doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
-from photogram.diagnosis.editing import _BESIDE, HOPELESS, Edited, blunder_section, edit
+from photogram.diagnosis.editing import HOPELESS, Edited, blunder_section, edit
 from photogram.diagnosis.findings import Diagnosis, Explained, Finding, Level, Section, Words, note
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
@@ -268,7 +269,7 @@ def _set_of(block: Block, adjusted: Adjuster) -> tuple[str, Explained | None]:
         explained = None if model is None else explain(model)
         if explained is not None:
             return "control-set", explained
-    kinds = ("control", "station", f"{_BESIDE}{Position.KIND}")
+    kinds = ("control", "station", f"{BESIDE}{Position.KIND}")
     weighted = ((block.photo_position_sd > 0) & np.isfinite(block.photo_position_sd)).any()
     observed = weighted or any(isinstance(each, Position) for each in block.observations)
     if observed and doubtful(adjusted.tried(block), *kinds):

@@ -11,12 +11,18 @@ have hardly any redundancy, are judged one by one here.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Bools, Indices
 from photogram.diagnosis.adjusting import Adjuster
+from photogram.diagnosis.blunders import (
+    Suspect,
+    control_finding,
+    finding_of,
+    kind_of,
+    tests,
+    with_rivals,
+)
 from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.predictions import (
@@ -26,7 +32,6 @@ from photogram.diagnosis.predictions import (
     freed,
     tests_of_predictions,
 )
-from photogram.diagnosis.rivals import ODDS, rival_images
 from photogram.diagnosis.robust import critical, mad_sd
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError
@@ -34,18 +39,10 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
-from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
-from photogram.show.angles import ARCSEC
 
 ROUNDS = 20
 """Adjustments at the most."""
-TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
-"""Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
-
-Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
-value still means something.
-"""
 COMPARABLE = 0.4
 """Of the largest test value of a round: what is smaller may be its consequence and is judged again."""
 HOPELESS = 5.0
@@ -63,8 +60,6 @@ SURE = 1e-4
 SHOWN = 20
 RETURNS = 10
 """Images that are tried anew when all blunders are out, at the most."""
-_BESIDE = "beside images: "
-"""Before the names of further kinds of observations."""
 
 
 @dataclass
@@ -105,16 +100,6 @@ class Edited:
     def taken_out(self) -> int:
         """How many observations the last adjustment did without."""
         return len(self.section.findings) + sum(len(each) for each in self.control.values())
-
-
-@dataclass(frozen=True)
-class _Suspect:
-    """One observation: its kind, its place in the arrays of the block, and its test value."""
-
-    kind: str
-    row: int
-    axis: int
-    test: float
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
@@ -244,7 +229,7 @@ def _judged(
     point_sd = result.block.point_sd.copy()
     for row, error, test in zip(points.tolist(), errors, np.abs(tests), strict=True):
         for axis in np.flatnonzero(test > limit).tolist():
-            finding = _control_finding(given, row, axis, float(error[axis]), float(test[axis]) * spread)
+            finding = control_finding(given, row, axis, float(error[axis]), float(test[axis]) * spread)
             control.setdefault(given.point_ids[row], []).append(finding)
         fits = test <= limit
         point_sd[row, fits] = given.point_sd[row, fits]
@@ -300,10 +285,10 @@ def _snoop(
         if not suspects or not result.converged or step == ROUNDS - 1:
             break
         for suspect in suspects:
-            finding = _finding(result, suspect, spread)
+            finding = finding_of(result, suspect, spread)
             if suspect.kind == "control":
                 control.setdefault(finding.points[0], []).append(
-                    _with_rivals(finding, result, suspect, spread)
+                    with_rivals(finding, result, suspect, spread)
                 )
             else:
                 section.findings.append(finding)
@@ -316,30 +301,13 @@ def _snoop(
     return result, spread, control
 
 
-def tests(result: Result) -> dict[str, Floats]:
-    """Test values by kind, in standard deviations of the residuals; 0 where nothing checks."""
-    images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
-    others = {
-        "control": (result.point_redundancy, result.point_standardized),
-        "station": (result.photo_redundancy, result.photo_standardized),
-        **{f"{_BESIDE}{name}": (each.redundancy, each.standardized) for name, each in result.kinds.items()},
-    }
-    return {
-        "image": np.nan_to_num(images),
-        **{
-            name: np.where(redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(values)), 0.0)
-            for name, (redundancy, values) in others.items()
-        },
-    }
-
-
-def _largest(result: Result, spread: float) -> list[_Suspect]:
+def _largest(result: Result, spread: float) -> list[Suspect]:
     """Return the observations beyond the critical value that are the largest of their neighbourhood."""
     values = tests(result)
     count = sum(int((each > 0).sum()) for each in values.values())
     limit = critical(count) * spread
     beyond = [
-        _Suspect(kind, int(row), int(axis), float(each[row, axis]))
+        Suspect(kind, int(row), int(axis), float(each[row, axis]))
         for kind, each in values.items()
         for row, axis in np.argwhere(each > limit)
     ]
@@ -347,7 +315,7 @@ def _largest(result: Result, spread: float) -> list[_Suspect]:
     if not beyond or beyond[0].kind != "image":
         # An error of control or of a station spoils test values far away: nothing is taken out with it.
         return beyond[:1]
-    taken: list[_Suspect] = []
+    taken: list[Suspect] = []
     photos: set[int] = set()
     points: set[int] = set()
     for suspect in beyond:
@@ -362,7 +330,7 @@ def _largest(result: Result, spread: float) -> list[_Suspect]:
     return taken
 
 
-def _without(result: Result, suspects: list[_Suspect]) -> Block:
+def _without(result: Result, suspects: list[Suspect]) -> Block:
     """Leave out images and observations; give up the weights of components of control and of stations."""
     block = result.block
     point_sd = block.point_sd.copy()
@@ -377,7 +345,7 @@ def _without(result: Result, suspects: list[_Suspect]) -> Block:
         elif suspect.kind == "station":
             station_sd[suspect.row, suspect.axis] = np.inf
         else:
-            gone.add(int(_kind(result, suspect).rows[suspect.row]))
+            gone.add(int(kind_of(result, suspect).rows[suspect.row]))
     changed = block.replace(
         point_sd=point_sd,
         photo_position_sd=station_sd[:, :3],
@@ -385,101 +353,6 @@ def _without(result: Result, suspects: list[_Suspect]) -> Block:
         observations=[each for row, each in enumerate(block.observations) if row not in gone],
     )
     return kept_images(changed, kept)
-
-
-def _kind(result: Result, suspect: _Suspect) -> ObservedKind:
-    return result.kinds[suspect.kind.removeprefix(_BESIDE)]
-
-
-def _finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
-    if suspect.kind == "image":
-        return _image_finding(result, suspect, spread)
-    if suspect.kind == "control":
-        row, axis = suspect.row, suspect.axis
-        error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
-        return _control_finding(result.block, row, axis, error, suspect.test)
-    if suspect.kind != "station":
-        return _other_finding(result, suspect)
-    name = result.block.photo_ids[suspect.row]
-    what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
-    text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
-    return Finding("station-misfit", "look", text, [name], [], {"test_value": suspect.test})
-
-
-def _with_rivals(finding: Finding, result: Result, suspect: _Suspect, spread: float) -> Finding:
-    """Name the control whose error would leave nearly the same residuals: odds below 20."""
-    values = tests(result)["control"].max(axis=1) / spread
-    near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
-    near &= values > critical(int((values > 0).sum()))
-    near[suspect.row] = False
-    names = [result.block.point_ids[row] for row in np.flatnonzero(near).tolist()]
-    if not names:
-        return finding
-    text = f"{finding.text}; it may as well be control point {' or '.join(names)}"
-    return replace(finding, text=text, points=[*finding.points, *names])
-
-
-def _other_finding(result: Result, suspect: _Suspect) -> Finding:
-    """Say that an observation beside images does not fit."""
-    kind = _kind(result, suspect)
-    observation = result.block.observations[int(kind.rows[suspect.row])]
-    redundancy = float(kind.redundancy[suspect.row, suspect.axis])
-    error, unit = float(kind.residuals[suspect.row, suspect.axis]) / redundancy, kind.units[suspect.axis]
-    if unit == "rad":
-        error, unit = error / ARCSEC, "arcsec"
-    text = (
-        f"{kind.components[suspect.axis]} of {observation.name} does not fit (test value {suspect.test:.1f},"
-        f" redundancy {redundancy:.2f}): its error is about {error:.4g} {unit}".rstrip()
-    )
-    values = {"test_value": suspect.test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
-    photos, points = list(observation.photos), list(observation.points)
-    return Finding("observation-misfit", "look", text, photos, points, values)
-
-
-def _control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
-    """Say that a component of control does not fit; `error` is that of the given value."""
-    angle = block.geographic and axis < 2
-    unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
-    component = (("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z"))[axis]
-    name = block.point_ids[row]
-    text = (
-        f"{component} of control point {name} does not fit (test value {test:.1f}):"
-        f" its error is about {error:.3f} {unit}"
-    )
-    values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
-    return Finding("control-misfit", "look", text, [], [name], values)
-
-
-def _image_finding(result: Result, suspect: _Suspect, spread: float) -> Finding:
-    block, row, axis = result.block, suspect.row, suspect.axis
-    photo, point = int(block.image_photos[row]), int(block.image_points[row])
-    redundancy = float(result.redundancy[row, axis])
-    error = float(result.residuals[row, axis]) / redundancy
-    others = [
-        block.photo_ids[each] for each in block.image_photos[rival_images(result, row, spread)].tolist()
-    ]
-    doubt = f"; it may as well be the image on photo {' or '.join(others)}" if others else ""
-    if doubt and np.count_nonzero(block.image_points == point) == 2:
-        doubt = f"; with two rays it may as well be the image on photo {others[0]}"
-    unit, factor = small_unit(block.image_unit)
-    text = (
-        f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}: error of {'xy'[axis]} about"
-        f" {error * factor:.{0 if unit == 'um' else 2}f} {unit} (test value {suspect.test:.1f},"
-        f" redundancy {redundancy:.2f}){doubt}"
-    )
-    return Finding(
-        "blunder",
-        "look",
-        text,
-        [block.photo_ids[photo], *others],
-        [block.point_ids[point]],
-        {
-            f"error_{unit}": error * factor,
-            "test_value": suspect.test,
-            "redundancy": redundancy,
-            "axis": float(axis),
-        },
-    )
 
 
 def _returned(result: Result, whole: Block, section: Section, spread: float, adjusted: Adjuster) -> Result:

@@ -1,0 +1,150 @@
+"""One observation that does not fit: its test value, and what is said of it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.diagnosis.findings import Finding, small_unit
+from photogram.diagnosis.rivals import ODDS, rival_images
+from photogram.diagnosis.robust import critical
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.network.block import Block
+from photogram.results.observation_kinds import ObservedKind
+from photogram.results.result import Result
+from photogram.show.angles import ARCSEC
+
+TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
+"""Redundancy numbers below which image coordinates, and control or stations, are not checked by the others.
+
+Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
+value still means something.
+"""
+BESIDE = "beside images: "
+"""Before the names of further kinds of observations."""
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """One observation: its kind, its place in the arrays of the block, and its test value."""
+
+    kind: str
+    row: int
+    axis: int
+    test: float
+
+
+def tests(result: Result) -> dict[str, Floats]:
+    """Test values by kind, in standard deviations of the residuals; 0 where nothing checks."""
+    images = np.where(result.redundancy > TESTABLE, np.abs(result.standardized), 0.0)
+    others = {
+        "control": (result.point_redundancy, result.point_standardized),
+        "station": (result.photo_redundancy, result.photo_standardized),
+        **{f"{BESIDE}{name}": (each.redundancy, each.standardized) for name, each in result.kinds.items()},
+    }
+    return {
+        "image": np.nan_to_num(images),
+        **{
+            name: np.where(redundancy > TESTABLE_PRIOR, np.nan_to_num(np.abs(values)), 0.0)
+            for name, (redundancy, values) in others.items()
+        },
+    }
+
+
+def kind_of(result: Result, suspect: Suspect) -> ObservedKind:
+    """Return the observations of its kind, beside images."""
+    return result.kinds[suspect.kind.removeprefix(BESIDE)]
+
+
+def finding_of(result: Result, suspect: Suspect, spread: float) -> Finding:
+    """Say that an observation does not fit; `spread` is that of the test values of its adjustment."""
+    if suspect.kind == "image":
+        return _image_finding(result, suspect, spread)
+    if suspect.kind == "control":
+        row, axis = suspect.row, suspect.axis
+        error = -float(result.point_differences[row, axis] / result.point_redundancy[row, axis])
+        return control_finding(result.block, row, axis, error, suspect.test)
+    if suspect.kind != "station":
+        return _other_finding(result, suspect)
+    name = result.block.photo_ids[suspect.row]
+    what = ("first", "second", "third")[suspect.axis % 3] + (" coordinate" if suspect.axis < 3 else " angle")
+    text = f"the {what} of station {name} contradicts its standard deviation (test value {suspect.test:.1f})"
+    return Finding("station-misfit", "look", text, [name], [], {"test_value": suspect.test})
+
+
+def with_rivals(finding: Finding, result: Result, suspect: Suspect, spread: float) -> Finding:
+    """Name the control whose error would leave nearly the same residuals: odds below 20."""
+    values = tests(result)["control"].max(axis=1) / spread
+    near = (suspect.test / spread) ** 2 - values**2 < 2 * math.log(ODDS)
+    near &= values > critical(int((values > 0).sum()))
+    near[suspect.row] = False
+    names = [result.block.point_ids[row] for row in np.flatnonzero(near).tolist()]
+    if not names:
+        return finding
+    text = f"{finding.text}; it may as well be control point {' or '.join(names)}"
+    return replace(finding, text=text, points=[*finding.points, *names])
+
+
+def _other_finding(result: Result, suspect: Suspect) -> Finding:
+    """Say that an observation beside images does not fit."""
+    kind = kind_of(result, suspect)
+    observation = result.block.observations[int(kind.rows[suspect.row])]
+    redundancy = float(kind.redundancy[suspect.row, suspect.axis])
+    error, unit = float(kind.residuals[suspect.row, suspect.axis]) / redundancy, kind.units[suspect.axis]
+    if unit == "rad":
+        error, unit = error / ARCSEC, "arcsec"
+    text = (
+        f"{kind.components[suspect.axis]} of {observation.name} does not fit (test value {suspect.test:.1f},"
+        f" redundancy {redundancy:.2f}): its error is about {error:.4g} {unit}".rstrip()
+    )
+    values = {"test_value": suspect.test, "redundancy": redundancy, f"error_{unit}".rstrip("_"): error}
+    photos, points = list(observation.photos), list(observation.points)
+    return Finding("observation-misfit", "look", text, photos, points, values)
+
+
+def control_finding(block: Block, row: int, axis: int, error: float, test: float) -> Finding:
+    """Say that a component of control does not fit; `error` is that of the given value."""
+    angle = block.geographic and axis < 2
+    unit, error = ("arcsec", float(np.degrees(error)) * 3600) if angle else (block.linear_unit, error)
+    component = (("longitude", "latitude", "height") if block.geographic else ("X", "Y", "Z"))[axis]
+    name = block.point_ids[row]
+    text = (
+        f"{component} of control point {name} does not fit (test value {test:.1f}):"
+        f" its error is about {error:.3f} {unit}"
+    )
+    values = {"component": float(axis), "test_value": test, f"error_{unit}": error}
+    return Finding("control-misfit", "look", text, [], [name], values)
+
+
+def _image_finding(result: Result, suspect: Suspect, spread: float) -> Finding:
+    block, row, axis = result.block, suspect.row, suspect.axis
+    photo, point = int(block.image_photos[row]), int(block.image_points[row])
+    redundancy = float(result.redundancy[row, axis])
+    error = float(result.residuals[row, axis]) / redundancy
+    others = [
+        block.photo_ids[each] for each in block.image_photos[rival_images(result, row, spread)].tolist()
+    ]
+    doubt = f"; it may as well be the image on photo {' or '.join(others)}" if others else ""
+    if doubt and np.count_nonzero(block.image_points == point) == 2:
+        doubt = f"; with two rays it may as well be the image on photo {others[0]}"
+    unit, factor = small_unit(block.image_unit)
+    text = (
+        f"point {block.point_ids[point]} on photo {block.photo_ids[photo]}: error of {'xy'[axis]} about"
+        f" {error * factor:.{0 if unit == 'um' else 2}f} {unit} (test value {suspect.test:.1f},"
+        f" redundancy {redundancy:.2f}){doubt}"
+    )
+    return Finding(
+        "blunder",
+        "look",
+        text,
+        [block.photo_ids[photo], *others],
+        [block.point_ids[point]],
+        {
+            f"error_{unit}": error * factor,
+            "test_value": suspect.test,
+            "redundancy": redundancy,
+            "axis": float(axis),
+        },
+    )
