@@ -53,7 +53,7 @@ def packages(name: str = "photogram") -> Iterator[str]:
     """Return the names of a public package and of those in it."""
     yield name
     home = import_module(name)
-    for inner in {*home.__all__} - {*names(home)}:
+    for inner in sorted({*home.__all__} - {*names(home)}):
         yield from packages(f"{name}.{inner}")
 
 
