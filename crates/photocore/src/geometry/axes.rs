@@ -29,7 +29,7 @@ pub(crate) fn inverse<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option<SMa
 }
 
 /// The same matrix, of a size that is no type.
-pub(crate) fn dense<const R: usize, const C: usize>(matrix: &SMatrix<f64, R, C>) -> DMatrix<f64> {
+fn dense<const R: usize, const C: usize>(matrix: &SMatrix<f64, R, C>) -> DMatrix<f64> {
     DMatrix::from_column_slice(R, C, matrix.as_slice())
 }
 

@@ -10,7 +10,7 @@
 //! With a plane n . P = d in the axes of the first photo, u2 ~ H u1, H = R + t n^T / d, R = A^T and t = -A^T b. The two poses come from
 //! the singular values of H (Ma, Soatto, Kosecka and Sastry, An Invitation to 3-D Vision, 2004, section 5.3).
 
-use nalgebra::{DMatrix, DVector, Schur};
+use nalgebra::{SMatrix, SVector, Schur};
 
 use super::oriented::Oriented;
 use crate::geometry::{Matrix3, Vector3, principal_axes};
@@ -88,8 +88,8 @@ pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
     };
     let e: [[Polynomial; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
     let equations = constraints(&e);
-    let (left, right) = (equations.columns(0, 10), equations.columns(10, 10));
-    let Some(reduced) = left.into_owned().lu().solve(&right) else { return vec![] };
+    let (left, right) = (equations.fixed_columns::<10>(0), equations.fixed_columns::<10>(10));
+    let Some(reduced) = left.into_owned().lu().solve(&right.into_owned()) else { return vec![] };
     let action = action_matrix(&reduced);
     roots(&action)
         .into_iter()
@@ -102,15 +102,17 @@ pub fn five_points(pairs: &[[Vector3; 2]; 5]) -> Vec<Matrix3> {
         .collect()
 }
 
-/// Right singular vectors of equations in the nine elements of a matrix, row by row, those of the largest singular values first. As many
-/// equations as elements, at least: missing ones are zero.
-fn right_vectors(equations: DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// Equations in the nine elements of a matrix: up to twelve, the others zero.
+type Equations = SMatrix<f64, 12, 9>;
+
+/// Right singular vectors, row by row, those of the largest singular values first.
+fn right_vectors(equations: Equations) -> Option<SMatrix<f64, 9, 9>> {
     equations.try_svd(false, true, f64::EPSILON, STEPS)?.v_t
 }
 
 /// Four matrices that span what the five equations leave.
 fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
-    let mut equations = DMatrix::zeros(9, 9);
+    let mut equations = Equations::zeros();
     for (row, [first, second]) in pairs.iter().enumerate() {
         (0..9).for_each(|k| equations[(row, k)] = first[k / 3] * second[k % 3]);
     }
@@ -119,7 +121,7 @@ fn null_space(pairs: &[[Vector3; 2]; 5]) -> Option<[Matrix3; 4]> {
 }
 
 /// det E = 0 and E E^T E - 1/2 tr(E E^T) E = 0.
-fn constraints(e: &[[Polynomial; 3]; 3]) -> DMatrix<f64> {
+fn constraints(e: &[[Polynomial; 3]; 3]) -> SMatrix<f64, 10, 20> {
     let sum = |terms: [Polynomial; 3]| plus(&plus(&terms[0], 1.0, &terms[1]), 1.0, &terms[2]);
     let square = |i: usize, j: usize| sum(std::array::from_fn(|k| product(&e[i][k], &e[j][k])));
     let mut squares: [[Polynomial; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| square(i, j)));
@@ -134,12 +136,12 @@ fn constraints(e: &[[Polynomial; 3]; 3]) -> DMatrix<f64> {
     ]);
     let rows: Vec<Polynomial> =
         (0..9).map(|k| cubic(k / 3, k % 3)).chain(std::iter::once(determinant)).collect();
-    DMatrix::from_fn(10, 20, |row, column| rows[row][column])
+    SMatrix::from_fn(|row, column| rows[row][column])
 }
 
 /// Multiplication by x of the ten lower monomials, modulo the equations.
-fn action_matrix(reduced: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut action = DMatrix::zeros(10, 10);
+fn action_matrix(reduced: &SMatrix<f64, 10, 10>) -> SMatrix<f64, 10, 10> {
+    let mut action = SMatrix::<f64, 10, 10>::zeros();
     for row in 0..6 {
         action.set_row(row, &-reduced.row(row));
     }
@@ -150,20 +152,20 @@ fn action_matrix(reduced: &DMatrix<f64>) -> DMatrix<f64> {
     action
 }
 
-fn roots(action: &DMatrix<f64>) -> Vec<f64> {
+fn roots(action: &SMatrix<f64, 10, 10>) -> Vec<f64> {
     if !action.iter().all(|value| value.is_finite()) {
         return vec![];
     }
-    let Some(schur) = Schur::try_new(action.clone(), f64::EPSILON, STEPS) else { return vec![] };
+    let Some(schur) = Schur::try_new(*action, f64::EPSILON, STEPS) else { return vec![] };
     let values = schur.complex_eigenvalues();
     values.iter().filter(|value| value.im.abs() <= NOT_REAL * (1.0 + value.re.abs())).map(|v| v.re).collect()
 }
 
 /// The monomials that belong to a root, by inverse iteration.
-fn eigenvector(action: &DMatrix<f64>, root: f64) -> Option<DVector<f64>> {
+fn eigenvector(action: &SMatrix<f64, 10, 10>, root: f64) -> Option<SVector<f64, 10>> {
     let near = root + 1e-10 * (1.0 + root.abs());
-    let factors = (action - DMatrix::identity(10, 10) * near).lu();
-    let mut vector = DVector::repeat(10, 1.0);
+    let factors = (action - SMatrix::<f64, 10, 10>::identity() * near).lu();
+    let mut vector = SVector::<f64, 10>::repeat(1.0);
     for _ in 0..3 {
         vector = factors.solve(&vector)?;
         let size = vector.norm();
@@ -185,7 +187,7 @@ pub fn over_plane(pairs: &[[Vector3; 2]; 4]) -> Vec<Oriented> {
 
 /// H with u2 x (H u1) = 0, of any size.
 fn homography(pairs: &[[Vector3; 2]; 4]) -> Option<Matrix3> {
-    let mut equations = DMatrix::zeros(12, 9);
+    let mut equations = Equations::zeros();
     for (pair, [first, second]) in pairs.iter().enumerate() {
         let across = second.cross_matrix();
         for row in 0..3 {

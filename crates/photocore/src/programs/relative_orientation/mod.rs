@@ -25,10 +25,8 @@ mod oriented;
 pub use five_points::{five_points, over_plane};
 pub use oriented::Oriented;
 
-use nalgebra::DMatrix;
-
 use super::sampling::Samples;
-use crate::geometry::{Matrix3, Vector3, dense};
+use crate::geometry::{Matrix3, Vector3};
 use crate::sorting::sort_by;
 
 /// Samples that are drawn: with a third of the pairs wrong, one in eight has none of them.
@@ -89,9 +87,8 @@ fn rivals(mut found: Vec<Candidate>) -> Vec<Candidate> {
 
 /// Of the four poses of an essential matrix, E = [b]x A, the one that has most of the pairs in front of both photos.
 fn in_front(e: &Matrix3, pairs: &[[Vector3; 2]]) -> Option<Oriented> {
-    let svd = dense(e).try_svd(true, true, f64::EPSILON, STEPS)?;
-    let square = |matrix: DMatrix<f64>| Matrix3::from_column_slice(matrix.as_slice());
-    let (u, v_t) = (square(svd.u?), square(svd.v_t?));
+    let svd = e.try_svd(true, true, f64::EPSILON, STEPS)?;
+    let (u, v_t) = (svd.u?, svd.v_t?);
     let upright = |m: Matrix3| if m.determinant() < 0.0 { -m } else { m };
     let turn = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     let base = Vector3::from(u.column(2));
