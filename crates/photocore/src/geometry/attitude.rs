@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use super::angle_axis::{angle_axis_rotation, right_jacobian_inverse, rotation_angle_axis};
-use super::axes::{Matrix3, Vector3, inverse};
+use super::axes::{Matrix3, Vector3};
 use super::rotation::{nearest_turns, rotation, rotation_angles};
 
 /// The sense of omega, phi, kappa.
@@ -169,7 +169,7 @@ impl AttitudeNumbers {
     /// K, with rho = K d(numbers).
     pub fn rates(&self, numbers: [f64; 3]) -> Matrix3 {
         let [_, q, r] = numbers;
-        let back = |rates: Matrix3| inverse(&rates).unwrap_or_else(|| Matrix3::repeat(f64::NAN));
+        let inverse = |rates: Matrix3| rates.try_inverse().unwrap_or_else(|| Matrix3::repeat(f64::NAN));
         match self {
             Self::OmegaPhiKappa(RotationSense::GroundToPhoto) => omega_phi_kappa(numbers),
             Self::OmegaPhiKappa(RotationSense::PhotoToGround) => {
@@ -195,10 +195,10 @@ impl AttitudeNumbers {
                 let ((sq, cq), (sr, cr)) = (q.sin_cos(), r.sin_cos());
                 boresight * Matrix3::new(-sq, 0.0, 1.0, sr * cq, cr, 0.0, cr * cq, -sr, 0.0)
             }
-            Self::RotationVector => back(right_jacobian_inverse(&numbers.into())),
-            Self::RotationVectorToPhoto => -back(right_jacobian_inverse(&-Vector3::from(numbers))),
+            Self::RotationVector => inverse(right_jacobian_inverse(&numbers.into())),
+            Self::RotationVectorToPhoto => -inverse(right_jacobian_inverse(&-Vector3::from(numbers))),
             Self::RotationVectorToVision => {
-                -(vision_axes() * back(right_jacobian_inverse(&-Vector3::from(numbers))))
+                -(vision_axes() * inverse(right_jacobian_inverse(&-Vector3::from(numbers))))
             }
         }
     }
@@ -217,7 +217,7 @@ impl AttitudeNumbers {
 
     /// K^-1, with d(numbers) = K^-1 rho; None at a singular attitude.
     pub fn by_step(&self, numbers: [f64; 3]) -> Option<Matrix3> {
-        inverse(&self.rates(numbers)).filter(|_| !self.is_singular(numbers))
+        self.rates(numbers).try_inverse().filter(|_| !self.is_singular(numbers))
     }
 
     /// Cofactors of the numbers from those of the rotation step, K^-1 Q K^-T; None at a singular attitude.

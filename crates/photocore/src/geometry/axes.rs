@@ -1,7 +1,6 @@
-//! Vectors and matrices in cartesian axes, and what `nalgebra` finds of small matrices: compiled for one size, not for each.
+//! Vectors and matrices in cartesian axes.
 
 use crate::sorting::order;
-use nalgebra::{DMatrix, SMatrix};
 
 /// Three components in cartesian axes.
 pub type Vector3 = nalgebra::Vector3<f64>;
@@ -16,21 +15,11 @@ pub(crate) fn principal_axes(matrix: &Matrix3) -> Option<(Vector3, Matrix3)> {
     if !matrix.iter().all(|element| element.is_finite()) {
         return None;
     }
-    let eigen = dense(matrix).try_symmetric_eigen(f64::EPSILON, SWEEPS)?;
+    let eigen = matrix.try_symmetric_eigen(f64::EPSILON, SWEEPS)?;
     let values = eigen.eigenvalues;
     let falling = order(3, &|a, b| values[b].total_cmp(&values[a]));
-    let axes = Matrix3::from_fn(|row, column| eigen.eigenvectors[(row, falling[column])]);
-    Some((Vector3::from_fn(|k, _| values[falling[k]]), axes))
-}
-
-/// The inverse of a small square matrix; None where there is none.
-pub(crate) fn inverse<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
-    dense(matrix).try_inverse().map(|inverse| SMatrix::from_column_slice(inverse.as_slice()))
-}
-
-/// The same matrix, of a size that is no type.
-fn dense<const R: usize, const C: usize>(matrix: &SMatrix<f64, R, C>) -> DMatrix<f64> {
-    DMatrix::from_column_slice(R, C, matrix.as_slice())
+    let columns = [0, 1, 2].map(|k| eigen.eigenvectors.column(falling[k]).into_owned());
+    Some((Vector3::from_fn(|k, _| values[falling[k]]), Matrix3::from_columns(&columns)))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use nalgebra::Matrix6;
 use super::angle_axis::angle_axis_with_jacobian;
 use super::angle_axis::rotation_angle_axis;
 use super::attitude::{AttitudeNumbers, RotationSense};
-use super::axes::{Matrix3, Vector3, inverse};
+use super::axes::{Matrix3, Vector3};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
 use super::pose::Pose;
 use super::pose::{POSE, column};
@@ -183,7 +183,7 @@ impl Orientation {
     /// How the six unknowns move with a step of the pose, dC, then rho: the inverse of [`Orientation::steps`]. None where angles are
     /// singular.
     pub fn unknowns_by_step(&self) -> Option<Matrix6<f64>> {
-        inverse(&self.step_matrix())
+        self.step_matrix().try_inverse()
     }
 
     /// The six numbers of the pose (see [`PoseNumbers`]).

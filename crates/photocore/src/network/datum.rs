@@ -16,7 +16,7 @@ use crate::Threads;
 use crate::adjustment::{Datum, Motions};
 use crate::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Point, Pose, PoseNumbers, Vector3,
-    angle_axis::rotation_angle_axis, angle_axis_rotation, inverse, local_vertical,
+    angle_axis::rotation_angle_axis, angle_axis_rotation, local_vertical,
 };
 use crate::sorting::sort_by;
 
@@ -119,14 +119,14 @@ impl Bundle {
         let mut vectors = vec![vec![0.0; unknowns.len()]; MOTIONS * origins.len()];
         for (point, &at) in self.coordinates(unknowns).enumerate() {
             let point_at = Point::new(self.space, at);
-            let back = match self.space {
+            let inverse = match self.space {
                 ObjectSpace::Rectangular => Matrix3::identity(),
-                ObjectSpace::Geographic(_) => inverse(&point_at.partials())?,
+                ObjectSpace::Geographic(_) => point_at.partials().try_inverse()?,
             };
             let Some(part) = parts.of_point[point] else { continue };
             let from = point_at.position() - origins[part];
             for (k, vector) in vectors[MOTIONS * part..][..MOTIONS].iter_mut().enumerate() {
-                let moved = back * displacement(k, &from);
+                let moved = inverse * displacement(k, &from);
                 vector[self.of_point(point)].copy_from_slice(moved.as_slice());
             }
         }

@@ -10,7 +10,7 @@ use super::mounts::{AT_PHOTO, Trajectory};
 use super::parts::Parts;
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::trajectory::{Active, Flight};
-use crate::geometry::{Matrix3, Pose, Vector3, inverse};
+use crate::geometry::{Matrix3, Pose, Vector3};
 use crate::sorting::sort_by;
 
 /// Times that are looked at for each function of a basis, at the most: those in between say the same.
@@ -130,9 +130,9 @@ impl<'a> Following<'a> {
     fn new(own: &'a Trajectory, times: &[(f64, f64)], [c, r]: &Changes) -> Self {
         let at = |&(weight, time): &(f64, f64)| (weight, own.course.at(time, &|k| c[k], &|k| r[k]));
         let flights: Vec<(f64, Flight)> = times.iter().map(at).collect();
-        let back = |(_, flight): &(f64, Flight)| inverse(&flight.jacobian).unwrap_or_default();
+        let inverse = |(_, flight): &(f64, Flight)| flight.jacobian.try_inverse().unwrap_or_default();
         Self {
-            to_corrections: flights.iter().map(back).collect(),
+            to_corrections: flights.iter().map(inverse).collect(),
             position: Band::new(c.len(), flights.iter().map(|(weight, flight)| (*weight, &flight.position))),
             rotation: Band::new(r.len(), flights.iter().map(|(weight, flight)| (*weight, &flight.rotation))),
             flights,

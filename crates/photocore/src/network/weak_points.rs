@@ -4,7 +4,7 @@ use super::median::median;
 use super::model::Bundle;
 use super::selection::TOGETHER;
 use super::{AdjustedPoint, Network};
-use crate::geometry::{self, Matrix3, principal_axes};
+use crate::geometry::{self, Matrix3};
 use crate::parallel;
 
 /// The largest standard deviation of a point over its smallest, from which on its rays are nearly parallel.
@@ -71,8 +71,11 @@ fn is_flat(cofactors: &Matrix3) -> bool {
 
 /// The largest standard deviation over the smallest.
 fn ratio(cofactors: &Matrix3) -> f64 {
-    let Some((eigenvalues, _)) = principal_axes(cofactors) else { return f64::NAN };
-    let (largest, smallest) = (eigenvalues.x, eigenvalues.z);
+    if !cofactors.iter().all(|value| value.is_finite()) {
+        return f64::NAN;
+    }
+    let eigenvalues = cofactors.symmetric_eigenvalues();
+    let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
     // The smallest of a matrix is known to its largest's rounding.
     if smallest > f64::EPSILON * largest { (largest / smallest).sqrt() } else { f64::INFINITY }
 }

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::model::Bundle;
 use super::observations::misalignment;
 use crate::adjustment::Term;
-use crate::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3, principal_axes};
+use crate::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3};
 
 /// Angles are the observation of a rotation where their phi may well be 90 degrees: by so many of their standard deviations, or
 const REACH: f64 = 3.0;
@@ -71,11 +71,9 @@ fn rotation_equations(
     let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
     let (residual, by_step) = misalignment(&numbers.attitude(angles), &numbers.attitude(observed));
     let rates = numbers.rates(observed) * Matrix3::from_diagonal(sd);
-    let Some((variances, axes)) = principal_axes(&(rates * rates.transpose())) else {
-        return (residual * f64::NAN, by_step * f64::NAN);
-    };
+    let eigen = (rates * rates.transpose()).symmetric_eigen();
     let least = if observed[1].cos().abs() < STEEP { sd.min() } else { 0.0 };
-    let root = variances.map(|variance| variance.sqrt().max(least).recip());
-    let root = axes * Matrix3::from_diagonal(&root) * axes.transpose();
+    let root = eigen.eigenvalues.map(|variance| variance.sqrt().max(least).recip());
+    let root = eigen.eigenvectors * Matrix3::from_diagonal(&root) * eigen.eigenvectors.transpose();
     (root * residual, root * by_step)
 }

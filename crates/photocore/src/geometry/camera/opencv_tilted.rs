@@ -3,7 +3,7 @@
 use super::inverse::{Matrix2, RadialLimit};
 use super::model::{CameraModel, Image, Unit, parameters};
 use super::vision::OpencvPinhole;
-use crate::geometry::{Matrix3, Vector3, inverse};
+use crate::geometry::{Matrix3, Vector3};
 
 /// [`OpencvPinhole`] with a sensor that is turned by `tau_x`, `tau_y` against the plane of the lens, as the documents of OpenCV have it:
 ///
@@ -127,7 +127,7 @@ impl CameraModel for OpencvTilted {
     /// None where the sensor is tilted beyond the ray, too.
     fn direction(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let [fx, fy, cx, cy] = std::array::from_fn(|k| self.lens.parameters[k]);
-        let h = inverse(&self.matrix())? * Vector3::new((x - cx) / fx, (y - cy) / fy, 1.0);
+        let h = self.matrix().try_inverse()? * Vector3::new((x - cx) / fx, (y - cy) / fy, 1.0);
         if h.z > 0.0 { self.normalised().direction([h.x / h.z, h.y / h.z]) } else { None }
     }
 

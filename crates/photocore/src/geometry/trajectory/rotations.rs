@@ -1,7 +1,7 @@
 //! What the coefficients of rotations are: rotation vectors, or the three angles of ISIS.
 
 use crate::geometry::angle_axis::{angle_axis_with_jacobian, right_jacobian_rate};
-use crate::geometry::{Matrix3, Vector3, inverse};
+use crate::geometry::{Matrix3, Vector3};
 
 /// What is added to the attitudes of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -67,7 +67,7 @@ impl Rotations {
             }
             Self::Zxz => {
                 let table = angles(&attitude);
-                let changes = inverse(&Self::zxz_jacobian(&table)).map(|inverse| inverse * rate);
+                let changes = Self::zxz_jacobian(&table).try_inverse().map(|inverse| inverse * rate);
                 let changes = changes.unwrap_or_else(|| Vector3::repeat(f64::NAN));
                 let turn = [table + turn[0], changes + turn[1]];
                 let jacobian = Self::zxz_jacobian(&turn[0]);

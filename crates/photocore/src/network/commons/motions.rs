@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{CommonState, Moves, PlacedCommon, turned};
-use crate::geometry::{Matrix3, Vector3, inverse};
+use crate::geometry::{Matrix3, Vector3};
 use crate::network::model::Bundle;
 use crate::network::observations::Observation;
 use crate::network::stations::Placed;
@@ -54,10 +54,10 @@ impl PlacedCommon {
             Vector3::zeros()
         } else if self.kind.is_axis() {
             let part = state.turns.fixed_view::<2, 2>(0, 0).into_owned();
-            let found = inverse(&part).unwrap_or_default() * turn.xy();
+            let found = part.try_inverse().unwrap_or_default() * turn.xy();
             Vector3::new(found.x, found.y, 0.0)
         } else {
-            inverse(&state.turns).unwrap_or_else(Matrix3::zeros) * turn
+            state.turns.try_inverse().unwrap_or_else(Matrix3::zeros) * turn
         }
     }
 

@@ -9,7 +9,7 @@
 //!
 //! Its minima over all rotations are found without the stations and without initial values.
 
-use nalgebra::DMatrix;
+use nalgebra::Matrix4;
 
 use super::transform::Similarity;
 use super::{SimilarityError, Station};
@@ -193,12 +193,12 @@ impl Moments {
     fn horn(&self) -> Result<Matrix3, SimilarityError> {
         let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = self.c.map(<[f64; 3]>::from);
         #[rustfmt::skip]
-        let matrix = DMatrix::from_row_slice(4, 4, &[
+        let matrix = Matrix4::new(
             xx + yy + zz, yz - zy, zx - xz, xy - yx,
             yz - zy, xx - yy - zz, xy + yx, zx + xz,
             zx - xz, xy + yx, yy - xx - zz, yz + zy,
             xy - yx, zx + xz, yz + zy, zz - xx - yy,
-        ]);
+        );
         let eigen =
             matrix.try_symmetric_eigen(f64::EPSILON, EIGEN_STEPS).ok_or(SimilarityError::NotFinite)?;
         let vector = eigen.eigenvectors.column(eigen.eigenvalues.imax());
