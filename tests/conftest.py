@@ -9,27 +9,21 @@ import pytest
 from typer.testing import CliRunner
 
 import browser as browsers
+from golden_data import shared
 from photogram import Block, simulate
 from photogram.cli import app
-from shared_data import SHARED
-
-STRASBOURG = SHARED / "strasbourg"
 
 
 @pytest.fixture(scope="session")
 def strasbourg() -> Path:
     """Directory of the Strasbourg block; the test is skipped where it is absent."""
-    if not STRASBOURG.is_dir():
-        pytest.skip("the Strasbourg block is not there (../shared/data/strasbourg)")
-    return STRASBOURG
+    return shared("strasbourg")
 
 
 @pytest.fixture(scope="session")
 def roma() -> Path:
     """Directory of the Roma photos; the test is skipped where it is absent."""
-    if not (SHARED / "roma").is_dir():
-        pytest.skip("the Roma photos are not there (../shared/data/roma)")
-    return SHARED / "roma"
+    return shared("roma")
 
 
 @pytest.fixture(scope="session")

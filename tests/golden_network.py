@@ -1,28 +1,16 @@
-"""Golden networks beside the repository, as blocks."""
+"""Golden networks as blocks."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
-import pytest
 
+from golden_data import golden
 from photogram import Attitudes, Block, Distance
 
-FOLDER = Path(__file__).parents[1] / "../shared/data/network"
 
-
-def golden_file(name: str) -> str:
-    """Return the text of a golden file, or skip where it is absent."""
-    if not FOLDER.is_dir():
-        pytest.skip("the golden networks are not there (../shared/data/network)")
-    return (FOLDER / name).read_text(encoding="utf-8")
-
-
-def free_network(file: str, *, bars: bool) -> Block:
+def free_network(*, bars: bool) -> Block:
     """Return the network of `free_network.json`, with its scale bars or without."""
-    inputs = json.loads(file)["inputs"]
+    inputs = golden("network", "free_network.json")["inputs"]
     initial, observed = inputs["initial"], inputs["observations"]
     photo_ids = [name for name in initial if name.startswith("photo")]
     point_ids = [name for name in initial if name.startswith("point")]

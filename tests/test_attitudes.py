@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
@@ -10,11 +9,9 @@ import numpy as np
 import pytest
 
 import photogram
+from golden_data import golden
 from photogram import Attitudes
 from photogram.network.attitudes import Representation
-
-GOLDEN = Path(__file__).parents[1] / "../shared/data/network/attitudes.json"
-golden = pytest.mark.skipif(not GOLDEN.exists(), reason="the shared golden data are not at hand")
 
 NAMES: dict[str, Representation] = {
     "omega_phi_kappa": "omega_phi_kappa",
@@ -34,7 +31,7 @@ def cases(name: str) -> list[tuple[int, dict, dict]]:
     """All golden attitudes with the figures of one representation."""
     found = [
         (index, case, case["representations"][name])
-        for index, case in enumerate(json.loads(GOLDEN.read_text())["cases"])
+        for index, case in enumerate(golden("network", "attitudes.json")["cases"])
     ]
     assert len(found) == 20
     return found
@@ -50,13 +47,11 @@ def differences(own: np.ndarray, given: np.ndarray, name: str) -> float:
     return np.abs((own - given + math.pi) % (2 * math.pi) - math.pi).max()
 
 
-@golden
 def test_the_golden_file_has_these_representations() -> None:
-    first = json.loads(GOLDEN.read_text())["cases"][0]["representations"]
+    first = golden("network", "attitudes.json")["cases"][0]["representations"]
     assert set(first) == set(NAMES)
 
 
-@golden
 @pytest.mark.parametrize("name", NAMES)
 def test_golden_attitudes(name: str) -> None:
     for index, case, figures in cases(name):
@@ -84,9 +79,8 @@ def test_golden_attitudes(name: str) -> None:
         assert np.abs(step[0] - expected).max() < 1e-9 * np.abs(expected).max()
 
 
-@golden
 def test_golden_matrix_of_vision() -> None:
-    for case in json.loads(GOLDEN.read_text())["cases"]:
+    for case in golden("network", "attitudes.json")["cases"]:
         attitude = Attitudes(np.array(case["matrix_photo_to_object"])[None])
         vision = np.array(case["matrix_vision_from_object"])
         assert np.abs(attitude.values("matrix_to_vision")[0] - vision).max() < 1e-15

@@ -1,6 +1,5 @@
 """Boards that bend: places of points that follow from two numbers, in a rig of two cameras."""
 
-import json
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -8,21 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from golden_data import golden as golden_file
 from photogram import Block, Camera, InputError, Result, adjust, adjust_in_parts, read_result
 from photogram.distributed import Division
 from photogram.network import Bend, Figure, Mount, Sensor, rotation_angles
-from shared_data import SHARED
 
-GOLDEN = SHARED / "targets" / "rig_small.json"
 NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
 FLIP = np.diag([1.0, -1.0, -1.0])
-
-pytestmark = pytest.mark.skipif(not GOLDEN.is_file(), reason="no golden data beside the repository")
 
 
 @cache
 def golden() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(GOLDEN.read_text())
+    found: dict[str, Any] = golden_file("targets", "rig_small.json")
     return found
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from example_scripts import load
+from golden_data import golden as golden_file
 from photogram import Block, Camera, adjust
 from photogram.network import project
 from photogram.results import calibrations, distortion_curve, lens_field
-from shared_data import SHARED
 
 FREE = np.inf
 NAMES = ("c", "xp", "yp", "K1", "K2", "K3", "P1", "P2")
@@ -27,10 +27,7 @@ def result(example):
 
 @pytest.fixture(scope="module")
 def golden():
-    path = SHARED / "network" / "selfcal.json"
-    if not path.exists():
-        pytest.skip("the golden networks are not there (../shared/data/network)")
-    return json.loads(path.read_text())
+    return golden_file("network", "selfcal.json")
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,6 @@ from photogram.cli.simulate import simulate as simulate_command
 from photogram.cli.simulation_options import MotionOptions
 from photogram.giant import read_project
 
-STRASBOURG = Path(__file__).parents[2] / "shared" / "data" / "strasbourg" / "giant"
 SMALL = ["--strips", "2", "--photos-per-strip", "4", "--points-per-photo", "30"]
 OUTPUTS = {"FRAMES", "GROUND", "RESTART", "report.html", "report.txt"}
 
@@ -284,15 +283,13 @@ def test_components_of_a_collection(run):
     assert "images, x" in Path("out/components.txt").read_text()
 
 
-def test_strasbourg(run, tmp_path):
-    if not STRASBOURG.exists():
-        pytest.skip("the Strasbourg block is not beside the repository")
-    result = run("giant", STRASBOURG, "--out", "out", "--json", "result.json")
+def test_strasbourg(run, strasbourg):
+    result = run("giant", strasbourg / "giant", "--out", "out", "--json", "result.json")
     # One of the two published check points is 0.3 m off, four standard deviations of the difference.
     assert result.exit_code == 4, result.output
     assert "Check points disagree with the adjustment: 1) 410, -0.294 m in Y" in result.output
     document = json.loads(Path("result.json").read_bytes())
-    expected = json.loads((STRASBOURG / "expected.json").read_bytes())
+    expected = json.loads((strasbourg / "giant" / "expected.json").read_bytes())
     for group in ("plates", "ground"):
         assert document["weighted_sum_of_squares"][group] == pytest.approx(
             expected["weighted_sum_of_squares"][group], rel=1e-6

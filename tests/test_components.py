@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from golden_data import golden
 from photogram import (
     Block,
     InputError,
@@ -20,10 +21,8 @@ from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 from photogram.results.group_sums import Probing, factored
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
-from shared_data import SHARED
 
 PUBLISHED = Path(__file__).parent / "data" / "statistics" / "published_problems.json"
-BLOCK = SHARED / "statistics" / "block6_components.json"
 EXACT = Probing(exact=10_000)
 
 
@@ -119,7 +118,7 @@ def test_a_negative_component_is_said_so_and_held(one_way):
 
 
 def six_photos():
-    given = json.loads(BLOCK.read_text())
+    given = golden("statistics", "block6_components.json")
     own = given["input"]
     photos, points = list(own["photos_initial"]), list(own["points_initial"])
     poses = np.array([own["photos_initial"][photo] for photo in photos])
@@ -145,7 +144,6 @@ def six_photos():
     return block, given
 
 
-@pytest.mark.skipif(not BLOCK.exists(), reason="needs shared/data/statistics")
 @pytest.mark.parametrize("which", ["two_helmert", "three_foerstner"])
 def test_six_photo_block(which):
     block, given = six_photos()
@@ -176,7 +174,6 @@ def test_six_photo_block(which):
     assert redundancy[:3] == pytest.approx(expected["log"][0]["r"], rel=1e-5)
 
 
-@pytest.mark.skipif(not BLOCK.exists(), reason="needs shared/data/statistics")
 def test_random_signs_are_near_the_exact_matrix_and_the_same_again():
     block, given = six_photos()
     signs = Probing(exact=30, vectors=64)
@@ -312,9 +309,8 @@ def test_sums_over_groups_follow_their_distribution(simulated):
     assert f"images, photo {simulated.photo_ids[photo]}" in [each.name for each in found]
 
 
-@pytest.mark.skipif(not BLOCK.exists(), reason="needs shared/data/statistics")
 def test_sums_of_the_six_photo_block():
-    given = json.loads((SHARED / "statistics" / "block6_components.json").read_text())
+    given = golden("statistics", "block6_components.json")
     block, _ = six_photos()
     sums = group_sums(adjust(block, tolerance=1e-8), "strip", probing=EXACT)
     first = given["three_helmert"]["log"][0]

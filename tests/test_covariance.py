@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import copy
-import json
 import pickle
 
 import numpy as np
 import pytest
 
 from example_scripts import load
-from golden_network import free_network, golden_file
+from golden_data import golden
+from golden_network import free_network
 from photogram import Attitudes, InnerConstraints, InputError, OutOfMemoryError, adjust
 
 
@@ -86,9 +86,8 @@ def test_the_bias_of_a_function_is_half_the_trace_of_its_second_derivatives(smal
 
 
 def test_a_relative_pose_by_propagation_knows_of_no_datum():
-    golden = golden_file("free_network.json")
-    expected = json.loads(golden)["relative_pose_photo5_in_photo1"]
-    minimum = adjust(free_network(golden, bars=True), tolerance=1e-9)
+    expected = golden("network", "free_network.json")["relative_pose_photo5_in_photo1"]
+    minimum = adjust(free_network(bars=True), tolerance=1e-9)
     first = Attitudes.of("matrix", np.array([expected["matrix"]])).values("matrix")[0]
 
     def relative(one, other):
@@ -135,8 +134,7 @@ def test_what_has_no_covariance_is_refused(small, monkeypatch):
 
 
 def test_points_that_were_left_out_have_none():
-    golden = golden_file("free_network.json")
-    block = free_network(golden, bars=False)
+    block = free_network(bars=False)
     seen = (block.image_points != 0) | (block.image_photos == block.image_photos[block.image_points == 0][0])
     fewer = block.replace(
         image_photos=block.image_photos[seen],

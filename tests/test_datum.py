@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from example_scripts import load
-from golden_network import free_network, golden_file
+from golden_data import golden
+from golden_network import free_network
 from photogram import AdjustmentError, Block, InnerConstraints, InputError, MinimumConstraints, Result, adjust
 
 FINE = 1e-9
 
 
-@pytest.fixture(scope="module")
-def golden():
-    return golden_file("free_network.json")
+def block_of(name: str) -> Block:
+    return free_network(bars=not name.startswith("no scale bar"))
 
 
-def block_of(golden, name: str) -> Block:
-    return free_network(golden, bars=not name.startswith("no scale bar"))
+def solution_of(name: str) -> dict[str, Any]:
+    return golden("network", "free_network.json")["solutions"][name]
 
 
 def datum_of(solution) -> InnerConstraints:
@@ -56,9 +57,9 @@ NAMES = (
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_golden_networks_in_their_datums(golden, name):
-    expected = json.loads(golden)["solutions"][name]
-    block, datum = block_of(golden, name), datum_of(expected)
+def test_golden_networks_in_their_datums(name):
+    expected = solution_of(name)
+    block, datum = block_of(name), datum_of(expected)
     result = adjust(block, tolerance=FINE, datum=datum)
     minimum = adjust(block, tolerance=FINE)
     assert minimum.datum.kind == "minimum constraints"
@@ -80,18 +81,18 @@ def test_golden_networks_in_their_datums(golden, name):
         assert found.datum.lost < 1e-9
 
 
-def test_what_is_held_may_be_chosen(golden):
-    expected = json.loads(golden)["solutions"]
+def test_what_is_held_may_be_chosen():
+    expected = golden("network", "free_network.json")["solutions"]
     held = MinimumConstraints(photo="photo1", coordinate=("photo5", "X"))
     for bars, name, chosen in (
         (True, "all points", MinimumConstraints(photo="photo1")),
         (False, "no scale bar, all points, with scale", held),
     ):
-        result = adjust(free_network(golden, bars=bars), tolerance=FINE, datum=chosen)
+        result = adjust(free_network(bars=bars), tolerance=FINE, datum=chosen)
         pose = [("photo1", unknown) for unknown in ("X", "Y", "Z", "omega", "phi", "kappa")]
         assert result.datum.held == (*pose, *([] if bars else [("photo5", "X")]))
         # Golden ones hold where the inner constraints have taken the network.
-        moved = adjust(free_network(golden, bars=bars), tolerance=FINE, datum=datum_of(expected[name]))
+        moved = adjust(free_network(bars=bars), tolerance=FINE, datum=datum_of(expected[name]))
         again = adjust(
             moved.block.replace(
                 photo_positions=moved.photo_positions,
@@ -104,9 +105,9 @@ def test_what_is_held_may_be_chosen(golden):
         compare(again, expected[name]["cofactors_minimum_constraints"])
 
 
-def test_relative_to_a_photo_is_what_holding_it_gives(golden):
-    expected = json.loads(golden)["solutions"]["all points"]
-    inner = adjust(free_network(golden, bars=True), tolerance=FINE, datum=datum_of(expected))
+def test_relative_to_a_photo_is_what_holding_it_gives():
+    expected = golden("network", "free_network.json")["solutions"]["all points"]
+    inner = adjust(free_network(bars=True), tolerance=FINE, datum=datum_of(expected))
     relative = inner.relative_to(photo="photo1")
     compare(relative, expected["cofactors_minimum_constraints"])
     np.testing.assert_array_equal(relative.photo_positions, inner.photo_positions)
@@ -114,11 +115,11 @@ def test_relative_to_a_photo_is_what_holding_it_gives(golden):
     assert str(relative.datum) == "relative to photo1"
     points = [f"point{k}" for k in range(5, 17)]
     by_points = relative.in_datum(InnerConstraints(points=points)).relative_to(points=points)
-    compare(by_points, json.loads(golden)["solutions"]["points 5 to 16"]["cofactors"])
+    compare(by_points, golden("network", "free_network.json")["solutions"]["points 5 to 16"]["cofactors"])
 
 
-def test_standard_deviations_say_what_they_refer_to(golden):
-    result = adjust(free_network(golden, bars=False), datum=InnerConstraints(photos=None))
+def test_standard_deviations_say_what_they_refer_to():
+    result = adjust(free_network(bars=False), datum=InnerConstraints(photos=None))
     assert str(result.datum) == "inner constraints over 40 points and 8 photos, scale included"
     report = result.report()
     assert report.count(f"standard deviations: {result.datum}") == 2
@@ -127,17 +128,17 @@ def test_standard_deviations_say_what_they_refer_to(golden):
     assert document["kind"] == "inner constraints"
     assert document["scale"] is True
     assert len(document["points"]) == 40
-    barred = adjust(free_network(golden, bars=True), datum=InnerConstraints(photos=None))
+    barred = adjust(free_network(bars=True), datum=InnerConstraints(photos=None))
     assert str(barred.datum) == "inner constraints over 40 points and 8 photos"
     assert json.loads(barred.to_json())["datum"]["scale"] is False
     assert result.point_table().attrs["datum"] == str(result.datum)
     assert any("inner constraints" in str(message) for message in result.messages)
-    minimum = adjust(free_network(golden, bars=False))
+    minimum = adjust(free_network(bars=False))
     again = minimum.in_datum(InnerConstraints(photos=None))
     assert [str(m) for m in again.messages] == [str(m) for m in result.messages]
 
 
-def test_a_block_that_is_not_free_says_why(golden, small_block):
+def test_a_block_that_is_not_free_says_why(small_block):
     assert adjust(small_block).datum.kind == "observations"
     with pytest.raises(AdjustmentError, match=r"not free: its datum is given by .*control \(1\)"):
         adjust(small_block, datum=InnerConstraints())
@@ -148,8 +149,8 @@ def test_a_block_that_is_not_free_says_why(golden, small_block):
     assert (relative.photo_sd[0] == 0).all()
 
 
-def test_datums_that_cannot_be_are_refused(golden):
-    block = free_network(golden, bars=False)
+def test_datums_that_cannot_be_are_refused():
+    block = free_network(bars=False)
     result = adjust(block)
     for points in (["point1", "point2"], []):
         with pytest.raises(InputError, match="do not carry it"):
@@ -170,11 +171,11 @@ def test_datums_that_cannot_be_are_refused(golden):
         result.in_datum(MinimumConstraints())  # type: ignore[arg-type]
 
 
-def apart(golden, *, joined: bool) -> Block:
+def apart(*, joined: bool) -> Block:
     """Return the network twice, the second one beside the first, joined by distances or not."""
     from photogram import Distance
 
-    block = free_network(golden, bars=False)
+    block = free_network(bars=False)
     block = block.replace(point_positions=adjust(block, datum=InnerConstraints()).point_positions)
     shift = np.array([25.0, 3.0, 1.0])
     photos, points = len(block.photo_ids), len(block.point_ids)
@@ -205,9 +206,9 @@ def apart(golden, *, joined: bool) -> Block:
     )
 
 
-def test_every_part_of_a_network_has_its_datum(golden):
-    one = adjust(free_network(golden, bars=False), tolerance=FINE)
-    block = apart(golden, joined=False)
+def test_every_part_of_a_network_has_its_datum():
+    one = adjust(free_network(bars=False), tolerance=FINE)
+    block = apart(joined=False)
     both = adjust(block, tolerance=FINE)
     assert len(both.datum.held) == 14
     assert both.degrees_of_freedom == 2 * one.degrees_of_freedom
@@ -222,8 +223,8 @@ def test_every_part_of_a_network_has_its_datum(golden):
     np.testing.assert_allclose(first.point_sd, np.vstack([inner.point_sd, both.point_sd[40:]]), rtol=1e-5)
 
 
-def test_parts_that_distances_join_are_one(golden):
-    both = adjust(apart(golden, joined=True), tolerance=FINE)
+def test_parts_that_distances_join_are_one():
+    both = adjust(apart(joined=True), tolerance=FINE)
     assert both.converged
     assert len(both.datum.held) == 6
     freedom = 2 * len(both.residuals) + 12 - (6 * 16 + 3 * 80) + 6

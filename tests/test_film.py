@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from golden_data import DATA, golden
 from photogram import Camera, InputError, Result, adjust, diagnose, first_values, read_result, simulate
 from photogram.film import interior_orientation, which_mark
 from photogram.formats import Project, read
 from photogram.network import Film, FilmPlacement, FilmSize, Readings, Scan, Scanner
-from shared_data import SHARED
 
-FOLDER = SHARED / "film"
+FOLDER = DATA / "film"
 KINDS = {
     "fiducial readings": "fiducial",
     "film": "film",
@@ -25,13 +25,8 @@ KINDS = {
 }
 """What the golden data call a kind, and what results do."""
 
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="no golden data beside the repository")
 
-
-@cache
-def golden() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((FOLDER / "film.json").read_text())
-    return found
+FILM: dict[str, Any] = golden("film", "film.json")
 
 
 def project(folder: Path, settings: str = "") -> Project:
@@ -49,7 +44,7 @@ def adjusted(settings: str = "") -> Result:
 
 
 def test_golden_sums() -> None:
-    wanted, result = golden()["full"]["adjustment"], adjusted()
+    wanted, result = FILM["full"]["adjustment"], adjusted()
     assert result.sum_and_freedom == (pytest.approx(wanted["omega"], rel=1e-9), wanted["dof"])
     for name, own in KINDS.items():
         kind, sums = result.kinds[own], wanted["by_kind"][name]
@@ -67,7 +62,7 @@ def test_golden_sums() -> None:
 
 
 def test_golden_values_of_photos_and_films() -> None:
-    wanted, result = golden()["full"]["photos"], adjusted()
+    wanted, result = FILM["full"]["photos"], adjusted()
     values, cofactors = result.film, result.film_cofactors
     for row, name in enumerate(result.block.photo_ids):
         own = wanted[name]
@@ -81,7 +76,7 @@ def test_golden_values_of_photos_and_films() -> None:
 
 
 def test_golden_points_and_camera() -> None:
-    wanted, result = golden()["full"], adjusted()
+    wanted, result = FILM["full"], adjusted()
     for row, name in enumerate(result.block.point_ids):
         own = wanted["points"].get(name)
         if own is not None:
@@ -92,7 +87,7 @@ def test_golden_points_and_camera() -> None:
 
 
 def test_golden_marks_roll_pattern_and_scanner() -> None:
-    wanted, result = golden()["full"], adjusted()
+    wanted, result = FILM["full"], adjusted()
     own = {(each.kind, each.name): each for each in result.unknowns}
     for name, mark in wanted["fiducials"].items():
         found = own["fiducial", f"rc10 {name}"]
@@ -105,7 +100,7 @@ def test_golden_marks_roll_pattern_and_scanner() -> None:
 
 
 def test_golden_readings_have_residuals_redundancy_and_tests() -> None:
-    wanted, kind = golden()["full"]["fiducial_readings"], adjusted().kinds["fiducial"]
+    wanted, kind = FILM["full"]["fiducial_readings"], adjusted().kinds["fiducial"]
     rows = {name: row for row, name in enumerate(kind.names)}
     for each in wanted:
         row = rows[f"{each['photo']} - rc10 {each['fiducial']}"]
@@ -115,7 +110,7 @@ def test_golden_readings_have_residuals_redundancy_and_tests() -> None:
 
 
 def test_golden_two_steps() -> None:
-    wanted, result = golden()["two_steps"], adjusted('[film]\ninterior = "before"\n')
+    wanted, result = FILM["two_steps"], adjusted('[film]\ninterior = "before"\n')
     sums = wanted["adjustment"]
     assert result.sum_and_freedom == (pytest.approx(sums["omega"], rel=1e-9), sums["dof"])
     for row, name in enumerate(result.block.point_ids):
@@ -126,7 +121,7 @@ def test_golden_two_steps() -> None:
 
 @pytest.mark.parametrize("photo", [f"p{k}" for k in range(1, 7)])
 def test_golden_interior_orientation(tmp_path: Path, photo: str) -> None:
-    wanted = golden()["interior_orientation_alone"][photo]
+    wanted = FILM["interior_orientation_alone"][photo]
     found = interior(project(tmp_path), photo)
     assert found.omega == pytest.approx(wanted["omega"], rel=1e-8)
     assert found.degrees_of_freedom == wanted["dof"]
@@ -283,8 +278,8 @@ def test_a_bilinear_film_and_a_grid_are_adjusted(tmp_path: Path) -> None:
     own = project(tmp_path, '[film]\nmodel = "bilinear"\n')
     films = (tmp_path / "films.csv").read_text().splitlines()
     bilinear = adjust(own.block)
-    assert bilinear.degrees_of_freedom == golden()["full"]["adjustment"]["dof"]
-    assert bilinear.sum_and_freedom[0] < golden()["full"]["adjustment"]["omega"]
+    assert bilinear.degrees_of_freedom == FILM["full"]["adjustment"]["dof"]
+    assert bilinear.sum_and_freedom[0] < FILM["full"]["adjustment"]["omega"]
     head = films[0].replace("half_format_mm", "grid_x,grid_y,grid_dx,grid_dy,grid_columns,grid_rows")
     row = films[1].replace("w1 w2", "grid").replace("113.0", "-115,-115,115,115,3,3")
     (tmp_path / "films.csv").write_text(f"{head}\n{row}\n")

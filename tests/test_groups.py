@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from golden_data import golden
 from photogram.statistics import (
     bonferroni,
     critical_tau,
@@ -15,7 +16,6 @@ from photogram.statistics import (
     log_fisher,
     parts_tests,
 )
-from shared_data import SHARED
 from test_statistics import PUBLISHED
 
 SMALL = PUBLISHED.with_name("small_problems.json")
@@ -23,10 +23,7 @@ SMALL = PUBLISHED.with_name("small_problems.json")
 
 @pytest.fixture(scope="module")
 def block():
-    path = SHARED / "statistics" / "block6_blunders.json"
-    if not path.exists():
-        pytest.skip("the six-photo block is not there (../shared/data/statistics)")
-    return json.loads(path.read_text())
+    return golden("statistics", "block6_blunders.json")
 
 
 def grouped(adjustment, size):

@@ -1,16 +1,14 @@
 """Splined cameras: knots beside the parameters, as mrcal has them."""
 
-import json
 import pickle
 
 import numpy as np
 import pytest
 
+from golden_data import golden
 from photogram import Attitudes, Block, Camera, InputError, adjust
 from photogram.network.knots import beyond_knots
-from shared_data import SHARED
 
-TARGETS = SHARED / "targets"
 CORE = {"fx": 700.0, "fy": 705.0, "cx": 640.0, "cy": 480.0}
 SPLINE = {"order": 3, "nx": 11, "ny": 8, "fov_x_deg": 120.0}
 
@@ -30,9 +28,8 @@ def looking(rays):
     return np.asarray(rays) * [1, -1, -1]
 
 
-@pytest.mark.skipif(not TARGETS.is_dir(), reason="no golden data at hand")
 def test_images_and_partials_are_those_of_mrcal():
-    cases = json.loads((TARGETS / "splined.json").read_text())["projections"]
+    cases = golden("targets", "splined.json")["projections"]
     for case in [each for each in cases if isinstance(each["knots"], list)]:
         words = dict(each.split("=") for each in case["model"].replace("fov_x_deg", "fov").split("_")[3:])
         shape, fov = (int(words["Ny"]), int(words["Nx"])), float(words["fov"])

@@ -3,12 +3,11 @@
 Tolerances are those of its README unless a comment says why not.
 """
 
-import json
-
 import numpy as np
 import pytest
 
 from example_scripts import load
+from golden_data import golden as golden_file
 from photogram import Block, Camera, InputError, Position, Spheroid, adjust
 from photogram.network import (
     Attitude,
@@ -31,17 +30,11 @@ from photogram.network import (
     Velocity,
     projected,
 )
-from shared_data import SHARED
-
-MOVING = SHARED / "moving"
 
 
 def golden(name):
-    """Return inputs and solution of a golden network, or skip."""
-    path = MOVING / f"{name}.json"
-    if not path.exists():
-        pytest.skip(f"no {path}")
-    data = json.loads(path.read_text())
+    """Return inputs and solution of a golden network."""
+    data = golden_file("moving", f"{name}.json")
     return data["inputs"], data["solution"]
 
 

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import photogram
 import photogram.collection
+from golden_data import golden
 from linear_trial import LinearTrial
 from photogram import Block, Distance
 from photogram.adjustment.snooping import block_trial
@@ -20,16 +21,8 @@ from photogram.statistics.snooping.snooping import Settings, snooped
 from photogram.statistics.snooping.starts import _robust_sizes
 from photogram.statistics.snooping.suspects import Prediction
 from photogram.statistics.snooping.taking_out import with_prediction
-from shared_data import SHARED
 
 DATA = Path(__file__).parent / "data" / "statistics"
-
-
-def golden():
-    file = SHARED / "statistics" / "block6_blunders.json"
-    if not file.is_file():
-        pytest.skip("the golden block is not there (../shared/data/statistics)")
-    return json.loads(file.read_text(encoding="utf-8"))
 
 
 def golden_block(given):
@@ -63,7 +56,7 @@ def called(observation):
 
 @pytest.mark.parametrize(("unit_weight", "log"), [("known", "snoop_chi2"), ("unknown", "snoop_F")])
 def test_golden_logs(unit_weight, log):
-    data = golden()
+    data = golden("statistics", "block6_blunders.json")
     expected = data[log]
     found = photogram.snoop(golden_block(data["input"]), unit_weight=unit_weight, parts=False)
     rounds = expected["log"]
@@ -105,7 +98,7 @@ def test_golden_logs(unit_weight, log):
 
 def test_groups_of_the_golden_block():
     """R, T, dimensions, estimated errors and effects of every observation, straight from the core."""
-    data = golden()
+    data = golden("statistics", "block6_blunders.json")
     block = golden_block(data["input"])
     result = photogram.adjust(block, tolerance=1e-9)
     trial = block_trial(block, result.state, result.options)
@@ -145,7 +138,7 @@ def lambda0_of(dimension):
 
 
 def test_correlations_on_a_point():
-    data = golden()
+    data = golden("statistics", "block6_blunders.json")
     block = golden_block(data["input"])
     result = photogram.adjust(block, tolerance=1e-9)
     trial = block_trial(block, result.state, result.options)
@@ -165,7 +158,7 @@ def test_correlations_on_a_point():
 
 def test_by_the_bound_as_exactly(monkeypatch):
     """The way for large networks finds the same in the golden block."""
-    data = golden()
+    data = golden("statistics", "block6_blunders.json")
     block = golden_block(data["input"])
     exact = photogram.snoop(block, parts=False)
     monkeypatch.setattr(network_trial, "WHOLE", 0)
@@ -175,7 +168,7 @@ def test_by_the_bound_as_exactly(monkeypatch):
 
 
 def test_a_height_goes_alone():
-    data = golden()
+    data = golden("statistics", "block6_blunders.json")
     found = photogram.snoop(golden_block(data["input"]))
     assert "Z of control point 033" in [entry.name for entry in found.removed]
     assert np.isinf(found.result.block.point_sd[found.result.block.point_ids.index("033")]).tolist() == [
@@ -342,7 +335,7 @@ def test_collections():
 
 
 def test_the_log_in_every_form():
-    data = golden()
+    data = golden("statistics", "block6_blunders.json")
     found = photogram.snoop(golden_block(data["input"]))
     report = found.report()
     assert "Taken out, in order" in report
@@ -367,7 +360,7 @@ def test_options_that_cannot_be(options):
 
 
 def test_reliability():
-    data = golden()
+    data = golden("statistics", "block6_blunders.json")
     block = golden_block(data["input"])
     result = photogram.adjust(block, tolerance=1e-9)
     found = result.reliability()

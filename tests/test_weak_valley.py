@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import photogram
+from golden_data import shared
 from photogram import Camera, adjust, formats
 from photogram.formats.supplements import self_calibrated
-from shared_data import SHARED
 
 WORDS = "(principal distance and "
 
@@ -66,9 +66,7 @@ def test_what_is_weak_is_named_where_the_iterations_run_out():
 
 @pytest.fixture(scope="module")
 def project():
-    if not (SHARED / "bathtub").exists():
-        pytest.skip("the bathtub is not there (../shared/data/bathtub)")
-    return formats.read(SHARED / "bathtub")
+    return formats.read(shared("bathtub"))
 
 
 @pytest.fixture
@@ -110,9 +108,7 @@ def test_a_camera_that_is_unknown_too_comes_to_rest_with_a_loss(project):
 
 @pytest.fixture(scope="module")
 def trafalgar():
-    path = SHARED / "bal" / "problem-21-11315-pre.txt"
-    if not path.exists():
-        pytest.skip("the problem is not there (../shared/data/bal)")
+    path = shared("bal", "problem-21-11315-pre.txt")
     return self_calibrated(formats.read(path), ["f", "k1", "k2"]).block, photogram.collection.read(path)
 
 

@@ -1,17 +1,15 @@
 """Hints of the absolute orientation against the golden likelihood ratios of the specification."""
 
-import json
 import re
 
 import numpy as np
 import pytest
 
+from golden_data import golden as golden_file
 from photogram import orient
 from photogram.absolute_orientation import Stations, hints
 from photogram.statistics.likelihood import judged, likelihood
-from shared_data import SHARED
 
-FILE = SHARED / "statistics" / "small_problems.json"
 CASES = (
     "clean",
     "heights are feet",
@@ -35,9 +33,7 @@ SAID = {
 
 @pytest.fixture(scope="module")
 def golden():
-    if not FILE.is_file():
-        pytest.skip(f"the golden problems are not there ({FILE})")
-    return json.loads(FILE.read_text(encoding="utf-8"))["similarity_hints"]
+    return golden_file("statistics", "small_problems.json")["similarity_hints"]
 
 
 def stations(golden, case):

@@ -1,20 +1,18 @@
 """Bundle files of Bundler: read, recognised, written; what is damaged is named with file and line."""
 
 import gzip
-import json
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from golden_data import DATA, golden
 from photogram import InputError, _photocore
 from photogram.collection import adjust, read, simulate, to_bytes
 from photogram.collection.formats import FORMATS, recognised
 
-DATA = Path(__file__).parents[3] / "shared" / "data" / "formats"
 RING = simulate(photos=5, points=12, seed=4)
 TEXT = to_bytes(RING.collection, file_format="bundler").decode()
 LINES = TEXT.splitlines()
@@ -29,11 +27,8 @@ def written(tmp_path, text):
 
 
 def test_the_sample_is_what_its_truth_says():
-    path = DATA / "bundler" / "bundle.out"
-    if not path.is_file():
-        pytest.skip("the samples are not there (../shared/data/formats)")
-    found, kind = recognised(path)
-    truth = json.loads((DATA / "truth.json").read_text())
+    found, kind = recognised(DATA / "formats" / "bundler" / "bundle.out")
+    truth = golden("formats", "truth.json")
     assert kind is FORMATS["bundler"]
     assert len(found.photo_parameters) == 6
     assert len(found.point_positions) == 40

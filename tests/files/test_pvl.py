@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from golden_data import shared
 from photogram import InputError
 from photogram.io.pvl import Group, Quantity, label_text, parsed
-from shared_data import SHARED
 
 FILE = Path("some.lbl")
 
@@ -132,9 +132,8 @@ def test_a_text_that_no_marks_hold_is_refused(text):
         label_text(Group("", "label", items=[("key", text)]))
 
 
-@pytest.mark.skipif(not (SHARED / "moving").is_dir(), reason="the published network is not there")
 def test_a_published_network_is_a_label():
-    text = (SHARED / "moving" / "lro" / "observationPair.net").read_text(encoding="utf-8")
+    text = shared("moving", "lro", "observationPair.net").read_text(encoding="utf-8")
     (network,) = parsed(text, FILE).groups("ControlNetwork")
     assert len(network.groups("ControlPoint")) == 46
     assert network.get("Version") == 5

@@ -1,12 +1,12 @@
 """Certificates of public reports, distances and distortion: figures of an independent dense program."""
 
 import csv
-import json
 import math
 
 import numpy as np
 import pytest
 
+from golden_data import DATA, golden
 from photogram.film import (
     Certificate,
     Crossing,
@@ -16,22 +16,15 @@ from photogram.film import (
     adjust_distances,
 )
 from photogram.film.lens_table import backward, chosen, curves_of, fit_curve, forward
-from shared_data import SHARED
 
-FILM = SHARED / "film"
-pytestmark = pytest.mark.skipif(not FILM.is_dir(), reason="needs shared/data/film")
 PAIRS = {"lr": ("ml", "mr"), "tb": ("mt", "mb"), "llur": ("ll", "ur"), "ullr": ("ul", "lr")}
-
-
-def golden(name):
-    return json.loads((FILM / f"{name}.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
 def reports():
     """Return the collected reports as certificates, figures as they were typed."""
     found = {}
-    with open(FILM / "certificates.csv", encoding="utf-8") as file:
+    with open(DATA / "film" / "certificates.csv", encoding="utf-8") as file:
         for row in csv.DictReader(file):
             marks = [mark for pair in PAIRS.values() for mark in pair if row[f"{mark}x"] and row[f"{mark}y"]]
             typed = {f"{mark}.{axis}": row[f"{mark}{axis}"] for mark in marks for axis in "xy"}
@@ -50,7 +43,8 @@ def reports():
 
 def test_the_seven_and_no_other_differ_beyond_the_limit(reports):
     wanted = {
-        each["certificate"]: each for each in golden("certificates_expected")["differences_beyond_the_limit"]
+        each["certificate"]: each
+        for each in golden("film", "certificates_expected.json")["differences_beyond_the_limit"]
     }
     assert len(reports) == 38
     beyond = {name: [d for d in one.check() if d.beyond] for name, one in reports.items()}
@@ -67,7 +61,7 @@ def test_the_seven_and_no_other_differ_beyond_the_limit(reports):
 
 
 def test_single_changes_explain_what_they_are_said_to(reports):
-    for each in golden("certificates_expected")["differences_beyond_the_limit"]:
+    for each in golden("film", "certificates_expected.json")["differences_beyond_the_limit"]:
         (found,) = (d for d in reports[each["certificate"]].check() if d.beyond)
         mine = {(one.field.replace(".", ""), one.perhaps, one.how): one for one in found.explanations}
         assert len(mine) == each["number_of_explanations"]
@@ -87,14 +81,14 @@ def test_usual_places_decide_between_changes_of_a_kind(reports):
 
 @pytest.mark.parametrize("case", ["four_distances_and_design", "four_distances_design_angle_crossing"])
 def test_too_few_distances_go_with_design_places(case):
-    compare(case, golden("distances")[case])
+    compare(case, golden("film", "distances.json")[case])
 
 
 @pytest.mark.parametrize(
     "case", ["four_marks_six_distances_free", "eight_marks_all_distances_one_typed_wrong"]
 )
 def test_enough_distances_are_adjusted_freely(case):
-    wanted = golden("distances")[case]
+    wanted = golden("film", "distances.json")[case]
     found = compare(case, wanted)
     assert found.free == 3
     assert np.linalg.matrix_rank(found.covariance, tol=1e-12) == 2 * len(found.names) - 3
@@ -131,7 +125,7 @@ def compare(case, wanted):
 
 
 def test_a_distance_typed_wrong_is_located():
-    wanted = golden("distances")["eight_marks_all_distances_one_typed_wrong"]
+    wanted = golden("film", "distances.json")["eight_marks_all_distances_one_typed_wrong"]
     found = compare("", wanted)
     worst = int(np.nanargmax(np.abs(found.standardized)))
     assert found.rows[worst] == wanted["typed_wrong"]["pair"]
@@ -153,7 +147,7 @@ def table(given, correlation=0.0):
     [("terms_1", 1, 0), ("terms_2", 2, 0), ("terms_3", 3, 0), ("terms_2_correlated_0.3", 2, 0.3)],
 )
 def test_curves_and_cameras_of_a_table(case, terms, correlation):
-    every = golden("distortion")
+    every = golden("film", "distortion.json")
     given, wanted = every["given"], every[case]
     c0, sd_c0 = given["calibrated_focal_length_mm"], given["sd_focal_length_mm"]
     found = fit_curve(table(given, correlation), c0, sd_c0, terms)
@@ -187,7 +181,7 @@ def alike(values, covariance, wanted, cofactors):
 
 
 def test_the_choice_of_terms_and_the_mapping():
-    every = golden("distortion")
+    every = golden("film", "distortion.json")
     given, choice = every["given"], every["choice"]
     curves = curves_of(table(given), given["calibrated_focal_length_mm"], given["sd_focal_length_mm"])
     assert [each.omega for each in curves] == pytest.approx(choice["omega"], rel=1e-9)

@@ -1,22 +1,19 @@
 """Certificates and calibrations of scanners in projects: camera, marks and scanner with their covariances."""
 
-import json
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from golden_data import golden
 from photogram import InputError, _photocore, adjust
 from photogram.comparator import Correction, Frame, Polynomial
 from photogram.film import Certificate, interior_orientation
 from photogram.film.distances import with_datum
 from photogram.formats import Project, read, to_files
 from photogram.network import Fiducial, Film, FilmPlacement, FilmSize, KnownTogether
-from shared_data import SHARED
 from test_film import project
-
-pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 
 CERTIFICATE = """[certificate]
 camera = "rc10"
@@ -126,8 +123,8 @@ def test_marks_by_distances_have_a_datum_that_changes_nothing(
 
 
 def test_a_datum_is_of_shifts_and_rotation_alone() -> None:
-    golden = json.loads((SHARED / "film" / "distances.json").read_text())
-    free = golden["eight_marks_all_distances_one_typed_wrong"]
+    expected = golden("film", "distances.json")
+    free = expected["eight_marks_all_distances_one_typed_wrong"]
     covariance, places = np.array(free["covariance"]), np.array(free["coordinates"])
     found, movements = with_datum(places, covariance)
     assert movements == 3

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from golden_data import DATA, golden
 from photogram import InputError, Result, adjust, formats, simulate
 from photogram.network import Fiducial, Film, KnownTogether, Mark
 from photogram.results.film_pictures import film_patterns, mark_residuals, mean_mark_residuals
 from photogram.results.film_report import film_table, scanner_table
 from photogram.show.quantity import labelled
-from shared_data import SHARED
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 
@@ -71,9 +71,8 @@ def test_lost_marks_are_named_and_the_largest_test_is_that_of_both_coordinates()
         assert value == residuals.tests[residuals.photos == row].max()
 
 
-@pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 def test_golden_tests_of_readings(tmp_path: Path) -> None:
-    for path in (SHARED / "film" / "block").glob("*.csv"):
+    for path in (DATA / "film" / "block").glob("*.csv"):
         (tmp_path / path.name).write_bytes(path.read_bytes())
     (tmp_path / "project.toml").write_text('[project]\nformat = 1\n\n[units]\nimage = "mm"\n')
     result = adjust(formats.read(tmp_path).block, tolerance=1e-9)
@@ -82,7 +81,7 @@ def test_golden_tests_of_readings(tmp_path: Path) -> None:
         (result.block.photo_ids[photo], mark): test
         for photo, mark, test in zip(found.photos.tolist(), found.marks, found.tests.tolist(), strict=True)
     }
-    wanted = json.loads((SHARED / "film" / "film.json").read_text())["full"]["fiducial_readings"]
+    wanted = golden("film", "film.json")["full"]["fiducial_readings"]
     assert len(wanted) == len(tests)
     for each in wanted:
         own = tests[each["photo"], f"rc10 {each['fiducial']}"]

@@ -11,10 +11,7 @@ from photogram.cli import app
 from photogram.errors import ContradictionError
 from photogram.film import interior_orientation
 from photogram.formats import read
-from shared_data import SHARED
 from test_film import project
-
-pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 
 
 def rewritten(path: Path, change: dict[str, str]) -> None:

@@ -11,10 +11,7 @@ from photogram import InputError, adjust
 from photogram.formats import Project, read, to_files
 from photogram.formats.adjusted import adjusted
 from photogram.network import Fiducial, KnownFilm
-from shared_data import SHARED
 from test_film import project
-
-pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 
 
 def written(own: Project, folder: Path) -> Project:

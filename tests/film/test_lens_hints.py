@@ -10,11 +10,9 @@ from photogram import Block, Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_lenses import lens_hints
 from photogram.formats import read
-from shared_data import SHARED
 from test_film import project
 
 ARCHIVE = files("photogram") / "examples" / "archive"
-GOLDEN = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 
 
 def archive(folder: Path, **changes: str) -> Path:
@@ -47,7 +45,6 @@ def test_what_the_hint_says_mends_it(tmp_path: Path) -> None:
     assert result.sums_of_squares.total == pytest.approx(given.sums_of_squares.total, rel=1e-9)
 
 
-@GOLDEN
 def test_the_score_is_what_another_adjustment_gives(tmp_path: Path) -> None:
     """The golden block with both terms turned: the sum of squares falls to that of the block as it is."""
     given = adjust(project(tmp_path).block)

@@ -7,18 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from golden_data import golden
 from photogram import InputError, Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
 from photogram.diagnosis.film_marks import mark_hints
 from photogram.diagnosis.film_scans import seam_hints
 from photogram.film import compare_steps
 from photogram.formats import read
-from shared_data import SHARED
 from test_film import project
 
 ARCHIVE = files("photogram") / "examples" / "archive"
-
-pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 
 
 def adjusted(folder: Path, table: str, change: dict[tuple[str, str], dict[int, float]]) -> Result:
@@ -37,9 +35,9 @@ def test_two_steps_have_smaller_standard_deviations(tmp_path: Path) -> None:
     with (tmp_path / "project.toml").open("a") as settings:
         settings.write('\n[film]\ninterior = "before"\n')
     before = adjust(read(tmp_path).block)
-    golden = json.loads((SHARED / "film" / "film.json").read_text())
+    expected = golden("film", "film.json")
     sd = [
-        np.array([golden[which]["points"][name]["sd"] for name in golden["full"]["points"]])
+        np.array([expected[which]["points"][name]["sd"] for name in expected["full"]["points"]])
         for which in ("full", "two_steps")
     ]
     ratio = 100.0 * (np.median(sd[1] / sd[0], axis=0) - 1.0)

@@ -12,10 +12,7 @@ from photogram import InputError
 from photogram.formats import Project, Wishes, read, read_marks, write_marks
 from photogram.io.csv_text import csv_text
 from photogram.network import Fiducial
-from shared_data import SHARED
 from test_film import project, project_again
-
-pytestmark = pytest.mark.skipif(not (SHARED / "film").is_dir(), reason="no golden data beside the repository")
 
 
 def written(own: Project, folder: Path) -> Path:

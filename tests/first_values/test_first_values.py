@@ -6,6 +6,7 @@ import pytest
 
 import photogram
 from example_scripts import load
+from golden_data import shared
 from photogram import (
     AdjustmentError,
     Block,
@@ -19,9 +20,6 @@ from photogram import (
 )
 from photogram.giant import read_project
 from photogram.network import Attitude, Boresight, rotation_matrix
-from shared_data import SHARED
-
-ROMA = SHARED / "roma"
 
 
 def agree(found, good, *, datum=True):
@@ -279,9 +277,7 @@ def test_strasbourg(strasbourg):
 
 def test_roma():
     """Sixty photos without control or poses: sigma0 of the fixed interior orientation without affinity."""
-    if not ROMA.is_dir():
-        pytest.skip("the Roma block is not there (../shared/data/roma)")
-    frame, point, column, row = np.loadtxt(ROMA / "markpts.txt", delimiter=",", unpack=True)
+    frame, point, column, row = np.loadtxt(shared("roma", "markpts.txt"), delimiter=",", unpack=True)
     photos, image_photos = np.unique(frame, return_inverse=True)
     points, image_points = np.unique(point, return_inverse=True)
     pixel = 36.0 / 5616

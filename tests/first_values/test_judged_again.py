@@ -6,15 +6,13 @@ import networks
 import numpy as np
 import pytest
 
+from golden_data import shared
 from photogram import adjust, adjust_started, first_values, formats
-from shared_data import SHARED
-
-CAMCAL = SHARED / "camcal"
 
 
 def printed(kind, count):
     """Return figures of the reference program's report, behind the word `kind`, as text."""
-    text = (CAMCAL / "expected_report.txt").read_text()
+    text = shared("camcal", "expected_report.txt").read_text()
     found = re.findall(rf"{kind}: +(\S+) ?(?:mm\S*|deg|ou)? *$", text, re.MULTILINE)
     assert len(found) >= count
     return found
@@ -22,9 +20,7 @@ def printed(kind, count):
 
 @pytest.fixture(scope="module")
 def calibrated():
-    if not CAMCAL.exists():
-        pytest.skip("the calibration of the demonstration is not there (../shared/data/camcal)")
-    block = formats.read(CAMCAL / "camcaldemo.xml").block
+    block = formats.read(shared("camcal", "camcaldemo.xml")).block
     return adjust_started(first_values(block), unit_variance="free")
 
 
@@ -105,12 +101,11 @@ def test_too_many_are_no_result():
     assert result.verdict.exit == 4
 
 
-@pytest.mark.skipif(not CAMCAL.exists(), reason="the calibration of the demonstration is not there")
 @pytest.mark.parametrize(
     ("options", "said"), [([], "were set aside"), (["--keep-all"], "take part all the same")]
 )
 def test_the_command_takes_all_that_fits_in(run, tmp_path, options, said):
-    path = str(CAMCAL / "camcaldemo.xml")
+    path = str(shared("camcal", "camcaldemo.xml"))
     done = run("adjust", path, "--out", str(tmp_path / "out"), "--no-html", *options)
     assert f"67 images do not fit and {said}" in done.output
     assert done.exit_code == 4

@@ -1,30 +1,25 @@
-"""The small block of ../shared/data/formats in every format, and the truth behind it."""
+"""The small block of tests/data/formats in every format, and the truth behind it."""
 
 from __future__ import annotations
 
-import json
 from functools import cache
 
 import numpy as np
-import pytest
 
+from golden_data import DATA, golden
 from photogram import Attitudes, adjust
-from shared_data import SHARED
 
-FORMATS = SHARED / "formats"
+FORMATS = DATA / "formats"
 
 
 def sample(*names):
-    """Return a path of the samples; the test is skipped where they are absent."""
-    path = FORMATS.joinpath(*names)
-    if not path.exists():
-        pytest.skip("the samples of formats are not there (../shared/data/formats)")
-    return path
+    """Return a path of the samples."""
+    return FORMATS.joinpath(*names)
 
 
 @cache
 def truth(*names):
-    return json.loads(sample(*(names or ("truth.json",))).read_text())
+    return golden("formats", *(names or ("truth.json",)))
 
 
 def plain_name(name):

@@ -21,11 +21,11 @@ from control_networks import (
     varint,
 )
 
+from golden_data import SHARED, needs
 from photogram import InputError
 from photogram.formats.isis import binary_network, network_text, read_network
 from photogram.formats.isis.reading import is_network
 from photogram.io.pvl import Group
-from shared_data import SHARED
 
 NETWORKS = SHARED / "moving" / "control_network"
 PUBLISHED = (
@@ -33,10 +33,10 @@ PUBLISHED = (
     NETWORKS / "lro_version5.net",
     SHARED / "moving" / "lro" / "observationPair.net",
 )
-there = pytest.mark.skipif(not NETWORKS.is_dir(), reason="the published networks are not there (../shared)")
+published = needs("moving", "control_network")
 
 
-@there
+@published
 @pytest.mark.parametrize("name", ["csm_version2.net", "lro_version5.net"])
 def test_published_networks_say_what_their_answers_say(name):
     answer = json.loads((NETWORKS / "answers.json").read_text(encoding="utf-8"))[name]
@@ -71,7 +71,7 @@ def test_published_networks_say_what_their_answers_say(name):
     )
 
 
-@there
+@published
 def test_the_same_network_in_text_and_binary_is_the_same():
     text, binary = read_network(PUBLISHED[2]), read_network(PUBLISHED[1])
     # The binary one was made without residuals, references and numbers of the registration.
@@ -85,7 +85,7 @@ def test_the_same_network_in_text_and_binary_is_the_same():
     assert np.flatnonzero(text.points.reference >= 0).size == 28
 
 
-@there
+@published
 @pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.name)
 def test_published_networks_are_written_without_loss(path, tmp_path):
     network = read_network(path)
@@ -101,7 +101,7 @@ def test_published_networks_are_written_without_loss(path, tmp_path):
     assert is_network(content)
 
 
-@there
+@published
 def test_untouched_messages_stay_byte_for_byte():
     data = (NETWORKS / "lro_version5.net").read_bytes()
     assert binary_network(read_network(NETWORKS / "lro_version5.net"))[LABEL:] == data[LABEL:]
@@ -115,7 +115,7 @@ def test_untouched_messages_stay_byte_for_byte():
     assert messages == old[65757:]
 
 
-@there
+@published
 def test_text_is_that_of_isis_but_for_its_comments():
     def lines(text):
         return [line for line in text.split("\n") if line.strip() and not line.strip().startswith("#")]
@@ -124,7 +124,7 @@ def test_text_is_that_of_isis_but_for_its_comments():
     assert lines(network_text(read_network(PUBLISHED[2])).decode()) == lines(original)
 
 
-@there
+@published
 @pytest.mark.parametrize("write", [binary_network, network_text])
 def test_what_an_adjustment_found_is_written_and_nothing_else_changes(write, tmp_path):
     network = read_network(PUBLISHED[2])

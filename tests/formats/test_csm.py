@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ephemeris_seconds import added_to_ephemeris_seconds
+from golden_data import SHARED, needs
 from photogram import Block, InputError, adjust
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.formats.csm.angles import Polynomials, fitted_angles, of_angles
@@ -14,12 +15,11 @@ from photogram.formats.csm.isd import Positions
 from photogram.formats.csm.photos import trajectory_of, with_polynomial_pointing
 from photogram.io.pvl import parsed
 from photogram.network import Table, Trajectory
-from shared_data import SHARED
 
 MOVING = SHARED / "moving"
 OURS = np.diag([1.0, -1.0, -1.0])
 
-pytestmark = pytest.mark.skipif(not MOVING.exists(), reason=f"no {MOVING}")
+pytestmark = [needs("moving", "csm"), needs("moving", "lro")]
 
 
 def supported(name, **how):

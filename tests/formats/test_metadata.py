@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from formats.photographs import DJI, dji, packet, picture, tags
+from golden_data import DATA
 from photogram import InputError
 from photogram.comparator import Place
 from photogram.formats import read_metadata
@@ -15,17 +16,14 @@ from photogram.formats.metadata.mrk import number_of, read_exposures
 from photogram.formats.metadata.pictures import LARGEST, said_by_packet, said_by_picture, said_by_tags
 from photogram.formats.metadata.record import ELLIPSOIDAL, SEA_LEVEL, UNSAID, fix_of
 from photogram.formats.metadata.reference import is_reference, read_geo_txt, read_reference
-from shared_data import SHARED
 
-SAMPLES = SHARED / "statement" / "metadata"
+SAMPLES = DATA / "statement" / "metadata"
 PIX4D = "http://pix4d.com/camera/1.0"
 LINE = "{}\t384233.385421\t[2264]\t   -40,N\t     0,E\t    86,V\t47.38,Lat\t8.54,Lon\t551.2,Ellh\t{}\t{},Q\n"
 
 
 @pytest.fixture(scope="module")
 def golden():
-    if not SAMPLES.is_dir():
-        pytest.skip("the samples are not there (../shared/data/statement/metadata)")
     return json.loads((SAMPLES / "expected.json").read_text())
 
 

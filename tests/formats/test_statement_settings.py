@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from golden_data import DATA, golden
 from photogram import InputError, adjust, formats
 from photogram.formats.names import with_names
 from photogram.formats.plain.statement_settings import read_sentences
 from photogram.formats.supplements import with_control
 from photogram.results.statement.request import Asked
-from shared_data import SHARED
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
@@ -403,18 +403,15 @@ def test_a_statement_takes_what_a_project_asks(project):
 
 
 def test_classes_of_a_project_are_judged_as_the_golden_data_have_it(tmp_path):
-    source = SHARED / "statement"
-    if not source.exists():
-        pytest.skip(f"{source} is not here")
-    place = Path(shutil.copytree(source / "block", tmp_path / "block"))
+    place = Path(shutil.copytree(DATA / "statement" / "block", tmp_path / "block"))
     with (place / "project.toml").open("a") as file:
         file.write('\n[statement]\nclass_h = "5cm"\nclass_v = "50 mm"\n')
     whole = formats.read(place)
     result = adjust(whole.block, unit_variance=whole.options.unit_variance)
     found = json.loads(result.statement(**whole.statement).to_json())["asprs"]
-    golden = json.loads((source / "statement.json").read_text())["asprs"]
+    expected = golden("statement", "statement.json")["asprs"]
     for key in ("class_h_m", "class_v_m", "upper_h", "upper_v"):
-        assert found[key] == pytest.approx(golden[key], rel=1e-6)
+        assert found[key] == pytest.approx(expected[key], rel=1e-6)
     assert [found[key] for key in ("horizontal", "vertical")] == ["met with confidence", "met"]
 
 

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,8 +25,6 @@ from photogram import Block, InputError, Refraction
 from photogram.giant import Project, read_project, write_project
 from photogram.giant.export import adjusted_frames, adjusted_ground
 from photogram.io.writing import write_whole
-
-STRASBOURG = Path(__file__).parents[3] / "shared" / "data" / "strasbourg" / "giant"
 
 
 def project_of(directory, **changes):
@@ -271,10 +268,8 @@ def test_read_write_read_gives_the_same_numbers(tmp_path):
     same(project, read_project(tmp_path / "again"))
 
 
-def test_strasbourg(tmp_path):
-    if not STRASBOURG.exists():
-        pytest.skip("the Strasbourg block is not beside the repository")
-    project = read_project(STRASBOURG)
+def test_strasbourg(strasbourg, tmp_path):
+    project = read_project(strasbourg / "giant")
     block = project.to_block()
     assert project.messages == []
     assert block.photo_ids == ["8811", "8936", "8937", "8938", "9111"]

@@ -1,25 +1,18 @@
 """Networks with start values, and what may go wrong with them."""
 
-import json
-
 import numpy as np
-import pytest
 
+from golden_data import golden
 from photogram import Attitudes, Block
 from photogram.network import rotation_angles, rotation_matrix
-from shared_data import SHARED
 
-NETWORKS = SHARED / "network"
 PITCH = 0.006
 HALF = {"aerial": [115.0, 115.0], "selfcal": [18.0, 12.0]}
 
 
-def golden(name):
+def golden_block(name):
     """Return the block of start values of a golden network."""
-    file = NETWORKS / f"{name}.json"
-    if not file.is_file():
-        pytest.skip(f"the golden networks are not there ({file})")
-    given = json.loads(file.read_text(encoding="utf-8"))["inputs"]
+    given = golden("network", f"{name}.json")["inputs"]
     blocks, images = given["initial"], given["observations"]["image"]
     photos = [block for block in blocks if block.startswith("photo")]
     points = [block for block in blocks if block.startswith("point")]

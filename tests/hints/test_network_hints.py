@@ -42,7 +42,7 @@ LOOKED_AT = {"aerial": [0, 1, 2, 3, 4], "selfcal": [0, 1, 9, 10, 11]}
 @pytest.mark.parametrize("network", LOOKED_AT)
 @pytest.mark.parametrize("mistake", TABLE)
 def test_the_table_of_the_specification(network, mistake):
-    block = mistakes.mistakes(mistakes.golden(network), mistakes.HALF[network])[mistake]
+    block = mistakes.mistakes(mistakes.golden_block(network), mistakes.HALF[network])[mistake]
     photos = np.array(LOOKED_AT[network])
     seen = regressions(view(block, photos), photos)
     scale, turn, rest, misfit = TABLE[mistake][network == "selfcal"]
@@ -78,7 +78,7 @@ NAMED = {
 @pytest.mark.parametrize("network", LOOKED_AT)
 @pytest.mark.parametrize("mistake", NAMED)
 def test_mistakes_are_named(network, mistake):
-    block = mistakes.mistakes(mistakes.golden(network), mistakes.HALF[network])[mistake]
+    block = mistakes.mistakes(mistakes.golden_block(network), mistakes.HALF[network])[mistake]
     found = verdicts(block)
     assert [verdict.names for verdict in found] == [[NAMED[mistake]]]
     (hint,) = hints(block)
@@ -95,14 +95,14 @@ def test_mistakes_are_named(network, mistake):
     ],
 )
 def test_readings_of_angles_in_convergent_photos(mistake, said):
-    block = mistakes.mistakes(mistakes.golden("selfcal"), mistakes.HALF["selfcal"])[mistake]
+    block = mistakes.mistakes(mistakes.golden_block("selfcal"), mistakes.HALF["selfcal"])[mistake]
     (hint,) = hints(block)
     assert said in str(hint)
 
 
 def test_small_angles_hide_what_they_mean():
     """Near the vertical the sign of phi and the order of angles cannot be told, and nothing is said."""
-    made = mistakes.mistakes(mistakes.golden("aerial"), mistakes.HALF["aerial"])
+    made = mistakes.mistakes(mistakes.golden_block("aerial"), mistakes.HALF["aerial"])
     assert hints(made["sign of phi"]) == hints(made["phi-omega-kappa"]) == []
 
 
@@ -130,7 +130,7 @@ def test_what_cannot_be_told_is_said():
 
 @pytest.mark.parametrize("network", LOOKED_AT)
 def test_start_values_without_mistakes(network):
-    assert hints(mistakes.golden(network)) == []
+    assert hints(mistakes.golden_block(network)) == []
 
 
 # Blocks whose points are intersected from the poses that are wrong
@@ -187,7 +187,7 @@ def test_a_single_photo():
 )
 def test_cameras_with_lenses(mistake):
     """A camera in millimetres with a principal point and distortion sees like one without."""
-    given = mistakes.golden("selfcal")
+    given = mistakes.golden_block("selfcal")
     made = mistakes.mistakes(given, mistakes.HALF["selfcal"])[mistake]
     distance = made.principal_distances[0]
     lens = {"c": float(distance), "xp": 0.05, "yp": -0.03, "K1": -1e-4}

@@ -1,7 +1,7 @@
 """The adjusted golden block, once for all tests of the statement."""
 
 import pytest
-from golden_statement import block_path
+from golden_statement import BLOCK
 
 import photogram
 from photogram.formats import read
@@ -9,4 +9,4 @@ from photogram.formats import read
 
 @pytest.fixture(scope="session")
 def result():
-    return photogram.adjust(read(block_path()).block, unit_variance="unity")
+    return photogram.adjust(read(BLOCK).block, unit_variance="unity")

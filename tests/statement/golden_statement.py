@@ -1,21 +1,19 @@
-"""The golden data of the accuracy statement; tests that need them are skipped where they are absent."""
+"""The golden data of the accuracy statement."""
 
-import json
 from functools import cache
 
 import numpy as np
-import pytest
 
-from shared_data import SHARED
+import golden_data
+from golden_data import DATA
+
+BLOCK = DATA / "statement" / "block"
 
 
 @cache
 def golden(name):
-    """Return what a file of the golden data holds."""
-    path = SHARED / "statement" / name
-    if not path.exists():
-        pytest.skip(f"{path} is not here")
-    return json.loads(path.read_text(encoding="utf-8"))
+    """Return the content of a file of the golden data."""
+    return golden_data.golden("statement", name)
 
 
 def cofactors():
@@ -33,10 +31,7 @@ def differences():
 
 def control():
     """Return the rows of `control.csv` of the golden block by their use: names, coordinates, deviations."""
-    path = SHARED / "statement" / "block" / "control.csv"
-    if not path.exists():
-        pytest.skip(f"{path} is not here")
-    rows = [line.split(",") for line in path.read_text(encoding="utf-8").split()[1:]]
+    rows = [line.split(",") for line in (BLOCK / "control.csv").read_text(encoding="utf-8").split()[1:]]
     return {
         use: (
             [row[0] for row in rows if row[7] == use],
@@ -45,14 +40,6 @@ def control():
         )
         for use in ("control", "check")
     }
-
-
-def block_path():
-    """Return where the golden block lies."""
-    path = SHARED / "statement" / "block"
-    if not path.exists():
-        pytest.skip(f"{path} is not here")
-    return path
 
 
 def compare(found, expected, path, tolerance):

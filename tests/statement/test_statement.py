@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from golden_statement import block_path, compare, golden
+from golden_statement import BLOCK, compare, golden
 
 import photogram
 from photogram.formats import read
@@ -36,7 +36,7 @@ def document(stated):
 @pytest.mark.parametrize("basis", ["unity", "free"])
 def test_every_figure_is_the_golden_one(basis):
     weights = {"unity": "unity", "free": "constrained"}[basis]
-    adjusted = photogram.adjust(read(block_path()).block, unit_variance=weights)
+    adjusted = photogram.adjust(read(BLOCK).block, unit_variance=weights)
     found = json.loads(adjusted.statement(budgets=()).to_json())
     expected = dict(golden("statement.json")[f"statement_{basis}"])
     points = expected.pop("points")
@@ -45,7 +45,7 @@ def test_every_figure_is_the_golden_one(basis):
 
 
 def test_the_unit_variance_counts_all_rows_and_decides_by_f():
-    adjusted = photogram.adjust(read(block_path()).block)
+    adjusted = photogram.adjust(read(BLOCK).block)
     assert adjusted.variance_of_unit_weight == pytest.approx(0.992030460476, rel=1e-9)
     whole = adjusted.statement(budgets=()).figures["prediction"]["all"]
     assert whole["p_high"] < whole["p_high_f"] < whole["p_high"] + 0.05
@@ -57,7 +57,7 @@ def test_control_is_predicted_by_the_others(document):
 
 def test_leaving_a_control_point_out_says_the_same():
     """The formula is linear: 0.0014 of a standard deviation, 0.1 percent of T."""
-    block = read(block_path()).block
+    block = read(BLOCK).block
     stated = photogram.adjust(block, unit_variance="unity").statement(budgets=())
     for row in stated.leave_one_out[:3]:
         place = block.point_ids.index(row["point"])
@@ -158,7 +158,7 @@ def test_exit_headline_and_sentences_are_one_judgement(result, stated):
 
 def _with_checks(factor=1.0, survey=None):
     """Return the golden block with differences at check points that are larger, and other surveys."""
-    block = read(block_path()).block
+    block = read(BLOCK).block
     adjusted = photogram.adjust(block, unit_variance="unity")
     checks = adjusted.point_kinds == "check"
     moved = adjusted.point_positions - factor * (adjusted.point_positions - block.point_positions)

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from golden_statement import block_path
+from golden_statement import BLOCK
 
 import photogram
 from photogram.formats import read
@@ -21,7 +21,7 @@ FILES = (
 def site(tmp_path, monkeypatch):
     """Copy the golden block to where commands run."""
     monkeypatch.chdir(tmp_path)
-    shutil.copytree(block_path(), "site")
+    shutil.copytree(BLOCK, "site")
     for path in Path("site").iterdir():
         path.chmod(0o644)
     return Path("site")

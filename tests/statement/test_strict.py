@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from golden_statement import block_path
+from golden_statement import BLOCK
 
 from photogram.results.statement.judgement import judged
 
@@ -109,7 +109,7 @@ def test_the_command_ends_with_what_the_page_says(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     site = Path("site")
     site.mkdir()
-    for path in block_path().iterdir():
+    for path in BLOCK.iterdir():
         (site / path.name).write_bytes(path.read_bytes())
     rows = ["line,from,to,length,sd", "a,C01,C30,238.0,0.001", "b,C05,C26,240.0,0.001"]
     (site / "lengths.csv").write_text("\n".join(rows) + "\n")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from golden_statement import block_path
+from golden_statement import BLOCK
 
 from example_scripts import load
 from photogram import adjust, formats
@@ -19,9 +19,9 @@ def rows(path):
 
 def test_its_tables_are_those_of_the_golden_block():
     tables = {path.name for path in EXAMPLE.glob("*.csv")}
-    assert tables == {path.name for path in block_path().glob("*.csv")}
+    assert tables == {path.name for path in BLOCK.glob("*.csv")}
     for name in tables:
-        assert rows(EXAMPLE / name) == rows(block_path() / name), name
+        assert rows(EXAMPLE / name) == rows(BLOCK / name), name
 
 
 def test_its_statement_is_what_its_page_says():

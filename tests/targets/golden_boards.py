@@ -1,24 +1,15 @@
 """Golden data of calibration with targets, as boards and corners."""
 
-import json
-
 import numpy as np
-import pytest
+from given_targets import golden
 
+from golden_data import shared
 from photogram.targets import Board, Corners
-from shared_data import SHARED
-
-GOLDEN = SHARED / "targets"
-needs_golden = pytest.mark.skipif(not GOLDEN.exists(), reason="golden data are not here")
-
-
-def golden(name):
-    return json.loads((GOLDEN / name).read_text())
 
 
 def left():
     """Return 13 pictures of OpenCV: 9 x 6 corners, 25 mm."""
-    given = golden("opencv_left.json")["corners"]["left"]
+    given = golden("opencv_left")["corners"]["left"]
     pictures, points = len(given), 54
     corners = Corners(
         pictures=[f"left{int(name):02d}" for name in given],
@@ -36,7 +27,7 @@ def left():
 
 def rig():
     """Return the simulated rig of two cameras: 20 views of 9 x 7 corners."""
-    view, camera, point, x, y, level = np.array(golden("rig_small.json")["corners"], dtype=float).T
+    view, camera, point, x, y, level = np.array(golden("rig_small")["corners"], dtype=float).T
     pictures, picture = np.unique(2 * view + camera, return_inverse=True)
     corners = Corners(
         pictures=[f"{'ab'[int(each) % 2]}{int(each) // 2:02d}" for each in pictures],
@@ -54,7 +45,7 @@ def rig():
 
 def wide(step=1):
     """Return every so many of the 186 pictures of mrcal's lens of 150 degrees: 10 x 10 corners, 77 mm."""
-    lines = (GOLDEN / "mrcal_corners.vnl").read_text().splitlines()
+    lines = shared("targets", "mrcal_corners.vnl").read_text().splitlines()
     rows = [line.split() for line in lines if not line.startswith("#")]
     names, picture = np.unique([row[0] for row in rows], return_inverse=True)
     use = np.array([row[3] != "-" for row in rows])

@@ -8,8 +8,9 @@ from functools import cache
 
 import given_targets
 import numpy as np
-from given_targets import DATA, NAMES, golden
+from given_targets import NAMES, golden, rig_cofactors
 
+from golden_data import shared
 from photogram import Camera, _photocore
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.new_views import view_rows
@@ -23,7 +24,7 @@ def rig_small():
     """Return two cameras of eight parameters each, 20 views of a board whose points have weights."""
     data = golden("rig_small")
     found, seen = data["points"], rig_corners()
-    whole = np.load(DATA / "rig_small_cofactors.npy")
+    whole = rig_cofactors()
     common = whole.shape[0] - 6 * VIEWS
     poses = composed(found["R"], found["t"])
     to_motion = np.zeros((common + 6, len(whole)))
@@ -58,7 +59,7 @@ def rig_corners():
 @cache
 def stored(name):
     """Return the inputs of a calibration of mrcal, which are in its file: base 85 of the bytes of a NPZ."""
-    text = (DATA / f"{name}.cameramodel").read_text()
+    text = shared("targets", f"{name}.cameramodel").read_text()
     content = ast.literal_eval(text)["optimization_inputs"]
     return dict(np.load(io.BytesIO(base64.b85decode(content)), allow_pickle=False))
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from golden_boards import left, needs_golden
+from golden_boards import left
 from typer.testing import CliRunner
 
 from photogram import Camera, InputError
@@ -75,7 +75,6 @@ def started(model, **given):
     return Calibration(corners=first.corners, **(own | given))
 
 
-@needs_golden
 def test_the_optimum_with_the_priors_of_mrcal_is_its_own(tmp_path):
     start = started("cahvor", regularise="mrcal")
     free = start.cameras[0].replace(sd=dict.fromkeys(NAMES, math.inf))
@@ -96,7 +95,6 @@ def test_the_optimum_with_the_priors_of_mrcal_is_its_own(tmp_path):
     assert again.adjust().result.sums_of_squares.total == pytest.approx(COST, rel=1e-11)
 
 
-@needs_golden
 def test_first_values_are_found_and_the_lens_agrees_with_another():
     found, other = started("cahvor").adjust(), started("opencv5").adjust()
     assert found.cameras[0].values[6] == 0, "fx and fy do what r0 does"

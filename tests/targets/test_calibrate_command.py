@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from given_targets import DATA, golden, left_table
+from given_targets import golden, left_table
 from typer.testing import CliRunner
 
+from golden_data import shared
 from photogram import formats
 from photogram.cli.commands import application
 from photogram.targets import read
@@ -124,12 +125,17 @@ def test_what_does_not_go_is_refused(left, words, said):
 
 
 def test_corners_of_mrcal_by_options_alone(tmp_path):
-    if not DATA.exists():
-        pytest.skip("no shared data")
     out, document = tmp_path / "out", tmp_path / "out.json"
     words = ("--board", "10x10", "--spacing", "0.077", "--size", "6016x4016", "--shape", "points")
     found = run(
-        "calibrate", DATA / "mrcal_corners.vnl", *words, "--out", out, "--json", document, "--no-html"
+        "calibrate",
+        shared("targets", "mrcal_corners.vnl"),
+        *words,
+        "--out",
+        out,
+        "--json",
+        document,
+        "--no-html",
     )
     assert found.exit_code in (0, 4)
     board = json.loads(document.read_text())["board"]

@@ -4,8 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from given_targets import DATA, golden, left_table, poses_of, rig_small
+from given_targets import golden, left_table, poses_of, rig_cofactors, rig_small
 
+from golden_data import shared
 from photogram.targets import read
 from photogram.targets.regularisation import regularised
 from photogram.targets.tables import prior_shift
@@ -33,7 +34,7 @@ def test_rig_values():
 
 
 def test_rig_cofactors():
-    expected = np.load(DATA / "rig_small_cofactors.npy")
+    expected = rig_cofactors()
     names, found = rig_adjusted().cofactors(("cameras", "sensors", "board", "views"))
     assert names[:9] == [
         *(f"left {each}" for each in ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")),
@@ -87,7 +88,7 @@ def test_pictures_that_are_not_synchronised_have_poses_of_their_own():
 
 def test_state_of_mrcal():
     """What mrcal stored, evaluated as it is, costs what it said; its priors are in it."""
-    given = read(DATA / "opencv8-0.cameramodel") if DATA.exists() else pytest.skip("no shared data")
+    given = read(shared("targets", "opencv8-0.cameramodel"))
     corners = given.corners
     weighted = (given.residuals() / corners.sd[:, np.newaxis])[corners.use]
     priors = regularised(given.cameras, corners.sizes, 2 * 18_600)[0]
@@ -137,7 +138,7 @@ def test_rig_with_a_board_of_two_parabolas():
 
 @cache
 def opencv8(regularise):
-    given = read(DATA / "opencv8-0.cameramodel") if DATA.exists() else pytest.skip("no shared data")
+    given = read(shared("targets", "opencv8-0.cameramodel"))
     return given.replace(regularise=regularise).adjust()
 
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from given_targets import DATA, left_table, rig_small
+from given_targets import left_table, rig_small
 
+from golden_data import shared
 from photogram import InputError, formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of, project_of
 from photogram.targets import read
@@ -116,7 +117,7 @@ def test_corners_that_snooping_takes_out_are_marked(tmp_path):
 
 def test_a_calibration_of_mrcal_is_the_same_after_a_plain_project(tmp_path):
     """With the priors of its lens, which have no other place, and its three outliers."""
-    given = read(DATA / "opencv8-0.cameramodel")
+    given = read(shared("targets", "opencv8-0.cameramodel"))
     assert "3 corners not used, as the file says" in [each.text for each in given.messages]
     adjusted = given.adjust()
     found = calibration_of(again(adjusted_project(adjusted), tmp_path))

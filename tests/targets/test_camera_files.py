@@ -9,15 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from golden_boards import left, needs_golden, rig
+from golden_boards import left, rig
 
 from photogram import InputError
 from photogram.targets import Calibration, camera_files, first_values, projection_uncertainty, uncertainty_map
 from photogram.targets.mrcal_model import read_model
 from photogram.targets.output.formats import CAMERA_FORMATS, cameras_covariance
 from photogram.targets.projection import worst
-
-pytestmark = needs_golden
 
 
 def calibrated(given, model):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from golden_boards import GOLDEN, needs_golden
 
+from golden_data import shared
 from photogram import Camera, InputError
 from photogram.targets import convert_lens
 from photogram.targets.mrcal_model import read_model
@@ -117,9 +117,8 @@ def test_what_makes_no_sense_is_refused(source):
         convert_lens(Camera("perspective", {"c": -50.0}), "opencv5", SIZE)
 
 
-@needs_golden
 def test_the_wide_lens_of_mrcal_as_a_leaner_one():
-    calibration = read_model(GOLDEN / "opencv8-0.cameramodel")
+    calibration = read_model(shared("targets", "opencv8-0.cameramodel"))
     camera, size = calibration.cameras[0].replace(sd=0.0), calibration.corners.sizes[0]
     whole = convert_lens(camera, "opencv_fisheye", size)
     assert 1 < whole.rms < 10 < whole.largest

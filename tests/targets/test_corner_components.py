@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from given_targets import DATA, left_table, rig_small
+from given_targets import left_table, rig_small
 from typer.testing import CliRunner
 
+from golden_data import shared
 from photogram import InputError
 from photogram.cli import app
 from photogram.targets import corner_components, read, simulate_corners
@@ -38,7 +39,7 @@ def test_what_is_no_group(twice_as_bad):
 
 
 def test_priors_of_lenses_take_no_part():
-    whole = read(DATA / "opencv8-0.cameramodel")
+    whole = read(shared("targets", "opencv8-0.cameramodel"))
     some = np.arange(186) % 6 == 0
     part = whole.replace(corners=whole.corners.of_pictures(some), poses=np.asarray(whole.poses)[some])
     found = corner_components(part.adjust(), ["level"])

@@ -4,8 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from given_targets import DATA, rig_small
+from given_targets import rig_small
 
+from golden_data import shared
 from photogram import Camera, InputError
 from photogram.targets import Board, read
 from photogram.targets.corner_files import holds_targets, read_table, read_vnl, sorted_files
@@ -19,13 +20,6 @@ XY = np.array([[10.5, 20.25], [30.0, 21.0], [50.0, 22.0], [11.0, 40.0], [31.0, 4
 
 
 MODEL = "opencv8-0.cameramodel"
-
-
-def shared(name):
-    """Return a file of the golden data; skip the test where it is absent."""
-    if not (DATA / name).exists():
-        pytest.skip(f"{DATA / name} is absent")
-    return DATA / name
 
 
 def rows(*images, form="{image},{k},{x},{y}"):
@@ -235,7 +229,7 @@ def test_arrays_of_python_objects_are_not_unpickled(tmp_path):
 
 
 def test_content_of_a_model_of_mrcal():
-    found = read_model(shared(MODEL))
+    found = read_model(shared("targets", MODEL))
     corners = found.corners
     assert (corners.view_count, len(corners.xy), np.count_nonzero(~corners.use)) == (186, 18_600, 3)
     sd, counts = np.unique(corners.sd[corners.use], return_counts=True)
@@ -247,8 +241,8 @@ def test_content_of_a_model_of_mrcal():
 
 
 def test_the_table_has_the_corners_of_the_model():
-    found = read_model(shared(MODEL)).corners
-    table = read_vnl(shared("mrcal_corners.vnl"), Board(columns=10, rows=10, spacing=0.077))
+    found = read_model(shared("targets", MODEL)).corners
+    table = read_vnl(shared("targets", "mrcal_corners.vnl"), Board(columns=10, rows=10, spacing=0.077))
     assert table.images[:2] == ["view000.jpg", "view001.jpg"]
     assert np.array_equal(table.point, found.point)
     assert np.array_equal(table.use, found.use)
@@ -267,7 +261,7 @@ def test_the_table_has_the_corners_of_the_model():
 )
 def test_a_damaged_model_of_mrcal_is_refused(tmp_path, before, after, said):
     path = tmp_path / "x.cameramodel"
-    text = shared(MODEL).read_text()
+    text = shared("targets", MODEL).read_text()
     assert before in text
     path.write_text(text.replace(before, after, 1))
     with pytest.raises(InputError, match=said):
@@ -276,7 +270,7 @@ def test_a_damaged_model_of_mrcal_is_refused(tmp_path, before, after, said):
 
 def test_a_model_of_mrcal_with_damaged_arrays_is_refused(tmp_path):
     path = tmp_path / "x.cameramodel"
-    text = shared(MODEL).read_text()
+    text = shared("targets", MODEL).read_text()
     amid = len(text) // 2
     path.write_text(text[:amid] + ("A" if text[amid] != "A" else "B") + text[amid + 1 :])
     with pytest.raises(InputError, match="no archive of arrays"):

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from golden_boards import golden, left, needs_golden, rig, wide
+from given_targets import golden
+from golden_boards import left, rig, wide
 from relisted import relisted
 
 from photogram.targets import Calibration, first_values
-
-pytestmark = needs_golden
 
 
 def calibration(board, first, **others):
@@ -31,7 +30,7 @@ def cost(found):
 
 
 def test_the_left_pictures_end_where_they_should():
-    known = golden("opencv_left.json")["left"]["solution"]
+    known = golden("opencv_left")["left"]["solution"]
     found = adjusted_left(left()[1])
     assert found.result.converged
     assert cost(found) == pytest.approx(known["cost"], rel=1e-9)
@@ -45,7 +44,7 @@ def test_the_left_pictures_end_where_they_should():
 def test_the_left_pictures_end_there_wherever_their_corners_begin(orders):
     board, corners = left()
     found = adjusted_left(relisted(board, corners, orders))
-    known = golden("opencv_left.json")["left"]["solution"]
+    known = golden("opencv_left")["left"]["solution"]
     assert cost(found) == pytest.approx(known["cost"], rel=1e-9)
 
 
@@ -54,7 +53,7 @@ def test_the_left_pictures_need_no_size():
     first = first_values(board, corners.replace(sizes=[None]), "opencv5")
     assert "size of its pictures is not known" in str(first.remarks[0])
     found = calibration(board.replace(shape="held"), first).adjust()
-    assert cost(found) == pytest.approx(golden("opencv_left.json")["left"]["solution"]["cost"], rel=1e-9)
+    assert cost(found) == pytest.approx(golden("opencv_left")["left"]["solution"]["cost"], rel=1e-9)
 
 
 def adjusted_rig(corners):
@@ -65,7 +64,7 @@ def adjusted_rig(corners):
 
 
 def test_the_rig_ends_where_it_should():
-    known = golden("rig_small.json")["points"]
+    known = golden("rig_small")["points"]
     first, found = adjusted_rig(rig()[1])
     assert cost(found) == pytest.approx(known["cost"], rel=1e-9)
     np.testing.assert_allclose(first.sensors[1, :3, :3], known["sensor1"]["R"], atol=5e-3)
@@ -78,7 +77,7 @@ def test_the_rig_ends_there_wherever_corners_of_its_second_camera_begin():
     board, corners = rig()
     second = np.flatnonzero(corners.cameras == 1)[[0, 3, 11]].tolist()
     first, found = adjusted_rig(relisted(board, corners, dict.fromkeys(second, 3) | {13: 5, 20: 1}))
-    assert cost(found) == pytest.approx(golden("rig_small.json")["points"]["cost"], rel=1e-9)
+    assert cost(found) == pytest.approx(golden("rig_small")["points"]["cost"], rel=1e-9)
     said = [str(each) for each in first.remarks if "begin at another corner" in str(each)]
     assert {corners.pictures[row] for row in second} <= {each.split()[1].rstrip(":") for each in said}
 
@@ -92,7 +91,7 @@ def test_the_rig_converges_where_boards_of_both_cameras_are_turned():
 
 
 def test_a_lens_of_150_degrees_ends_where_it_should():
-    known = golden("mrcal_opencv8.json")["without_regularisation"]
+    known = golden("mrcal_opencv8")["without_regularisation"]
     board, corners = wide()
     first = first_values(board, corners)
     held = board.replace(shape="held")

@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from golden_boards import left, needs_golden, rig
+from golden_boards import left, rig
 from relisted import relisted
 
 from photogram import InputError
 from photogram.targets import Board, first_values
 from photogram.targets.sightings import LISTED, Listings
-
-pytestmark = needs_golden
 
 
 def remarks(first):

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from golden_boards import golden, left, needs_golden, wide
+from given_targets import golden
+from golden_boards import left, wide
 
 from photogram import Camera
 from photogram.targets.first_camera import misfits, rays_of, trials
@@ -16,8 +17,6 @@ from photogram.targets.sightings import (
     ray_homographies,
 )
 
-pytestmark = needs_golden
-
 
 @pytest.fixture(scope="module")
 def thirteen():
@@ -25,7 +24,7 @@ def thirteen():
 
 
 def test_homographies_and_focal_lengths_are_the_golden_ones(thirteen):
-    known = golden("opencv_left.json")["left"]
+    known = golden("opencv_left")["left"]
     found = homographies(thirteen.coordinates, thirteen.xy)
     found /= found[:, 2:, 2:]
     np.testing.assert_allclose(found, known["homographies"], rtol=1e-8)
@@ -35,7 +34,7 @@ def test_homographies_and_focal_lengths_are_the_golden_ones(thirteen):
 
 
 def test_poses_of_homographies_are_the_golden_ones(thirteen):
-    start = golden("opencv_left.json")["left"]["start"]
+    start = golden("opencv_left")["left"]["start"]
     parameters = {"fx": start["fx"], "fy": start["fy"], "cx": 319.5, "cy": 239.5}
     matrix = np.array([[start["fx"], 0, 319.5], [0, start["fy"], 239.5], [0, 0, 1]])
     found = np.linalg.inv(matrix) @ homographies(thirteen.coordinates, thirteen.xy)

@@ -9,6 +9,7 @@ import pytest
 from given_targets import golden
 from golden_calibrations import adjusted_rig
 
+from golden_data import shared
 from photogram import Camera, InputError, variance_components
 from photogram.targets import (
     difference,
@@ -182,7 +183,7 @@ def bent_rig():
 def test_the_file_of_mrcal_gives_its_map():
     """Corners, board, start and priors of a `.cameramodel`: the uncertainty that mrcal computes of it."""
     data = golden("mrcal_opencv8")["uncertainty"]
-    found = read(given_targets.DATA / "opencv8-0.cameramodel").adjust()
+    found = read(shared("targets", "opencv8-0.cameramodel")).adjust()
     scale = found.result.covariance_scale
     for name, distance in (("infinity", np.inf), ("1 m", 1.0)):
         own = projection_uncertainty(found, 0, data["pixels"], distance, "mean-frames", noise_only=True)

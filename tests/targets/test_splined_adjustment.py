@@ -1,28 +1,24 @@
 """A lens of knots, a board that bends: the golden adjustment of mrcal's splined camera."""
 
-import json
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
+from golden_data import golden as golden_file
 from photogram import Block, Camera, InputError, Result, adjust, adjust_in_parts
 from photogram.distributed import Division
 from photogram.network import Bend, Figure, rotation_angles, rotation_matrix
-from shared_data import SHARED
 
-GOLDEN = SHARED / "targets" / "splined.json"
 FLIP = np.diag([1.0, -1.0, -1.0])
 ACROSS = 10.0
 """mrcal holds knots so much tighter across the radius than along it."""
 
-pytestmark = pytest.mark.skipif(not GOLDEN.is_file(), reason="no golden data beside the repository")
-
 
 @cache
 def golden() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(GOLDEN.read_text())["adjusted"]
+    found: dict[str, Any] = golden_file("targets", "splined.json")["adjusted"]
     return found
 
 

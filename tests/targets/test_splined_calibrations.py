@@ -5,9 +5,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from given_targets import DATA, golden
+from given_targets import golden
 from test_splined_adjustment import lens
 
+from golden_data import shared
 from photogram import InputError, formats
 from photogram.formats.targets.calibrations import adjusted_project, calibration_of
 from photogram.targets import Board, Calibration, Corners, cross_validate, projection_uncertainty, read
@@ -144,9 +145,7 @@ def test_standard_deviations_of_knots_are_said_once():
 
 
 def test_the_splined_calibration_of_mrcal():
-    if not DATA.exists():
-        pytest.skip("no shared data")
-    found = read(DATA / "splined-0.cameramodel")
+    found = read(shared("targets", "splined-0.cameramodel"))
     camera = found.cameras[0]
     assert camera.knots.shape == (20, 30, 2)
     assert not camera.deviations.any()
@@ -157,7 +156,7 @@ def test_the_splined_calibration_of_mrcal():
 
 def test_few_views_converge_though_most_knots_are_from_their_priors():
     """Sixteen of 186 views: Gauss-Newton goes along a valley that hardly anything but priors slopes."""
-    whole = read(DATA / "splined-0.cameramodel")
+    whole = read(shared("targets", "splined-0.cameramodel"))
     some = np.arange(len(whole.corners.pictures)) % 12 == 3
     part = whole.replace(corners=whole.corners.of_pictures(some), poses=np.asarray(whole.poses)[some])
     found = part.adjust()

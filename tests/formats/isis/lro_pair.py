@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from golden_data import SHARED
 from photogram import formats
 from photogram.formats import Wishes
 from photogram.formats.isis import network_text, read_network
-from shared_data import SHARED
 
 LRO = SHARED / "moving" / "lro"
 SIDES = ("L", "R")

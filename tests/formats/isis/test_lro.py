@@ -5,11 +5,12 @@ import pytest
 from lro_pair import LRO, SERIAL, SIDES, WEIGHTED, answers, project, with_coordinates
 
 from ephemeris_seconds import added_to_ephemeris_seconds
+from golden_data import needs
 from photogram import adjust
 from photogram.formats.isis.contents import contents_of
 from photogram.formats.isis.outcome import Outcome
 
-pytestmark = pytest.mark.skipif(not LRO.exists(), reason=f"no {LRO}")
+pytestmark = needs("moving", "lro")
 
 
 @pytest.fixture(scope="module")
