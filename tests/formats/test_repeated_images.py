@@ -14,9 +14,9 @@ from photogram.formats.supplements import repeated_remarks, with_repeated
 EVERY = 5
 
 
-@pytest.fixture(scope="module")
-def repeated(tmp_path_factory):
-    """Return a model, every fifth image of which stands there again beside its place."""
+@pytest.fixture(scope="module", params=[1, 2], ids=["one more", "two more"])
+def repeated(request, tmp_path_factory):
+    """Return a model with additional observations of every fifth point in a photo, one or two of each."""
     folder = tmp_path_factory.mktemp("repeated") / "model"
     shutil.copytree(sample("colmap", "text"), folder)
     lines = (folder / "images.txt").read_text().splitlines()
@@ -26,7 +26,7 @@ def repeated(tmp_path_factory):
         words = lines[row].split()
         features = [words[k : k + 3] for k in range(0, len(words), 3)]
         for x, y, point in features[::EVERY]:
-            if point != "-1":
+            for _ in range(request.param if point != "-1" else 0):
                 dx, dy = random.normal(0.0, 0.5, 2)
                 lines[row] += f" {float(x) + dx} {float(y) + dy} {point}"
     (folder / "images.txt").write_text("\n".join(lines) + "\n")
@@ -35,26 +35,15 @@ def repeated(tmp_path_factory):
 
 def cost_of_all(project, result):
     """Return the weighted sum of squares of all images, the repeated ones too, at a solution."""
-    block, again = project.block, project.repeated
-    there = at_adjusted(result)
-    photos = [block.photo_ids.index(name) for name in again.photos]
-    points = [block.point_ids.index(name) for name in again.points]
-    every = there.replace(
-        image_photos=np.append(block.image_photos, photos)[-len(photos) :],
-        image_points=np.append(block.image_points, points)[-len(points) :],
-        image_xy=again.xy,
-        image_sd=np.full(again.xy.shape, block.image_sd[0, 0]),
-    )
-    first = there.replace(
-        image_photos=block.image_photos,
-        image_points=block.image_points,
-        image_xy=block.image_xy,
-        image_sd=block.image_sd,
-    )
-    return sum(
-        float((((each.image_xy - computed_images(each)) / each.image_sd) ** 2).sum())
-        for each in (first, every)
-    )
+    again, there = project.repeated, at_adjusted(result)
+    computed = computed_images(there)
+    names = [
+        (there.photo_ids[i], there.point_ids[j])
+        for i, j in zip(there.image_photos, there.image_points, strict=True)
+    ]
+    rows = [names.index(pair) for pair in zip(again.photos, again.points, strict=True)]
+    residuals = np.vstack([project.block.image_xy - computed, again.xy - computed[rows]])
+    return float(((residuals / project.block.image_sd[0, 0]) ** 2).sum())
 
 
 def test_they_are_counted_with_what_they_cost(repeated):
@@ -67,6 +56,15 @@ def test_they_are_counted_with_what_they_cost(repeated):
     figures = re.search(r"would be (\S+) here and not (\S+) \(", str(said)).groups()
     assert float(figures[0]) == pytest.approx(cost_of_all(project, result), rel=1e-5)
     assert float(figures[1]) == pytest.approx(result.sums_of_squares.total, rel=1e-5)
+
+
+def test_an_adjustment_that_does_not_converge_has_no_such_remark(repeated):
+    project = formats.read(repeated)
+    places = project.block.photo_positions
+    away = places + np.random.default_rng(1).normal(0.0, 2.0, places.shape)
+    result = adjust(project.block.replace(photo_positions=away), max_iterations=1)
+    assert not result.converged
+    assert repeated_remarks(project, result) == []
 
 
 def test_they_are_taken_in_to_the_cost_of_all(repeated):

@@ -110,27 +110,22 @@ def with_repeated(project: Project) -> Project:
 
 
 def repeated_remarks(project: Project, result: Result) -> list[Message]:
-    """Say what the sum of squares would be with second images of a point on a photo, where there are any."""
+    """Report the sum of squares with the additional observations of points in photos, if there are any."""
+    if not result.converged:
+        return []
+    block = project.block
     first, second = _repeated_rows(project)
-    used = result.used_images[first] if result.converged and len(result.used_images) else first[:0] > 0
-    # Where images of photos that move would be is not computed here.
-    used &= ~timed_photos(project.block)[project.block.image_photos[first]]
+    # The residual of a moving photo depends on the line of the observation.
+    used = result.used_images[first] & ~timed_photos(block)[block.image_photos[first]]
     if not used.any():
         return []
-    from photogram.adjustment.prediction import at_adjusted, computed_images
-
-    block, sd = project.block, project.block.image_sd[first][used]
-    there = at_adjusted(result).replace(
-        image_photos=block.image_photos[first][used],
-        image_points=block.image_points[first][used],
-        image_xy=project.repeated.xy[second][used],
-        image_sd=sd,
-    )
-    more = float((((there.image_xy - computed_images(there)) / sd) ** 2).sum())
+    first, second = first[used], second[used]
+    residuals = project.repeated.xy[second] - block.image_xy[first] + result.residuals[first]
+    more = float(((residuals / block.image_sd[first]) ** 2).sum())
     total = result.sums_of_squares.total
     return [
         Message(
-            f"with {int(used.sum())} second images of a point on a photo, which are left out, the weighted"
+            f"with {len(first)} second images of a point on a photo, which are left out, the weighted"
             f" sum of squares would be {total + more:.6g} here and not {total:.6g}"
             " (--keep-repeated takes them in)"
         )
