@@ -1,5 +1,6 @@
 """OpenSfM and OpenDroneMap: reconstructions, tracks of all versions, lists of control."""
 
+import re
 import shutil
 
 import numpy as np
@@ -20,6 +21,7 @@ from test_plain_project import EXAMPLE, written
 
 from photogram import InputError, Position, adjust, formats
 from photogram.formats import supplements
+from photogram.formats.names import with_names
 from photogram.formats.self_check import agreement
 
 
@@ -106,6 +108,73 @@ def test_lists_of_control_come_with_their_measurements(tmp_path, file):
     assert len(full) == len(control)
     np.testing.assert_allclose(full[0].precision, np.diag([4e-4, 4e-4, 9e-4]), atol=1e-7)
     assert adjust(turned.replace(observations=full)).converged
+
+
+@pytest.mark.parametrize("file", ["gcp_list.txt", "ground_control_points.json"])
+def test_control_points_have_names_of_their_own(tmp_path, file):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    project = formats.read(only(tmp_path / "model"))
+    numbers = [name for name, own in names_by_position(project).items() if own.startswith("T")]
+    text = sample("opensfm", file).read_text()
+    control = sorted(set(re.findall(r"\b(?:GCP|CHK)-\d+\b", text)), key=len, reverse=True)
+    new = dict(zip(control, numbers, strict=False))
+    assert len(control) >= 5
+    assert len(new) == len(control)
+    (tmp_path / file).write_text(re.sub(r"\b(?:GCP|CHK)-\d+\b", lambda match: new[match[0]], text))
+    named, alike = (
+        supplements.with_control(project, path, {"control": (0.02,)}, None)
+        for path in (sample("opensfm", file), tmp_path / file)
+    )
+    # The tracks with these numbers are other points, and all else is the same.
+    tracks = {number: f"track {number}" for number in new.values()}
+    assert alike.block.point_ids == [new.get(name, tracks.get(name, name)) for name in named.block.point_ids]
+    np.testing.assert_array_equal(alike.block.image_points, named.block.image_points)
+    np.testing.assert_array_equal(alike.block.point_positions, named.block.point_positions)
+    np.testing.assert_array_equal(alike.starts, named.starts)
+    [said] = [each for each in alike.messages if f"{len(new)} tracks" in each.text]
+    assert said.file == tmp_path / file
+
+
+def test_two_control_points_of_one_id_are_refused(tmp_path):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    text = sample("opensfm", "ground_control_points.json").read_text()
+    (tmp_path / "gcp.json").write_text(text.replace("GCP-2", "GCP-1"))
+    with pytest.raises(InputError, match="GCP-1"):
+        supplements.with_control(
+            formats.read(only(tmp_path / "model")), tmp_path / "gcp.json", {"control": (0.02,)}, None
+        )
+
+
+def test_a_control_point_that_was_measured_as_a_track_is_the_track(tmp_path):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    project = formats.read(only(tmp_path / "model"))
+    number = next(name for name, own in names_by_position(project).items() if own == "GCP-1")
+    text = sample("opensfm", "gcp_list.txt").read_text()
+    (tmp_path / "gcp_list.txt").write_text(re.sub(r"\bGCP-1\b", number, text))
+    found = supplements.with_control(project, tmp_path / "gcp_list.txt", {"control": (0.02,)}, None)
+    row = project.block.point_ids.index(number)
+    assert found.block.point_ids[row] == number
+    assert (found.block.point_sd[row] == 0.02).all()
+
+
+def test_a_track_that_a_user_names_is_the_control_point_of_this_name(tmp_path):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    place = only(tmp_path / "model")
+    names = names_by_position(formats.read(place))
+    number = next(name for name, own in names.items() if own == "GCP-1")
+    first = "DJI_0001.JPG"
+    # The track is measured in the first photo, the control point in the others.
+    lines = (place / "tracks.csv").read_text().splitlines()
+    rows = [line for line in lines if line.split("\t")[1:2] != [number] or line.startswith(first)]
+    (place / "tracks.csv").write_text("\n".join(rows) + "\n")
+    (tmp_path / "names.csv").write_text(f"point,name\n{number},GCP-1\n")
+    head, *rest = sample("opensfm", "gcp_list.txt").read_text().splitlines()
+    rest = [line for line in rest if line.endswith("GCP-1") and first not in line]
+    (tmp_path / "gcp_list.txt").write_text("\n".join([head, *rest]) + "\n")
+    named = with_names(formats.read(place), tmp_path / "names.csv")
+    found = supplements.with_control(named, tmp_path / "gcp_list.txt", {"control": (0.02,)}, None)
+    assert found.block.point_ids == named.block.point_ids
+    assert len(found.block.image_xy) == len(named.block.image_xy) + len(rest)
 
 
 @pytest.mark.parametrize(

@@ -136,16 +136,18 @@ def _of_json(path: Path, project: Project) -> ControlList:
         if "position" in each:
             position = each["position"]
             height = repr(position["altitude"].number()) if "altitude" in position else ""
-            points[name] = (repr(position["longitude"].number()), repr(position["latitude"].number()), height)
-        for own in each.get("observations", []):
-            shot = own["shot_id"].text()
+            own = (repr(position["longitude"].number()), repr(position["latitude"].number()), height)
+            if points.setdefault(name, own) != own:
+                raise each.error(f"two control points have the id {name}; each point must have its own id")
+        for image in each.get("observations", []):
+            shot = image["shot_id"].text()
             size = sizes.get(shot)
-            if "projection" not in own or size is None:
+            if "projection" not in image or size is None:
                 messages.append(
                     Message(f"{name} on {shot} is left out: no such photo, or no place in it", path)
                 )
                 continue
-            x, y = own["projection"].numbers(2).tolist()
+            x, y = image["projection"].numbers(2).tolist()
             scale = max(size)
             images.append((shot, name, repr(size[0] / 2 + scale * x), repr(size[1] / 2 + scale * y)))
     head = Place(path)

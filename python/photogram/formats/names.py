@@ -12,6 +12,7 @@ from photogram.formats.plain.tables import indices_of
 from photogram.formats.project import Project
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
+from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 
 NAMES = "names.csv"
@@ -39,23 +40,33 @@ def with_names(project: Project, path: Path) -> Project:
         if taken.setdefault(name, row) != row:
             first = next(k for k, each in enumerate(names) if each == name)
             raise table.error(first, f"two points would have the name {name}")
-    messages = (*project.messages, Message(f"{len(rows)} points have the names of {path.name}", path))
-    colours = project.details.get("colours", {})
-    new = dict(zip(project.block.point_ids, ids, strict=True))
+    new = {project.block.point_ids[place]: name for place, name in zip(rows, names, strict=True)}
+    message = Message(f"{len(rows)} points have the names of {path.name}", path)
+    return with_other_names(project, new).replace(messages=(*project.messages, message))
+
+
+def with_other_names(project: Project, new: Mapping[str, str]) -> Project:
+    """Return a project with new names of points, by their names until now; all names differ."""
+    old = project.block.point_ids
+    ids = [new.get(name, name) for name in old]
+    colours, numbers = (project.details.get(key, {}) for key in ("colours", "point numbers"))
+    first = [numbers.get(name, name) for name in old]
     details = {
         **project.details,
         "colours": {new.get(point, point): colour for point, colour in colours.items()},
+        "point numbers": {own: name for own, name in zip(ids, first, strict=True) if name.isdigit()},
     }
-    details["point numbers"] = {name: old for old, name in new.items() if old.isdigit()}
+    again = project.repeated
     return project.replace(
         block=project.block.replace(point_ids=ids, observations=project.block.observations),
-        messages=messages,
         details=details,
         features={
             each: (kind, [new.get(point, point) for point in points])
             for each, (kind, points) in project.features.items()
         },
         statement=asked_by_other_names(project.statement, new),
+        repeated=replace(again, points=tuple(new.get(point, point) for point in again.points)),
+        tracks=project.tracks.difference(new),
     )
 
 

@@ -125,6 +125,8 @@ class Project(Brief):
         What its control is the points of, where photos show a board: by name.
     unused
         Images of the board that were left out.
+    tracks
+        Points whose names are numbers of tracks. A list of control points has other names.
     """
 
     block: Block
@@ -144,6 +146,7 @@ class Project(Brief):
     statement: Mapping[str, Any] = field(default_factory=dict)
     boards: Mapping[str, Board] = field(default_factory=dict)
     unused: Unused = field(default_factory=Unused)
+    tracks: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)

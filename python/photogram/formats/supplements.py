@@ -14,6 +14,7 @@ from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.models import carried, intersected, is_free
+from photogram.formats.names import with_other_names
 from photogram.formats.pixels import corner_of, pixel_table
 from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import WITH_SD, Settings
@@ -284,8 +285,8 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
     return table.some(rows).with_texts("photo", [names[row] for row in rows])
 
 
-def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
-    """Return the measurements that the project does not have already, at the same place in the photo."""
+def _present_rows(project: Project, table: ColumnTable) -> set[int]:
+    """Return the rows of measurements that the project has at the same place in the photo."""
     block = project.block
     known = {
         (block.photo_ids[photo], block.point_ids[point]): row
@@ -295,14 +296,40 @@ def _new_images(project: Project, table: ColumnTable) -> ColumnTable:
     }
     pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
     if not any(pair in known for pair in pairs):
-        return table
+        return set()
     there, given = to_corner(project), corner_of(table, None)
-    rows = [
+    return {
         row
         for row, pair in enumerate(pairs)
-        if pair not in known or np.abs(there[known[pair]] - given[row]).max() > SAME
-    ]
-    return table.some(rows)
+        if pair in known and np.abs(there[known[pair]] - given[row]).max() <= SAME
+    }
+
+
+def _with_list(project: Project, given: ControlList) -> Project:
+    """Return a project with the measurements of a list of control points.
+
+    A track with the identifier of a control point is another point, and renamed, unless both have a
+    measurement in common.
+    """
+    table = _known_photos(project, given)
+    present, points = _present_rows(project, table), table.texts("point")
+    other = project.tracks.intersection(given.control.texts("point")) - {points[row] for row in present}
+    if other:
+        new = {name: f"track {name}" for name in project.block.point_ids if name in other}
+        taken = {*project.block.point_ids, *given.control.texts("point")}
+        for name in new:
+            while new[name] in taken:
+                new[name] = f"track {new[name]}"
+        given.messages.append(
+            Message(
+                f"{len(new)} tracks have the identifier of a control point and are other points:"
+                f" they are renamed to {listed(list(new.values()), 3)}",
+                table.path,
+            )
+        )
+        project = with_other_names(project, new)
+    further = table.some([row for row in range(table.count) if row not in present])
+    return _with_table(project, table.path, further, None)
 
 
 def with_control(
@@ -353,8 +380,7 @@ def with_control(
         table = listed_control.control
         settings = replace(settings, crs={"control": crs or listed_control.crs})
         tables = Tables(settings, listed_control.messages)
-        images = _new_images(project, _known_photos(project, listed_control))
-        project = _with_table(project, path, images, None)
+        project = _with_list(project, listed_control)
     transform = Transform(settings, tables.messages)
     given = read_control(tables, table, transform)
     block = project.block

@@ -83,7 +83,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         lacks=[] if there else [f"no {TRACKS} beside it: no image measurements (--images)"],
         messages=[*messages, *_beside(folder)],
         details={"colours": colours},
-    )
+    ).replace(tracks=frozenset(points))
 
 
 def _model(document: Tree, wanted: int | None, messages: list[Message]) -> Tree:
