@@ -78,6 +78,22 @@ def document(kind="LINE_SCANNER", *, lines=400, samples=300, records=21):
     return found
 
 
+def unmirrored(document):
+    """Return a frame whose focal plane is not mirrored if it looks along +z."""
+    found = json.loads(json.dumps(document))
+    for name in ("focal2pixel_samples", "focal2pixel_lines"):
+        found[name][1] *= -1
+    return found
+
+
+def along_minus_z(document):
+    """Return the same frame with axes of the camera that are turned by 180 degrees about y."""
+    found = unmirrored(document)
+    w, x, y, z = np.array(found["instrument_pointing"]["quaternions"]).T
+    found["instrument_pointing"]["quaternions"] = np.column_stack([-y, z, w, -x]).tolist()
+    return found
+
+
 def written(folder, data, name="image.json"):
     """Return the path of an ISD."""
     path = folder / name

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support_data import RADIUS, START, document, written
+from support_data import RADIUS, START, along_minus_z, document, unmirrored, written
 
 from photogram import InputError
 from photogram.formats.csm import SupportedImage, read_support
@@ -93,6 +93,67 @@ def test_lenses_are_read_by_their_names(tmp_path, model):
     np.testing.assert_allclose(own.to_image(ground), PLACES[:, ::-1], rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("model", ["radial", *LENSES])
+@pytest.mark.parametrize("kind", ["positive", "negative"])
+def test_a_frame_that_looks_along_minus_z_sees_the_same(tmp_path, model, kind):
+    data = unmirrored(document("FRAME"))
+    if model != "radial":
+        data["optical_distortion"] = {model: LENSES[model]}
+    turned = along_minus_z(data)
+    if kind == "negative":
+        turned["focal_length_model"]["focal_length"] *= -1
+    one, other = image(tmp_path, data), image(tmp_path, turned)
+    assert (one.isd.look, other.isd.look) == (1, -1)
+    assert other.camera.parameters["c"] < 0
+    if model in ("radial", "lrolrocnac"):
+        # The other lenses are not the same in turned axes.
+        ground = one.to_ground(PLACES[:, 1], PLACES[:, 0])
+        np.testing.assert_allclose(other.to_ground(PLACES[:, 1], PLACES[:, 0]), ground, rtol=0, atol=1e-6)
+    ground = other.to_ground(PLACES[:, 1], PLACES[:, 0])
+    np.testing.assert_allclose(other.to_image(ground), PLACES[:, ::-1], rtol=0, atol=1e-6)
+    xy = other.coordinates(*PLACES.T)[1]
+    seen = projected(other.timed[0], other.flown, other.camera, ground)
+    np.testing.assert_allclose(seen, xy, rtol=0, atol=1e-6)
+
+
+def keywords(**values):
+    own = {f"INS-1_{name}": value for name, value in values.items()}
+    return {"INS-1_TRANSX": [0.0, 0.02, 0.0], "INS-1_TRANSY": [0.0, 0.0, 0.02], **own}
+
+
+def test_null_values_are_derived_from_other_fields(tmp_path):
+    data = document("FRAME", records=1)
+    data |= {"starting_detector_line": 0, "starting_detector_sample": 0, "detector_line_summing": 2}
+    data["detector_center"] = {"line": None, "sample": None}
+    data["center_ephemeris_time"] = None
+    found = read_support(written(tmp_path, data))
+    assert found.detector.centre.tolist() == [150.0, 400.0]
+    assert found.time == data["instrument_pointing"]["ephemeris_times"][0]
+    assert len(found.remarks) == 3
+    data["detector_center"] = None
+    assert read_support(written(tmp_path, data)).detector.centre.tolist() == [150.0, 400.0]
+
+
+@pytest.mark.parametrize("kind", ["FRAME", "LINE_SCANNER"])
+def test_null_values_are_those_of_the_keywords(tmp_path, kind):
+    data = document(kind)
+    plain = read_support(written(tmp_path, data))
+    data["naif_keywords"] = keywords(
+        BORESIGHT_SAMPLE=160.0,
+        BORESIGHT_LINE=2.5,
+        FOCAL_LENGTH=300.0,
+        ITRANSS=data["focal2pixel_samples"],
+        ITRANSL=data["focal2pixel_lines"],
+    )
+    data |= {"detector_center": {"line": None, "sample": None}, "focal_length_model": {"focal_length": None}}
+    data |= {"focal2pixel_samples": None, "focal2pixel_lines": None}
+    found = read_support(written(tmp_path, data))
+    assert len(found.remarks) == 5
+    assert found.focal_length == plain.focal_length
+    np.testing.assert_array_equal(found.detector.centre, plain.detector.centre)
+    np.testing.assert_array_equal(found.detector.planes["csm"].matrix, plain.detector.planes["csm"].matrix)
+
+
 def without(*keys):
     def change(data):
         for key in keys[:-1]:
@@ -123,6 +184,16 @@ FAULTS = [
         setting([0.0, 0.0, 0.0], "focal2pixel_lines"),
         "focal2pixel_samples: has no inverse, together with /focal2pixel_lines",
     ),
+    (setting(None, "detector_center", "line"), "/detector_center/line: is null, .* must be the line"),
+    (
+        setting(None, "focal_length_model", "focal_length"),
+        "/focal_length_model/focal_length: is null, .* must",
+    ),
+    (setting(None, "focal2pixel_samples"), "/focal2pixel_samples: is null, .* three numbers"),
+    (setting(None, "detector_line_summing"), "/detector_line_summing: is null, .* must be the number"),
+    (setting(None, "center_ephemeris_time"), "/center_ephemeris_time: is null, .* must be the time"),
+    (setting(None, "radii", "semimajor"), "/radii/semimajor: is null and must be a number"),
+    (setting(None, "instrument_pointing"), "/instrument_pointing: is null and must be of the type object"),
     (setting([0.0, 1.0], "focal2pixel_lines"), "focal2pixel_lines: has 2 numbers, not 3"),
     (setting(0, "detector_sample_summing"), "detector_sample_summing: is not positive"),
     (

@@ -71,6 +71,8 @@ class Tree:
         )
 
     def _as(self, kind: type, word: str) -> Any:
+        if self.value is None:
+            raise self.error(f"is null and must be of the type {word}")
         if not isinstance(self.value, kind) or isinstance(self.value, bool):
             raise self.error(f"is no {word}")
         return self.value
@@ -101,6 +103,8 @@ class Tree:
 
     def number(self) -> float:
         """Return a finite number."""
+        if self.value is None:
+            raise self.error("is null and must be a number")
         if not isinstance(self.value, int | float) or isinstance(self.value, bool):
             raise self.error("is no number")
         if not (abs(self.value) < LARGEST):

@@ -49,13 +49,13 @@ def network(folder, images, ground):
     return path
 
 
-@pytest.mark.parametrize("kind", ["FRAME", "PUSH_FRAME", "LINE_SCANNER"])
+@pytest.mark.parametrize("kind", ["FRAME", "PUSH_FRAME", "LINE_SCANNER", "-z"])
 def test_pointing_is_found_by_fixed_points(tmp_path, kind):
     # Between framelets there are gaps.
-    documents = [
-        support_data.document(kind),
-        moved(support_data.document(kind), 0.0 if kind == "PUSH_FRAME" else 0.4),
-    ]
+    plain = support_data.document("FRAME" if kind == "-z" else kind)
+    documents = [plain, moved(plain, 0.0 if kind == "PUSH_FRAME" else 0.4)]
+    if kind == "-z":
+        documents = [support_data.along_minus_z(support_data.unmirrored(each)) for each in documents]
     paths = [support_data.written(tmp_path, each, f"{k}.json") for k, each in enumerate(documents)]
     images = [
         SupportedImage(read_support(path), f"image {k}", "isis", "isis") for k, path in enumerate(paths)
@@ -69,6 +69,7 @@ def test_pointing_is_found_by_fixed_points(tmp_path, kind):
     project = formats.read(path, wishes=Wishes(cubes=tmp_path / "images.lis", jigsaw=words))
     result = adjust(project.block, tolerance=1e-9)
     outcome = Outcome(contents_of(project.details), result)
+    assert not any("behind" in each.text for each in result.messages)
     # The records of the pair are exact; priors of a degree hardly pull.
     assert np.abs(outcome.residuals).max() < 1e-4
     assert len(result.block.photo_ids) == (50 if kind == "PUSH_FRAME" else 2)

@@ -156,13 +156,15 @@ class Isd:
         Before the detector; None: a perfect one.
     position, pointing, body
         Tables of the camera's places, of inertial axes to those of the camera (x along samples as the plane
-        has it, looking along +z), and to those of the body.
+        has it, looking along z as `look` has it), and to those of the body.
     time
         Of a frame; the middle of others.
     lines
         The times of the lines of a scanner, by lines from the upper edge (0).
     remarks
         What the file contradicts itself in, and what was made of it, in sentences.
+    look
+        1: the camera looks along +z of its axes; -1: along -z.
     """
 
     path: Path
@@ -182,6 +184,12 @@ class Isd:
     framelets: Framelets | None = None
     jitter: Jitter | None = None
     remarks: tuple[str, ...] = field(default=())
+    look: Literal[1, -1] = 1
+
+    @property
+    def axes(self) -> Floats:
+        """(3,) factors from the axes of the camera to those of photos, which look along -z; and back."""
+        return np.array([1.0, -self.look, -self.look])
 
     def error(self, message: str) -> InputError:
         """Return an error that names the file."""

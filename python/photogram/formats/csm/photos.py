@@ -18,8 +18,8 @@ from photogram.network.moving_photos import LineSensor, Timed
 from photogram.network.projecting import projected
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
 
-_OURS = np.diag([1.0, -1.0, -1.0])
-"""From the axes of cameras that look along +z, y down, to those of photos; and back."""
+_DOWN = np.array([1.0, -1.0])
+"""Factors of x, y, between y up and y down."""
 _JOINED: dict[str, Interpolation] = {"csm": "lagrange", "isis": "linear"}
 """How records are joined where they do not say it themselves."""
 _STEPS = 5
@@ -52,7 +52,7 @@ def trajectory_of(
         places.times,
         places.places,
         pointing.times,
-        np.swapaxes(pointing.matrices, 1, 2) @ _OURS,
+        np.swapaxes(pointing.matrices, 1, 2) * isd.axes,
         velocities=places.velocities if own == "hermite" else None,
         interpolation=own,
         attitude_interpolation=pointing.interpolation or joined,
@@ -60,9 +60,9 @@ def trajectory_of(
     return Trajectory(name, table, position, rotation, (isd.body.times, isd.body.matrices))
 
 
-def to_camera(attitudes: Floats) -> Floats:
-    """Return (n, 3, 3) matrices from inertial axes to those of cameras, of attitudes photo to inertial."""
-    return np.asarray(np.swapaxes(attitudes @ _OURS, 1, 2))
+def to_camera(isd: Isd, attitudes: Floats) -> Floats:
+    """Return (n, 3, 3) matrices from inertial axes to those of a camera, of attitudes photo to inertial."""
+    return np.asarray(np.swapaxes(attitudes * isd.axes, 1, 2))
 
 
 def with_polynomial_pointing(isd: Isd, degree: int) -> Isd:
@@ -187,16 +187,20 @@ class SupportedImage:
         return photos, self._corrected(image)
 
     def _corrected(self, image: Floats) -> Floats:
-        """Return (n, 2) places behind a perfect lens, y up, of samples and lines of a frame."""
-        detector = self.isd.detector
-        places = detector.planes[self.pixels].places(detector.from_centre(image, self.pixels)) * [1.0, -1.0]
-        return places if self.isd.lens is None else self.isd.lens.corrected(places)
+        """Return (n, 2) places behind a perfect lens, in the axes of photos, of samples and lines."""
+        detector, lens = self.isd.detector, self.isd.lens
+        places = detector.planes[self.pixels].places(detector.from_centre(image, self.pixels))
+        if lens is not None:
+            places = lens.corrected(places * _DOWN) * _DOWN
+        return places * self.isd.axes[:2]
 
     def _measured(self, corrected: Floats) -> Floats:
         """Return what :meth:`_corrected` makes these of."""
-        places = corrected if self.isd.lens is None else self.isd.lens.distorted(corrected)
-        detector = self.isd.detector
-        return detector.image(detector.planes[self.pixels].detector(places * [1.0, -1.0]), self.pixels)
+        detector, lens = self.isd.detector, self.isd.lens
+        places = corrected * self.isd.axes[:2]
+        if lens is not None:
+            places = lens.distorted(places * _DOWN) * _DOWN
+        return detector.image(detector.planes[self.pixels].detector(places), self.pixels)
 
     def to_ground(self, lines: ArrayLike, samples: ArrayLike, height: float = 0.0) -> Floats:
         """Return where pixels lie on the spheroid of the body, its semi-axes longer by a height.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.csm.angles import of_quaternions
 from photogram.formats.csm.isd import Detector, Framelets, Isd, Jitter, Pixels, Plane, Positions, Turns
+from photogram.formats.csm.missing_values import completed
 from photogram.io.json import Tree, read_json, unknown
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
@@ -50,17 +51,21 @@ def read_isd(path: Path) -> Isd:
         raise unknown(model, "the sensor model", _KINDS)
     kind = cast("Any", _KINDS[model.text()])
     size = tree["image_samples"].whole(1), tree["image_lines"].whole(1)
+    code = _instrument(tree, keywords)
+    tree, remarks = completed(tree, keywords, code)
     focal_length = not_zero(tree["focal_length_model"]["focal_length"])
     _check_frames(tree)
-    detector = _detector(tree, keywords)
+    detector = _detector(tree, keywords, code)
     pointing, center = _turns(tree, "instrument_pointing"), tree["center_ephemeris_time"].number()
-    own: dict[str, Any] = {}
+    position = _positions(tree["instrument_position"])
+    look = _look(kind, focal_length, detector, position, pointing)
+    own: dict[str, Any] = {"look": look}
     if kind != "frame" and "jitter" in tree:
         raise tree["jitter"].error("is known of frames alone")
     if kind == "line":
-        drift = read_drift(keywords, _instrument(tree, keywords))
         lines = read_lines(tree, center)
-        own["lines"], own["remarks"] = fitting(lines, size[1], pointing.times, drift)
+        own["lines"], of_lines = fitting(lines, size[1], pointing.times, read_drift(keywords, code))
+        remarks += of_lines
     elif kind == "push frame":
         own["framelets"] = _framelets(tree, size[1], float(detector.summing[1]))
     elif "jitter" in tree:
@@ -72,15 +77,32 @@ def read_isd(path: Path) -> Isd:
         tree["name_sensor"].text(),
         size,
         _radii(tree["radii"]),
-        focal_length,
+        look * focal_length if focal_length < 0 else focal_length,
         detector,
         _lens(tree, focal_length),
-        _positions(tree["instrument_position"]),
+        position,
         pointing,
         _turns(tree, "body_rotation"),
         center,
+        remarks=remarks,
         **own,
     )
+
+
+def _look(
+    kind: str, focal_length: float, detector: Detector, position: Positions, pointing: Turns
+) -> Literal[1, -1]:
+    """Return 1 if a camera looks along +z of its axes, -1 if along -z.
+
+    Support data have a negative focal length for -z. ISIS has a positive one for the metric camera of Apollo:
+    its focal plane is mirrored for +z, and its body is on the other side.
+    """
+    if kind != "line" and focal_length < 0:
+        return -1
+    middle = len(pointing.times) // 2, len(position.times) // 2
+    depth = -(pointing.matrices[middle[0]] @ position.places[middle[1]])[2]
+    mirrored = np.linalg.det(detector.planes["csm"].matrix) < 0
+    return -1 if kind == "frame" and mirrored and depth < 0 else 1
 
 
 def _check_frames(tree: Tree) -> None:
@@ -208,7 +230,7 @@ def _flat(tree: Tree) -> list[float]:
     return [each.number() for each in tree] if isinstance(tree.value, list) else [tree.number()]
 
 
-def _detector(tree: Tree, keywords: Tree) -> Detector:
+def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
     """Return the detector; ISIS has its own way from pixels to millimetres in the keywords of NAIF."""
 
     def pair(form: str) -> Floats:
@@ -220,7 +242,6 @@ def _detector(tree: Tree, keywords: Tree) -> Detector:
         raise tree["detector_sample_summing"].error("is not positive, or that of lines is not")
     csm = from_pixels(tree["focal2pixel_samples"], tree["focal2pixel_lines"])
     planes: dict[Pixels, Plane] = {"csm": csm, "isis": csm}
-    code = _instrument(tree, keywords)
     if code is not None:
         planes["isis"] = transformed(keywords, code)
     return Detector(

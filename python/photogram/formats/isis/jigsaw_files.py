@@ -351,4 +351,4 @@ def _middle(isd: Isd, own: Trajectory) -> tuple[Floats, Floats]:
     still = Trajectory(own.name, own.table)
     tables = (isd.position.times, isd.pointing.times)
     (places, _), (_, turned) = (about(still, float(times[0] + times[-1]) / 2) for times in tables)
-    return places, to_angles(to_camera(turned[np.newaxis]))[0]
+    return places, to_angles(to_camera(isd, turned[np.newaxis]))[0]

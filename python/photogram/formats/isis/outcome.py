@@ -69,15 +69,19 @@ class Outcome:
         """(m, 2) measured minus computed sample and line, at the instant of the measured line, in pixels."""
         found = np.full((len(self.result.residuals), 2), np.nan)
         for image, mine in self.rows.items():
-            detector = image.supported.isd.detector
-            turned = np.linalg.inv(detector.planes["isis"].matrix)
-            found[mine] = (self.result.residuals[mine] * [1.0, -1.0]) @ turned.T / detector.summing
+            isd = image.supported.isd
+            turned = np.linalg.inv(isd.detector.planes["isis"].matrix)
+            own = self.result.residuals[mine] * isd.axes[:2]
+            found[mine] = own @ turned.T / isd.detector.summing
         return found
 
     @cached_property
     def focal(self) -> Floats:
-        """(m, 2) measured x and y in the focal plane behind a perfect lens, y down, millimetres."""
-        return focal_images(self.result.block) * [1.0, -1.0]
+        """(m, 2) measured x and y behind a perfect lens, in the axes of cameras, millimetres."""
+        found = focal_images(self.result.block).copy()
+        for image, mine in self.rows.items():
+            found[mine] *= image.supported.isd.axes[:2]
+        return found
 
     @cached_property
     def xyz(self) -> Floats:

@@ -136,7 +136,7 @@ class _Corrected:
     def _flown(self, times: Floats) -> tuple[Floats, Floats]:
         """Return places, and matrices inertial to camera, of the tables as they were."""
         places, turned, *_ = self.table.flown(times, *np.zeros((2, 0, 3)))
-        return places, to_camera(turned.reshape(-1, 3, 3))
+        return places, to_camera(self.original, turned.reshape(-1, 3, 3))
 
 
 def _given(own: Mapping[str, Any], name: str, times: Floats) -> Floats | None:
