@@ -102,7 +102,8 @@ def read(path: Path, wishes: Wishes) -> Project:
     if wishes.cameras is None:
         raise InputError("a table of pixels has no cameras: --camera FILE gives them", file=path)
     table = pixel_table(path)
-    cameras = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}), []))
+    messages: list[Message] = []
+    cameras = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}), messages))
     photos, points = table.names("photo"), table.names("point")
     which = _cameras_of(table, [each.name for each in cameras.cameras])
     of_photo = np.zeros(len(photos.names), dtype=np.int64)
@@ -111,7 +112,6 @@ def read(path: Path, wishes: Wishes) -> Project:
     if len(other):
         raise table.error(int(other[0]), "column camera: the photo had another camera before")
     corner = corner_of(table, wishes.pixel_origin)
-    messages = []
     if wishes.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
         messages.append(
             Message(

@@ -21,7 +21,7 @@ from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import quoted
+from photogram.messages import listed, quoted
 from photogram.network.cameras import Camera, Weights
 from photogram.network.moving_photos import LineSensor, Shutter
 
@@ -33,6 +33,9 @@ _EACH = ("all", "photo", "group")
 OTHER_LENS = 5.0
 """Millimetres by which a principal distance that is given differs from a certificate of another lens cone."""
 _SD = ("sd_radial", "sd_tangential")
+_DISTANCES = ("c", "f", "fx", "fy")
+SMALLEST_DISTANCE = 0.1
+"""Smallest principal distance, as a part of the width of the image."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,8 @@ def read_cameras(tables: Tables) -> Cameras:
     Raises
     ------
     InputError
-        There is none, a model that there is not, a parameter that is missing or that the model does not have.
+        There is none, a model that there is not, a parameter that is missing or that the model does not have,
+        a principal distance below :data:`SMALLEST_DISTANCE`.
     ContradictionError
         A principal distance that is far from that of the certificate.
     """
@@ -71,15 +75,20 @@ def read_cameras(tables: Tables) -> Cameras:
     found, weights = Cameras(lines=line_sensors(tables, table)), table.texts("weights")
     certificates = read_certificates(tables)
     found.certificates.update(certificates)
+    in_mm = []
     for row, own in enumerate(_rows(table)):
         if found.lines[row] is not None:
             own = own.behind_a_lens(table, row)
         if own.each not in _EACH:
             raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
         size = _size(table, row, own)
+        scale = 1e-3 if tables.settings.image == "um" else 1.0
+        if size is not None and found.lines[row] is None:
+            scale, converted = _from_mm(tables.settings.image, table, row, own, size[0], scale)
+            in_mm += [own.name] * converted
         certificate = _of_camera(tables, table, row, own, certificates)
         if certificate is None:
-            make = partial(_camera, tables, table, row, own, size)
+            make = partial(_camera, tables, table, row, own, size, scale)
         else:
             make = partial(certified, tables, own.name, own.model, certificate)
         found.cameras.append(made(table, row, make))
@@ -87,10 +96,47 @@ def read_cameras(tables: Tables) -> Cameras:
         found.pixel_mm.append(own.pixel_mm)
         found.for_each.append(own.each)
         found.weights_given.append(bool(weights[row]))
+    if in_mm:
+        tables.tell(
+            f"lengths of the cameras {listed(in_mm, 3)} are in mm: pixel_mm converts them", table.path
+        )
     return replace(
         found,
         cameras=with_knots(tables, read_covariances(tables).cameras(found.cameras)),
         shutters=shutters(tables, table, found.cameras, found.sizes),
+    )
+
+
+def _from_mm(
+    image: str, table: ColumnTable, row: int, own: _Row, width: int, scale: float
+) -> tuple[float, bool]:
+    """Return the factor from lengths of a row to the unit of the camera, and whether it converts mm to px.
+
+    Raises
+    ------
+    InputError
+        A principal distance that is too small in pixels.
+    """
+    pixel = own.pixel_mm if own.pixel_mm and own.pixel_mm > 0 else math.nan
+    least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel / scale)
+    small = [name for name in _DISTANCES if abs(own.values.get(name, math.inf)) < least]
+    if not small:
+        return scale, False
+    value = own.values[small[0]]
+    of_mm = [abs(own.values[name]) / pixel for name in _DISTANCES if name in own.values]
+    in_mm = image == "px" and all(each >= SMALLEST_DISTANCE * width for each in of_mm)
+    if in_mm and not {"cx", "cy"} & own.values.keys():
+        return 1 / pixel, True
+    if in_mm:
+        remedy = f"if it is in mm, give {value / pixel:.10g} px, for cx and cy are in px"
+    elif image == "px":
+        remedy = "give it in px, or in mm with a column pixel_mm, the side of a pixel in mm"
+    else:
+        remedy = f"correct it, the width or pixel_mm ({pixel:g} mm)"
+    raise table.error(
+        row,
+        f"column {small[0]}: the principal distance {value:g} {image} must be at least {least:g} {image}, a"
+        f" tenth of the image width of {width} px; {remedy}",
     )
 
 
@@ -206,7 +252,9 @@ def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Ca
     return found
 
 
-def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None) -> Camera:
+def _camera(
+    tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None, scale: float
+) -> Camera:
     if given.calibration:
         return _calibrated(tables, table, row, given)
     known = given.values
@@ -225,7 +273,6 @@ def _camera(tables: Tables, table: ColumnTable, row: int, given: _Row, size: Siz
     deviations = _spread(own, given.deviations)
     if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
         raise table.error(row, f"the model {model} has no {strange[0]}, but {', '.join(powers)}")
-    scale = 1e-3 if image == "um" else 1.0
     values = {own[k]: v * scale ** powers[own[k]] for k, v in parameters.items() if k in own}
     if size is not None and image == "px":
         if "w" in own:
