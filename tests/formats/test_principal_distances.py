@@ -72,6 +72,14 @@ def test_a_small_principal_distance_is_rejected(tmp_path, reader, columns, row, 
         assert word in refused.value.message
 
 
+def test_lengths_in_millimetres_have_no_covariances(tmp_path):
+    (tmp_path / "covariances.csv").write_text(
+        "kind,name,first,second,covariance\ncamera,A,c,c,4\ncamera,A,K1,K1,1e-12\n"
+    )
+    with pytest.raises(InputError, match="camera A has lengths in mm and a row of covariances"):
+        read(tmp_path, "plain", "camera,width,height,pixel_mm,c,K1\nA,5472,3648,0.0024,8.8,1e-5\n")
+
+
 @pytest.mark.parametrize(("image", "c"), [("mm", "0.0088"), ("um", "8.8")])
 def test_it_is_rejected_in_the_unit_of_images(tmp_path, image, c):
     table = "camera,width,height,pixel_mm,c\nA,5472,3648,0.0024,{}\n"

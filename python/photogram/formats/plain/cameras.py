@@ -96,13 +96,19 @@ def read_cameras(tables: Tables) -> Cameras:
         found.pixel_mm.append(own.pixel_mm)
         found.for_each.append(own.each)
         found.weights_given.append(bool(weights[row]))
+    covariances = read_covariances(tables)
+    if both := [name for name in in_mm if covariances.names("camera", name)]:
+        raise table.head.error(
+            f"the camera {both[0]} has lengths in mm and a row of covariances, which must be in px; give both"
+            " in px"
+        )
     if in_mm:
         tables.tell(
             f"lengths of the cameras {listed(in_mm, 3)} are in mm: pixel_mm converts them", table.path
         )
     return replace(
         found,
-        cameras=with_knots(tables, read_covariances(tables).cameras(found.cameras)),
+        cameras=with_knots(tables, covariances.cameras(found.cameras)),
         shutters=shutters(tables, table, found.cameras, found.sizes),
     )
 
