@@ -110,4 +110,4 @@ def test_snooping_has_the_same_words():
     found = start.snoop()
     assert found.verdict.code == "usable-after-removal"
     assert any(each.startswith("camera: 8 views") for each in found.verdict.lines)
-    assert found.snooped.verdict == found.verdict == found.snooped.judged.verdict
+    assert found.snooped.verdict == found.verdict == found.snooped.result.verdict

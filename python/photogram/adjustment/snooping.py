@@ -250,7 +250,7 @@ def finished(
         suspects=trial.suspects,
         settings=settings,
         exchanged=tuple(exchanged),
-    )
+    ).recorded()
 
 
 def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Result) -> list[Exchange]:

@@ -120,7 +120,7 @@ def adjust(
         if snooping.snoop:
             _check_snooping(project, choices, division)
             removed = _snooped(job, project, block, started, run, threads, snooping)
-            result = cast("Result", removed.judged)
+            result = cast("Result", removed.result)
         else:
             removed, result = None, run(started or block)
         own = _statement(job, project, result, removed, documents.crs, strict) if statement else None

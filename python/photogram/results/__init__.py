@@ -7,7 +7,7 @@ WAYS = {
     "columns_of": ("tables",),
     "document_of": ("document",),
     "files_of": ("block_files",),
-    "findings_of": ("findings", "snooping_result"),
+    "findings_of": ("findings",),
     "page_of": {
         "Result": ("page.block",),
         "Snooped": ("page.cleaning",),

@@ -61,6 +61,7 @@ from photogram.results.result_files import (
 from photogram.results.tables import TABLES
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.methods import files_of
+from photogram.statistics.findings import Removed
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
@@ -84,6 +85,7 @@ _CLASSES = (
     Quantity,
     Redundancies,
     Refraction,
+    Removed,
     ResultDatum,
     Spheroid,
     SumsOfSquares,

@@ -68,6 +68,7 @@ def network_findings(
         untested=ROBUST if result.loss else "no degrees of freedom",
         computed=has_redundancy(result),
         systematic=systematic,
+        snooped=result.snooped,
         remarks=unseen(result),
         snoop="--snoop (photogram.snoop)",
     )

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
     from photogram.results.reliability_summary import ReliabilitySummary
+    from photogram.statistics.findings import Removed
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
@@ -129,6 +130,8 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         spent in each phase.
     options, state
         How the core adjusted the network, and where that ended: what covariances are computed from.
+    snooped
+        The observations that data snooping removed before; None without data snooping.
     """
 
     status: str
@@ -155,6 +158,7 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
     seconds: Mapping[str, float]
     options: CoreOptions
     state: _photocore.BlockState
+    snooped: Removed | None = None
 
     KNOWN: ClassVar[bool] = True
     """Whether standard deviations are given, so that the unit weight is known."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import orjson
@@ -13,11 +12,11 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Judged, Paged, findings_of
+from photogram.show.methods import Paged
 from photogram.show.quantity import members
 from photogram.show.sections import Section, composed, headline, verdict_sections
 from photogram.show.summary import Brief, Rows, few
-from photogram.statistics.findings import Findings, Removed
+from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
 from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome
@@ -27,11 +26,13 @@ from photogram.statistics.snooping.taking_out import Settings
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["LN10", "Snooped", "estimated_errors", "rivals_of", "snooped_findings"]
+    from photogram.statistics.verdict import Verdict
+
+__all__ = ["LN10", "Snooped", "estimated_errors", "rivals_of"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Snooped(Brief, Judged, Paged):
+class Snooped(Brief, Paged):
     """A network after data snooping.
 
     Attributes
@@ -65,12 +66,22 @@ class Snooped(Brief, Judged, Paged):
         ]
         return f"{title}, without gross errors", [*own, *(row for row in rows if row[0] != "verdict")]
 
-    @cached_property
-    def judged(self) -> AdjustedNetwork:
-        """The result as its reports show it: with the verdict that knows what was taken out."""
-        own = replace(self.result)
-        vars(own)["verdict"] = self.verdict
-        return own
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict of the result, which considers the removed observations."""
+        return self.result.verdict
+
+    def recorded(self) -> Snooped:
+        """Return the same with the removed observations as part of the result."""
+        record = Removed(
+            [_member(entry) for entry in self.removed],
+            images=self.share_removed("image"),
+            control=self.share_removed("control"),
+            rivals=self.rivals,
+            exchanged=[each.sentence for each in self.exchanged],
+            kept=[f"suspect, but kept: {entry.name} ({entry.kept})" for entry in self.log if entry.kept],
+        )
+        return replace(self, result=replace(self.result, snooped=record))
 
     @property
     def log(self) -> list[Removal]:
@@ -129,7 +140,7 @@ class Snooped(Brief, Judged, Paged):
     def to_json(self) -> bytes:
         """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
         own = {"snooping": self.document()}
-        return json.to_json({**orjson.loads(self.judged.to_json()), **own})
+        return json.to_json({**orjson.loads(self.result.to_json()), **own})
 
     def sections(self) -> list[Section]:
         """Return the log as titled sections of a report."""
@@ -141,7 +152,7 @@ class Snooped(Brief, Judged, Paged):
 
     def report(self) -> str:
         """Return the report: that of the network without what was taken out, then the log of that."""
-        return self.judged.report() + "\n" + composed(headline("data snooping"), self._own())
+        return self.result.report() + "\n" + composed(headline("data snooping"), self._own())
 
     def _head(self) -> list[str]:
         outcome, settings = self.outcome, self.settings
@@ -271,21 +282,3 @@ def _lines(entry: Removal) -> list[str]:
             f" {entry.prediction_log_probability / LN10:.1f}"
         )
     return lines
-
-
-@findings_of.register(Snooped)
-def snooped_findings(found: Snooped) -> Findings:
-    """Return the findings on the network without gross errors, and what was taken out."""
-    kept = [f"suspect, but kept: {entry.name} ({entry.kept})" for entry in found.log if entry.kept]
-    rest = findings_of(found.result)
-    return replace(
-        rest,
-        snooped=Removed(
-            [_member(entry) for entry in found.removed],
-            images=found.share_removed("image"),
-            control=found.share_removed("control"),
-            rivals=found.rivals,
-            exchanged=[each.sentence for each in found.exchanged],
-        ),
-        remarks=[*rest.remarks, *kept],
-    )

@@ -248,6 +248,8 @@ class Removed:
         What cannot be told apart from them, as sentences.
     exchanged
         Names that are exchanged among them, as sentences.
+    kept
+        Suspects that were not taken out, with the reason, as sentences.
     """
 
     removed: Sequence[Mapping[str, Any]]
@@ -255,6 +257,7 @@ class Removed:
     control: float = 0.0
     rivals: Sequence[str] = ()
     exchanged: Sequence[str] = ()
+    kept: Sequence[str] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

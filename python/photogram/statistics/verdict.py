@@ -118,6 +118,7 @@ def verdict(found: Findings) -> Verdict:
             *(line.said(usable) for line in others),
             *evidence.remarks(),
             *found.remarks,
+            *(found.snooped.kept if found.snooped else ()),
             *_exchanged(found, fitting),
         ),
         next=next_steps(first.code, found, usable=usable, take_out=_can_be_taken_out(evidence)),

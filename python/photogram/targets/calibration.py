@@ -150,7 +150,7 @@ class Calibration(Start):
             raise InputError("gross errors are taken out without priors of cameras: regularise is None")
         start = self.adjust().calibration if self.sync == "offset" else self
         found = snoop(weighted_block(start), **options)
-        result = found.judged
+        result = found.result
         assert isinstance(result, Result)
         own = start.with_images_of(result.block)
         told = replace(result, messages=[*own.messages, *result.messages])

@@ -149,15 +149,14 @@ def judged(calibrated: Calibrated, worth: Worth | None = None) -> Calibrated:
     result, snooped = copy(calibrated.result), calibrated.snooped
     vars(result)["verdict"] = own
     if snooped is not None:
-        snooped = copy(snooped)
-        vars(snooped).pop("judged", None)
-        vars(snooped)["verdict"] = own
+        snooped = replace(snooped, result=copy(snooped.result))
+        vars(snooped.result)["verdict"] = own
     return replace(calibrated, result=result, snooped=snooped, worth=worth)
 
 
 def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
     """Return the tests of the block, with what is said of calibrations in the place of control."""
-    found = findings_of(calibrated.snooped or calibrated.result)
+    found = findings_of(calibrated.result)
     shown = showings(calibrated)
     cross = () if worth is None else worth.cross
     wrong = [_systematic(each) for each in cross if not each.explained]

@@ -101,7 +101,7 @@ def _of_sd(factor: float) -> float:
 @page_of.register(Snooped)
 def snooped_page(found: Snooped) -> Page:
     """Return the page of the network without what was taken out."""
-    page = page_of(found.judged)
+    page = page_of(found.result)
     gone = Fact("Taken out", f"{len(found.removed)}", note=f"of {len(found.suspects)} groups of observations")
     return replace(page, highlights=[gone, *page.highlights], sections=[_log(found), *page.sections])
 
