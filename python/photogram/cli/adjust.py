@@ -123,7 +123,7 @@ def adjust(
             result = cast("Result", removed.result)
         else:
             removed, result = None, run(started or block)
-        own = _statement(job, project, result, removed, documents.crs, strict) if statement else None
+        own = _statement(job, project, result, documents.crs, strict) if statement else None
         _finish(job, project, result, removed, target, documents, pictures, sections, own, strict=strict)
 
 
@@ -185,13 +185,10 @@ def _finish(
     )
 
 
-def _statement(
-    job: Job, project: Project, result: Result, removed: Snooped | None, crs: str | None, strict: bool
-) -> Statement | None:
+def _statement(job: Job, project: Project, result: Result, crs: str | None, strict: bool) -> Statement | None:
     """Return the accuracy statement of a result; None where the adjustment has not converged."""
     if not result.converged:
         return None
-    out = () if removed is None else tuple(each.name for each in removed.removed)
     with job.status("stating"):
         return stated(
             job,
@@ -201,7 +198,6 @@ def _statement(
             crs=crs,
             strict=strict,
             assumed=project.lacks,
-            removed=out,
         )
 
 

@@ -24,7 +24,6 @@ def stated(
     crs: str | None = None,
     strict: bool = False,
     assumed: Sequence[str] = (),
-    removed: Sequence[str] = (),
 ) -> Statement:
     """Return the statement of a result, with the files it was made of; dated today where no date is given."""
     from datetime import date
@@ -44,7 +43,6 @@ def stated(
         result,
         strict=strict,
         assumed=assumed,
-        removed=removed,
         system=system,
         inputs=run.inputs,
         command=f"{run.command} {given}".rstrip(),

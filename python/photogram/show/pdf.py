@@ -213,7 +213,8 @@ class _Flow:
         elif isinstance(part, Facts):
             if part.caption and part.caption != within:
                 yield Paragraph(escape(part.caption), self._caption)
-            yield self._facts(part)
+            if part.facts:
+                yield self._facts(part)
         elif isinstance(part, Drawing):
             yield from self._drawing(part)
         elif isinstance(part, Layers):

@@ -28,7 +28,6 @@ from photogram.show.page import (
     Fact,
     Facts,
     Part,
-    Remarks,
     Row,
     Section,
     Table,
@@ -39,6 +38,8 @@ SOURCES = 12
 """Sources of a budget at a finer level than kinds that the page lists, those that contribute most."""
 RADII = 11
 """Of the table of distortion."""
+LISTED = 1000
+"""Removed observations that the page lists at most; the table of them as a file lists all."""
 
 
 def checks_annex(found: Statement) -> Section:
@@ -255,11 +256,24 @@ def adjustment_annex(found: Statement) -> Section:
     if result.verdict.tests:
         parts.append(_tests(found))
     if found.removed:
-        removed = [translation.named(texts, each) for each in found.removed]
-        parts += [Facts(texts("table.removed"), []), Remarks(removed, 60)]
+        parts.append(_removed(found))
     parts += [*_markers(found), _overlap(found)]
     intro = translation.verdict(texts, result.verdict)
     return Section("annex-e", texts("annex.e"), parts, intro, annex=True)
+
+
+def _removed(found: Statement) -> Table:
+    """Return the removed observations, on the page at most :data:`LISTED` of them."""
+    texts, cells, count = found.texts, Written(found.texts), len(found.removed)
+    return Table.of(
+        texts("table.removed"),
+        found.removed[:LISTED],
+        [
+            (cells.column("observation", text=True), lambda each: translation.named(texts, each.name)),
+            (cells.column("reason", text=True), lambda each: texts(f"removed.{each.reason}")),
+        ],
+        texts("table.removed.note", shown=LISTED, all=count) if count > LISTED else "",
+    )
 
 
 def _tests(found: Statement) -> Table:

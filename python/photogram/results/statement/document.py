@@ -54,7 +54,7 @@ def to_json(found: Statement) -> bytes:
             "adjustment": _adjustment(result),
             "assumptions": found.assumptions,
             "remarks": found.judged.remarks,
-            "removed": list(found.removed),
+            "removed": [members(each, "name", "reason") for each in found.removed],
             "files": [{"name": each.path.name, "sha256": each.sha256} for each in found.inputs],
             "command": found.command or None,
         }

@@ -23,6 +23,30 @@ Said = list[tuple[str, str]]
 """Keys of the table of words, and texts."""
 
 
+@dataclass(frozen=True)
+class RemovedObservation:
+    """An observation that did not take part in the adjustment.
+
+    Attributes
+    ----------
+    name
+        Its name, such as `image of point C04 on photo 301`.
+    reason
+        `snooping`: data snooping removed it. `first values`: it does not fit the initial values. `earlier`:
+        it was removed before.
+    """
+
+    name: str
+    reason: str
+
+
+def removed_observations(result: Result, earlier: Sequence[str]) -> tuple[RemovedObservation, ...]:
+    """Return all observations that were removed, with those that the caller has removed `earlier`."""
+    snooped = () if result.snooped is None else [str(each["name"]) for each in result.snooped.removed]
+    of_reason = {"snooping": snooped, "first values": result.set_aside, "earlier": earlier}
+    return tuple(RemovedObservation(name, reason) for reason, names in of_reason.items() for name in names)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Grounds:
     """All that was found of an adjusted block and its check points, and what was asked of it.
@@ -44,6 +68,8 @@ class Grounds:
         What standards say.
     layout
         How check points lie; None without any.
+    removed
+        Observations that did not take part in the adjustment.
     """
 
     result: Result
@@ -57,14 +83,15 @@ class Grounds:
     taken_apart: tuple[Budget, ...]
     standards: Standards
     layout: Layout | None
+    removed: tuple[RemovedObservation, ...]
 
 
-def assumptions(found: Grounds, assumed: Sequence[str], removed: Sequence[str]) -> Said:
+def assumptions(found: Grounds, assumed: Sequence[str]) -> Said:
     """Return what was assumed: as files were read, in sentences, and of a block without what was removed."""
     asked, texts, layout, lengths = found.asked, found.texts, found.layout, found.standards.lengths
     said = [*_weights(found)]
     said += [texts.said("assume.read", said=translation.read(texts, each)) for each in assumed]
-    said += [*_adjustment(found, removed)]
+    said += [*_adjustment(found)]
     if len(found.compared):
         said += _survey(found)
         if found.compared.step > 1:
@@ -105,9 +132,9 @@ def _weights(found: Grounds) -> Said:
     return [*said, texts.said("weights.posterior", s2=s2, f=f), texts.said("honest.approximate")]
 
 
-def _adjustment(found: Grounds, removed: Sequence[str]) -> Said:
+def _adjustment(found: Grounds) -> Said:
     result, texts = found.result, found.texts
-    total, out = int(result.used_images.sum()), len(removed) + len(result.set_aside)
+    total, out = int(result.used_images.sum()), len(found.removed)
     block = result.block
     held = translation.held(texts, result)
     refraction = translation.refraction(texts, block.refraction, block.linear_unit)

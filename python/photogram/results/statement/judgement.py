@@ -76,9 +76,7 @@ class _Against:
         return self.warning or self.low or bool(self.control) or self.lengths
 
 
-def judged(
-    found: Grounds, *, assumed: Sequence[str] = (), removed: Sequence[str] = (), strict: bool = False
-) -> Judged:
+def judged(found: Grounds, *, assumed: Sequence[str] = (), strict: bool = False) -> Judged:
     """Return what the statement says of all that was found."""
     texts, of_all, standards = found.texts, found.of_all, found.standards
     against = _against(found)
@@ -104,7 +102,7 @@ def judged(
             *_honest(found),
             *(("budget.line", budget_line(texts, each)) for each in found.taken_apart),
         ],
-        assumptions=assumptions(found, assumed, removed),
+        assumptions=assumptions(found, assumed),
         remarks=remarks,
     )
 

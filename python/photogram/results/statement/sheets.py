@@ -36,6 +36,10 @@ def files_of_statement(found: Statement) -> dict[str, bytes]:
     }
     if found.left_out:
         files["leave_one_out.csv"] = _left_out_file(found.left_out, unit)
+    if found.removed:
+        columns = {"observation": [each.name for each in found.removed]}
+        columns["reason"] = [each.reason for each in found.removed]
+        files["removed.csv"] = csv_text(columns, [])
     return files
 
 

@@ -13,12 +13,13 @@ from photogram.arguments.annotations import check_arguments
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import nearest
+from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.results.statement.budget import budgets
 from photogram.results.statement.comparison import Compared, compared, control_places
 from photogram.results.statement.figures import figures
 from photogram.results.statement.given_coordinates import NOTHING, Survey, System, surveyed
-from photogram.results.statement.grounds import Grounds
+from photogram.results.statement.grounds import Grounds, removed_observations
 from photogram.results.statement.judgement import Judged, judged
 from photogram.results.statement.layout import Layout, layout
 from photogram.results.statement.leave_one_out import leave_one_out
@@ -45,8 +46,6 @@ class Statement(Grounds, Brief):
     ----------
     judged
         Headline, sentences, assumptions, remarks and exit code: one judgement for all that is written.
-    removed
-        Observations that were taken out before.
     survey
         Control and check points as they were given, in the system in which they are shown.
     inputs, command
@@ -54,7 +53,6 @@ class Statement(Grounds, Brief):
     """
 
     judged: Judged
-    removed: tuple[str, ...] = ()
     survey: Survey = NOTHING
     inputs: tuple[InputFile, ...] = ()
     command: str = ""
@@ -198,7 +196,8 @@ def statement(
     assumed
         What was assumed when the files were read, in sentences.
     removed
-        Observations that were taken out before, by their names.
+        Names of observations that you removed before the adjustment. The statement lists them together with
+        those that the result itself knows: of data snooping and of first values.
     system
         In which coordinates are shown; None: the axes of the block.
     inputs, command
@@ -229,7 +228,7 @@ def statement(
         raise AdjustmentError(
             "there is no statement without covariances: adjust with covariance=True, not in parts"
         )
-    texts = Texts(options.language, options.text, result.block.linear_unit)
+    texts = Texts(options.language, options.text, result.block.linear_unit, _names(result.block))
     covariances = result.covariances()
     found = compared(result, options, covariances)
     rest = found.without(list(options.without)) if options.without else None
@@ -256,15 +255,25 @@ def statement(
         taken_apart=tuple(taken_apart),
         standards=standards(result, options, found, of_all, of_vegetated, left_out),
         layout=_layout(result, found),
+        removed=removed_observations(result, removed),
     )
     return Statement(
         **vars(grounds),
-        judged=judged(grounds, assumed=assumed, removed=removed, strict=strict),
-        removed=tuple(removed),
+        judged=judged(grounds, assumed=assumed, strict=strict),
         survey=surveyed(result, found, system),
         inputs=tuple(inputs),
         command=command,
     )
+
+
+def _names(block: Block) -> dict[str, set[str]]:
+    """Return the names of a block by the fields of sentences that contain them."""
+    return {
+        "point": set(block.point_ids),
+        "photo": set(block.photo_ids),
+        "camera": {*block.camera_names, "the camera"},
+        "unknown": {each.name for each in block.unknowns},
+    }
 
 
 def _layout(result: Result, found: Compared) -> Layout | None:

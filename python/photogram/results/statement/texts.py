@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from datetime import date
 from functools import cache
 from importlib.resources import files
@@ -42,16 +41,35 @@ def fields_of(sentence: str) -> set[str]:
     return {name for _, name, _, _ in parts if name is not None}
 
 
+_Parts = Sequence[tuple[str, str | None]]
+
+
 @cache
-def _patterns(family: str) -> list[tuple[str, re.Pattern[str]]]:
-    """Return the English sentences of the keys of a family as patterns, in the order of the table."""
-    found = []
-    for key, sentence in table_of("en").items():
-        if key.startswith(f"{family}."):
-            parts = [(re.escape(text), name) for text, name, *_ in Formatter().parse(sentence)]
-            pattern = "".join(text + (f"(?P<{name}>.+)" if name else "") for text, name in parts)
-            found.append((key, re.compile(pattern)))
-    return found
+def _patterns(family: str) -> list[tuple[str, _Parts]]:
+    """Return the English sentences of a family by key, as texts with fields, in the order of the table."""
+    return [
+        (key, [(text, name) for text, name, *_ in Formatter().parse(sentence)])
+        for key, sentence in table_of("en").items()
+        if key.startswith(f"{family}.")
+    ]
+
+
+def _ways(parts: _Parts, said: str) -> Iterator[dict[str, str]]:
+    """Yield the fields of a sentence for every division of a text, those with a long first field first."""
+    if not parts:
+        if not said:
+            yield {}
+        return
+    (text, name), rest = parts[0], parts[1:]
+    if not said.startswith(text):
+        return
+    said = said[len(text) :]
+    if name is None:
+        yield from _ways(rest, said)
+        return
+    for end in range(len(said), 0, -1):
+        for fields in _ways(rest, said[end:]):
+            yield {name: said[:end], **fields}
 
 
 class Texts:
@@ -65,6 +83,9 @@ class Texts:
         Sentences by key that stand for those of the language.
     unit
         The linear unit of the block.
+    names
+        Names of points, photos, cameras and unknowns by the field that contains them: texts of other modules
+        are divided at these names only. A field without names contains any text.
 
     Raises
     ------
@@ -72,10 +93,16 @@ class Texts:
         A language or a key that there is not, fields that a sentence does not have.
     """
 
-    def __init__(self, language: str = "en", own: Mapping[str, str] | None = None, unit: str = "m") -> None:
+    def __init__(
+        self,
+        language: str = "en",
+        own: Mapping[str, str] | None = None,
+        unit: str = "m",
+        names: Mapping[str, Collection[str]] | None = None,
+    ) -> None:
         if language not in LANGUAGES:
             raise InputError(f"there is no language {language!r}: {', '.join(LANGUAGES)}")
-        self.language, self.unit = language, unit
+        self.language, self.unit, self._names = language, unit, names or {}
         english = table_of("en")
         for key, sentence in (own or {}).items():
             if key not in english:
@@ -184,9 +211,20 @@ class Texts:
         shown = ", ".join(names[:most])
         return shown if len(names) <= most else self("word.more", names=shown, count=len(names) - most)
 
-    def recognised(self, family: str, said: str) -> tuple[str, dict[str, str]] | None:
-        """Return the key of a family whose English sentence this is, and its fields; None without one."""
-        for key, pattern in _patterns(family):
-            if (found := pattern.fullmatch(said)) is not None:
-                return key, found.groupdict()
+    def is_name(self, text: str) -> bool:
+        """Return whether a text is the name of a point, photo, camera or unknown."""
+        return any(text in names for names in self._names.values())
+
+    def recognised(
+        self, family: str, said: str, accepts: Callable[[Mapping[str, str]], bool] = bool
+    ) -> tuple[str, dict[str, str]] | None:
+        """Return the key of a family whose English sentence this is, and its fields; None without one.
+
+        `accepts` judges fields; names are those of the block.
+        """
+        for key, parts in _patterns(family):
+            for fields in _ways(parts, said):
+                known = (value in self._names.get(name, (value,)) for name, value in fields.items())
+                if all(known) and (not fields or accepts(fields)):
+                    return key, fields
         return None

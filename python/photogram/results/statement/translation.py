@@ -55,11 +55,11 @@ def parameter(texts: Texts, name: str) -> str:
     if texts.has(f"axis.{name}"):
         return axis(texts, name)
     words = name.split(" ")
-    # Components of two words go before those of one: `rotation x`.
-    for cut in range(1, len(words)):
-        component = " ".join(words[cut:])
+    # `rotation x` precedes `x`, unless only the latter leaves a name of the block.
+    ways = [(" ".join(words[:cut]), " ".join(words[cut:])) for cut in range(1, len(words))]
+    for of, component in sorted(ways, key=lambda way: not texts.is_name(way[0])):
         if texts.has(f"axis.{component}"):
-            return " ".join([*words[:cut], axis(texts, component)])
+            return f"{of} {axis(texts, component)}"
     return name
 
 
@@ -77,17 +77,17 @@ def quantity(texts: Texts, name: str) -> str:
 
 def test(texts: Texts, name: str) -> str:
     """Return what a test of a verdict is called."""
-    head, colon, rest = name.partition(": ")
+    parts = name.split(": ")
+    ways = [(": ".join(parts[:cut]), ": ".join(parts[cut:])) for cut in range(1, len(parts) + 1)]
+    head, rest = next((way for way in ways if _recognised(texts, "test", way[0])), ways[0])
     own = rest if head in PLAIN else named(texts, rest)
-    said = _turned(texts, "test", head) + colon + own
+    said = _turned(texts, "test", head) + (f": {own}" if own else "")
     return f"{said[:1].upper()}{said[1:]}"
 
 
 def named(texts: Texts, said: str) -> str:
     """Return what other modules call an observation, or what else a test is of."""
-    found = texts.recognised("named", said)
-    axes = [] if found is None else found[1].get("axes", "x").split(", ")
-    if axes and all(each in LETTERS or texts.has(f"axis.{each}") for each in axes):
+    if _recognised(texts, "named", said):
         return _turned(texts, "named", said)
     words = said.split(" ")
     for cut in range(len(words) - 1, 0, -1):
@@ -181,8 +181,22 @@ def _one(texts: Texts, name: str) -> str:
     return ", ".join(texts.word("one", each) for each in name.split(", "))
 
 
+def _recognised(texts: Texts, family: str, said: str) -> tuple[str, dict[str, str]] | None:
+    """Return key and fields of a sentence, preferably those in which every field is known as well."""
+
+    def components(fields: Mapping[str, str]) -> bool:
+        axes = fields["axes"].split(", ") if "axes" in fields else []
+        return all(each in LETTERS or texts.has(f"axis.{each}") for each in axes)
+
+    def whole(fields: Mapping[str, str]) -> bool:
+        own = fields.get("named")
+        return components(fields) and (own is None or _recognised(texts, "named", own) is not None)
+
+    return texts.recognised(family, said, whole) or texts.recognised(family, said, components)
+
+
 def _turned(texts: Texts, family: str, said: str) -> str:
-    found = texts.recognised(family, said)
+    found = _recognised(texts, family, said)
     if found is None:
         return said
     key, fields = found
