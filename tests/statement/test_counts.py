@@ -67,7 +67,7 @@ def with_one(result):
         (
             "en",
             [
-                "Only 1 check point, fewer than the 30 of the standard, was at hand; with it RMSE_H",
+                "With only 1 check point, fewer than the 30 of the standard, it is not decided",
                 "Tested by 1 check point: vertical accuracy",
                 "1 check point agrees with the standard deviations",
                 "The standard asks for 30 check points; at hand: 1.",
@@ -79,7 +79,7 @@ def with_one(result):
         (
             "de",
             [
-                "Es lag nur 1 Kontrollpunkt vor, weniger als die 30 des Standards; mit ihm RMSE_H",
+                "Mit nur 1 Kontrollpunkt, weniger als den 30 des Standards, ist nicht entschieden",
                 "Mit 1 Kontrollpunkt geprüft: Höhengenauigkeit",
                 "1 Kontrollpunkt stimmt mit den Standardabweichungen überein",
                 "Der Standard verlangt 30 Kontrollpunkte; vorhanden: 1.",

@@ -9,6 +9,7 @@ from golden_statement import cofactors, control, differences, golden
 from hypothesis import given
 from hypothesis import strategies as st
 
+import photogram
 from photogram import InputError
 from photogram.results.statement import asprs, iso_19157
 from photogram.results.statement.asprs import accuracy, three_d, verdict
@@ -20,6 +21,7 @@ from photogram.results.statement.lengths import (
     measured_lengths,
 )
 from photogram.results.statement.nssda import nssda
+from photogram.show.methods import page_of
 from photogram.statistics import effective_freedom
 
 
@@ -103,6 +105,47 @@ def test_the_words_follow_the_number_of_check_points():
         "tested",
         "tested",
     ]
+
+
+SENTENCES = {
+    "missed": "asprs.missed",
+    "met": "asprs.tested",
+    "met with confidence": "asprs.tested",
+    "produced to meet": "asprs.produced",
+    "not decided": "asprs.undecided",
+    "not tested": "asprs.none",
+}
+
+
+@pytest.mark.parametrize("count", [0, 1, 18, 29, 30])
+def test_page_and_document_have_one_verdict_for_each_class(result, count):
+    block, names = result.block, [f"C{k:02}" for k in range(1, 31)]
+    positions = block.point_positions.copy()
+    positions[[block.point_ids.index(name) for name in names[count:]]] = np.nan
+    fewer = photogram.adjust(block.replace(point_positions=positions), unit_variance="unity")
+    seen = set()
+    for size in (0.02, 0.035, 0.042, 0.047, 0.055, 0.1, 1.0):
+        found = fewer.statement(classes=dict.fromkeys(("h", "v", "3d"), size), budgets=())
+        member = json.loads(found.to_json())["asprs"]
+        verdicts = {"h": member["horizontal"], "v": member["vertical"], "3d": member["three_d"]}
+        keys = {each["key"] for each in found.sentences if each["key"].startswith("asprs.")}
+        # Without check points the standard has no sentence for three dimensions.
+        assert keys == {
+            f"{SENTENCES[verdict]}.{name}" for name, verdict in verdicts.items() if count or name != "3d"
+        }
+        (section,) = [each for each in page_of(found).sections if each.id == "figures"]
+        rows = section.parts[0].rows if count else []
+        shown = {row[0]: row[-1] for row in rows if row[-1]}
+        of_page = {"plan": "h", "h": "v", "all": "3d"}
+        assert shown == {
+            found.texts(f"component.{part}"): found.texts(f"asprs.verdict.{verdicts[name]}")
+            for part, name in of_page.items()
+            if count
+        }
+        assert (found.exit == 4) == ("missed" in verdicts.values())
+        assert ("not decided" in verdicts.values()) <= (found.headline != found.texts("headline.met"))
+        seen |= set(verdicts.values())
+    assert len(seen) >= (3 if count else 1)
 
 
 def test_control_is_to_be_twice_as_accurate_as_the_class():

@@ -41,7 +41,7 @@ from photogram.results.network_trial import (
     NetworkTrial,
 )
 from photogram.results.result import Result
-from photogram.results.snooping_result import Snooped
+from photogram.results.snooping_result import Snooped, recorded
 from photogram.results.suspects import network_trial
 from photogram.show.methods import Way
 from photogram.statistics.distributions import LEVEL
@@ -244,13 +244,14 @@ def finished(
     if not math.isinf(largest):
         with suppress(AdjustmentError):
             said += held_remark(held(), largest)
-    return Snooped(
+    found = Snooped(
         result=dataclasses.replace(result, messages=[*map(Message, said), *result.messages]),
         outcome=outcome,
         suspects=trial.suspects,
         settings=settings,
         exchanged=tuple(exchanged),
-    ).recorded()
+    )
+    return recorded(found)
 
 
 def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Result) -> list[Exchange]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["LN10", "Snooped", "estimated_errors", "rivals_of"]
+__all__ = ["LN10", "Snooped", "estimated_errors", "recorded", "rivals_of"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -70,18 +70,6 @@ class Snooped(Brief, Paged):
     def verdict(self) -> Verdict:
         """The verdict of the result, which considers the removed observations."""
         return self.result.verdict
-
-    def recorded(self) -> Snooped:
-        """Return the same with the removed observations as part of the result."""
-        record = Removed(
-            [_member(entry) for entry in self.removed],
-            images=self.share_removed("image"),
-            control=self.share_removed("control"),
-            rivals=self.rivals,
-            exchanged=[each.sentence for each in self.exchanged],
-            kept=[f"suspect, but kept: {entry.name} ({entry.kept})" for entry in self.log if entry.kept],
-        )
-        return replace(self, result=replace(self.result, snooped=record))
 
     @property
     def log(self) -> list[Removal]:
@@ -173,6 +161,19 @@ class Snooped(Brief, Paged):
         if out:
             lines.append(f"the unit variance holds after removal of {out} groups: it is biased low by little")
         return lines
+
+
+def recorded(found: Snooped) -> Snooped:
+    """Return the same with the removed observations as part of its result."""
+    record = Removed(
+        [_member(entry) for entry in found.removed],
+        images=found.share_removed("image"),
+        control=found.share_removed("control"),
+        rivals=found.rivals,
+        exchanged=[each.sentence for each in found.exchanged],
+        kept=[f"suspect, but kept: {entry.name} ({entry.kept})" for entry in found.log if entry.kept],
+    )
+    return replace(found, result=replace(found.result, snooped=record))
 
 
 _COLUMNS = (

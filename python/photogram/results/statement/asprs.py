@@ -130,12 +130,15 @@ def three_d(horizontal: Accuracy, vertical: Accuracy, freedom: float) -> Accurac
     return accuracy(found, survey, freedom, min(horizontal.count, vertical.count))
 
 
-def verdict(figure: Accuracy, limit: float) -> str:
+def verdict(figure: Accuracy | None, limit: float) -> str:
     """Return what can be said of a class, in the linear unit; refuse one that is not positive.
 
     `missed` where the figure is larger. Else, by the upper end of its interval, `met with confidence` or
-    `met`; with fewer than 30 points `produced to meet` or `not decided` in their places.
+    `met`; with fewer than 30 points `produced to meet` or `not decided` in their places. `not tested` without
+    a figure.
     """
+    if figure is None:
+        return "not tested"
     if figure.rmse > _class(limit):
         return "missed"
     sure = figure.upper <= limit

@@ -27,6 +27,14 @@ NOT_USABLE = 4
 HEIGHT_KINDS = 10.0
 """Standard deviations of a mean difference beyond which heights of two kinds may have been compared."""
 NAMED = 10
+_CASES = {
+    "missed": "missed",
+    "met with confidence": "tested",
+    "met": "tested",
+    "produced to meet": "produced",
+    "not decided": "undecided",
+}
+"""Sentences of the verdicts on a class that has check points."""
 
 
 @dataclass(frozen=True)
@@ -163,8 +171,8 @@ def _headline(against: _Against, of_all: Figures | None, standards: Standards, *
         (strict and against.control, "control"),
         (strict and against.lengths, "lengths"),
         (against.low, "low"),
-        (of_all is None and not met, "none"),
-        ("not decided" in verdicts, "found"),
+        (of_all is None and (not met or "not tested" in verdicts), "none"),
+        ("not decided" in verdicts or "not tested" in verdicts, "found"),
         ("produced to meet" in verdicts, "produced"),
         (bool(verdicts) or bool(met), "met"),
     ):
@@ -185,10 +193,8 @@ def _asprs(of: Grounds) -> Said:
             if figure is not None and name != "3d":
                 said.append(texts.said(f"asprs.found.{name}", n=figure.count, **own))
         elif figure is not None:
-            case = "missed" if found.verdicts[name] == "missed" else found.words
-            said.append(
-                texts.said(f"asprs.{case}.{name}", n=figure.count, **{"class": texts.size(size)}, **own)
-            )
+            key = f"asprs.{_CASES[found.verdicts[name]]}.{name}"
+            said.append(texts.said(key, n=figure.count, **{"class": texts.size(size)}, **own))
         elif name != "3d":
             left = {f"loo_{name}": texts.length(found.left_out[name])}
             said.append(texts.said(f"asprs.none.{name}", **{"class": texts.size(size)}, **left))

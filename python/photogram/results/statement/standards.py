@@ -46,9 +46,9 @@ class Asprs:
     figures
         By `h`, `v`, `3d`, `vva`; None where there are no points.
     verdicts
-        Of the classes that were asked for.
+        Of the classes that were asked for: sentences, headline, table and JSON document follow from them.
     words
-        `tested`, `produced` or `none`.
+        `tested`, `produced` or `none`, by the component with the fewest check points.
     area, points_asked
         Square kilometres, and how many check points the standard asks for there.
     survey, control
@@ -179,7 +179,8 @@ def _asprs(
     km2 = area * metre**2 / 1e6
     figures = _accuracies(of_all, of_vegetated)
     classes = asked.classes
-    verdicts = {name: asprs.verdict(own, size) for name, size in classes.items() if (own := figures[name])}
+    verdicts = {name: asprs.verdict(figures[name], size) for name, size in classes.items()}
+    counts = [0 if own is None else own.count for own in (figures["h"], figures["v"])]
     plan, height = _control_rmse(result)
     control: dict[str, bool] = {}
     if "h" in classes:
@@ -188,7 +189,7 @@ def _asprs(
     return Asprs(
         figures=figures,
         verdicts=verdicts,
-        words=asprs.wording(0 if of_all is None else of_all.n),
+        words=asprs.wording(min(filter(None, counts), default=0)),
         area=km2,
         points_asked=asprs.points_asked_for(km2),
         survey={
