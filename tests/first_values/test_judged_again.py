@@ -8,6 +8,7 @@ import pytest
 
 from golden_data import shared
 from photogram import adjust, adjust_started, first_values, formats
+from photogram.results.result import NOT_PHOTOGRAPHED, REJECTED
 
 
 def printed(kind, count):
@@ -83,6 +84,27 @@ def test_images_that_stay_out_head_the_verdict():
     assert result.verdict.warning
     assert all(name in result.verdict.headline for name in names)
     assert (result.verdict.exit_code(), result.verdict.exit_code(strict=True)) == (0, 4)
+
+
+def without_images(block):
+    """Return a block with a further pass point that no photo shows."""
+    return block.replace(
+        point_ids=[*block.point_ids, "UNSEEN"],
+        point_positions=np.vstack([block.point_positions, [[1.0, 2.0, 3.0]]]),
+        point_sd=np.vstack([block.point_sd, [[0.1, 0.1, 0.1]]]),
+    )
+
+
+def test_rejected_points_differ_from_points_that_were_never_photographed():
+    block = without_images(started([]))
+    point = next(row for row in range(len(block.point_ids)) if (block.image_points == row).sum() == 3)
+    rows, xy = np.flatnonzero(block.image_points == point), block.image_xy.copy()
+    xy[rows] += 200 * block.image_sd[rows] * [[1, 1], [-1, 1], [1, -1]]
+    result = adjust_started(first_values(block.replace(image_xy=xy)))
+    reasons = {block.point_ids[point]: REJECTED, "UNSEEN": NOT_PHOTOGRAPHED}
+    assert {name: reason for name, reason in result.dropped.items() if name in reasons} == reasons
+    (said,) = [str(each) for each in result.messages if NOT_PHOTOGRAPHED in str(each)]
+    assert block.point_ids[point] not in said.split(": ")[-1].split(", ")
 
 
 def test_all_may_be_kept():

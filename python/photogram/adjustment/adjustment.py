@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -44,7 +44,7 @@ from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
+from photogram.results.result import NOT_PHOTOGRAPHED, REJECTED, Result
 from photogram.show.methods import Way
 
 __all__ = [
@@ -369,18 +369,38 @@ def core_threads(threads: int | None) -> int:
 
 def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     """Collect remarks on the block that did not stop the adjustment, the gravest first."""
-    by_reason: dict[str, list[str]] = {}
-    for point, reason in solution.dropped:
-        by_reason.setdefault(reason, []).append(block.point_ids[point])
     error = None if solution.undetermined is None else named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
-    messages += [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
-    dropped = {block.point_ids[point] for point, _ in solution.dropped}
-    lost = [each.name for each in block.observations if dropped.intersection(each.points)]
+    dropped = {block.point_ids[point]: reason for point, reason in solution.dropped}
+    messages += _left_out(dropped)
+    lost = [each.name for each in block.observations if dropped.keys() & set(each.points)]
     if lost:
         messages.append(Message(f"left out with their points: {listed(lost)}"))
     return messages + refraction_remarks(block, solution.photo_positions)
+
+
+def _left_out(dropped: Mapping[str, str]) -> list[Message]:
+    """Return one message for each reason for which points are left out."""
+    by_reason: dict[str, list[str]] = {}
+    for point, reason in dropped.items():
+        by_reason.setdefault(reason, []).append(point)
+    return [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
+
+
+def with_rejections(result: Result, given: Block) -> Result:
+    """Return a result in which points that had images in the given block are not called unphotographed."""
+    if NOT_PHOTOGRAPHED not in result.dropped.values():
+        return result
+    imaged = {given.point_ids[row] for row in np.unique(given.image_points).tolist()}
+    dropped = {
+        name: REJECTED if reason == NOT_PHOTOGRAPHED and name in imaged else reason
+        for name, reason in result.dropped.items()
+    }
+    before, messages = _left_out(result.dropped), result.messages
+    place = next((row for row, each in enumerate(messages) if each in before), 0)
+    rest = [each for each in messages if each not in before]
+    return replace(result, dropped=dropped, messages=[*rest[:place], *_left_out(dropped), *rest[place:]])
 
 
 def _rises(iterations: list[Iteration]) -> list[Message]:

@@ -18,6 +18,7 @@ from photogram.adjustment.adjustment import (
     adjusted_from,
     core_options,
     core_threads,
+    with_rejections,
 )
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.remarks import check_cameras
@@ -211,7 +212,7 @@ def _snoop_block(
             first = adjusted(block, covariance=covariance, loss="huber")
         trial, outcome = _snooped_from(first, settings, threads, parts=parts)
     cleaned, options = _without(block, trial, outcome.out), core_options(unit_variance, None)
-    result = adjusted_from(cleaned, options, threads=threads, progress=progress)
+    result = with_rejections(adjusted_from(cleaned, options, threads=threads, progress=progress), block)
     has_held = any(
         (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
     )

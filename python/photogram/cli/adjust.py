@@ -249,6 +249,7 @@ def _snooped(
 ) -> Snooped:
     """Take gross errors out of a block, of what is kept where first values have set images aside."""
     from photogram import Result, snoop
+    from photogram.adjustment.adjustment import with_rejections
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.results.fitting import with_features
 
@@ -266,7 +267,8 @@ def _snooped(
         )
         result = diagnosed(cast("Result", found.result))
     assert isinstance(result, Result)
-    return replace(found, result=with_features(replace(result, set_aside=aside), project.features))
+    result = with_rejections(replace(result, set_aside=aside), project.block)
+    return replace(found, result=with_features(result, project.features))
 
 
 def adjusted_block(

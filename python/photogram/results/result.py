@@ -51,6 +51,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Redundancies", "Result", "SumsByKind", "SumsOfSquares"]
 
+NOT_PHOTOGRAPHED = "not photographed"
+REJECTED = "all its image observations are rejected"
+"""Reasons why a point without image observations is left out: it never had any, or none was used."""
+
 
 @dataclass(frozen=True)
 class SumsByKind:

@@ -23,7 +23,7 @@ from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengt
 from photogram.network.observations import Control
 from photogram.network.rays import local_axes
 from photogram.results.covariance import Covariances
-from photogram.results.result import Result
+from photogram.results.result import NOT_PHOTOGRAPHED, Result
 from photogram.results.statement.request import METRES, Asked
 
 PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
@@ -314,11 +314,6 @@ def _check_apart(block: Block, rows: Indices) -> None:
 def _not_usable(result: Result) -> list[tuple[str, str]]:
     """Return known points that took no part, with the reason."""
     known = (result.point_kinds == "check") & ~result.used_points
-    imaged = np.zeros(len(known), dtype=bool)
-    imaged[result.block.image_points] = True
-    found = []
-    for row in np.flatnonzero(known).tolist():
-        name = result.block.point_ids[row]
-        reason = result.dropped.get(name, "left out") if imaged[row] else "no images"
-        found.append((name, reason))
-    return found
+    names = [result.block.point_ids[row] for row in np.flatnonzero(known).tolist()]
+    reasons = ((name, result.dropped.get(name, "left out")) for name in names)
+    return [(name, "no images" if why == NOT_PHOTOGRAPHED else why) for name, why in reasons]
