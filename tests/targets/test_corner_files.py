@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from given_targets import rig_small
+from seen_boards import seen
 
 from golden_data import shared
 from photogram import Camera, InputError
@@ -192,7 +193,6 @@ def test_storage_of_opencv(tmp_path, kind):
     assert found.board == SMALL
     assert found.sizes == {"": (640, 480)}
     assert found.xy[6:] == pytest.approx(XY + 1)
-    assert "metres are assumed" in str(found.messages[0])
     with pytest.raises(InputError, match="6 corners in each view, but the board has 20"):
         read_storage(path, Board(columns=5, rows=4, spacing=0.1))
     path.write_text(storage(kind).replace("2f", "2i"))
@@ -215,6 +215,24 @@ def test_arrays_of_opencv(tmp_path):
     np.savez(path, objpoints=objpoints, imgpoints=np.stack([XY, XY + 1]))
     with pytest.raises(InputError, match="objpoints are no grid"):
         read_npz(path, None)
+
+
+@pytest.mark.parametrize("unit", [None, "mm"])
+def test_metres_are_assumed_only_without_a_unit(tmp_path, unit):
+    board = Board(columns=9, rows=7, spacing=30.0)
+    parameters = {"fx": 900.0, "fy": 900.0, "cx": 511.5, "cy": 383.5} | dict.fromkeys(
+        ("k1", "k2", "p1", "p2"), 0.0
+    )
+    corners, _ = seen(board, Camera("opencv", parameters), (1024, 768), views=6, seed=3, least=63)
+    np.savez(
+        tmp_path / "corners.npz",
+        objpoints=np.tile(board.places, (6, 1, 1)),
+        imgpoints=corners.xy.reshape(6, 63, 2),
+        image_size=(1024, 768),
+    )
+    calibration = read(tmp_path / "corners.npz", unit=unit)
+    assert calibration.board.unit == (unit or "m")
+    assert any("are assumed" in str(each) for each in calibration.messages) is (unit is None)
 
 
 def test_arrays_of_python_objects_are_not_unpickled(tmp_path):

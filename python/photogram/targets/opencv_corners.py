@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -15,7 +14,6 @@ from photogram.errors import InputError
 from photogram.io.files import read_beginning, read_bytes
 from photogram.io.json import Tree, read_json
 from photogram.io.yaml_text import read_yaml_text
-from photogram.messages import Message
 from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured
 from photogram.targets.npz_arrays import read_arrays
@@ -60,13 +58,7 @@ def read_storage(path: Path, board: Board | None) -> Measured:
     grid = _matrix(content["grid_points"]) if "grid_points" in content else None
     if own is not None and grid is not None and board is None:
         _check_grid(content["grid_points"], own, grid)
-    return _measured(path, xy, own, sizes, _told(path, own, board))
-
-
-def _told(path: Path, own: Board | None, given: Board | None) -> list[Message]:
-    if own is None or given is not None:
-        return []
-    return [Message("does not say the unit of its board: metres are assumed (--unit)", path)]
+    return _measured(path, xy, own, sizes)
 
 
 def _board(content: Tree) -> Board | None:
@@ -95,7 +87,6 @@ def _measured(
     xy: Floats,
     board: Board | None,
     sizes: dict[str, tuple[int, int]],
-    messages: Sequence[Message],
 ) -> Measured:
     views, points = xy.shape[:2]
     if board is not None and len(board.places) != points:
@@ -118,7 +109,6 @@ def _measured(
         use=np.ones(count, dtype=bool),
         sizes=sizes,
         board=board,
-        messages=messages,
     )
 
 
@@ -198,7 +188,7 @@ def read_npz(path: Path, board: Board | None) -> Measured:
         own = _gridded(
             path, arrays.numbers(arrays.first("objpoints", "object_points"), len(xy), xy.shape[1], 3)
         )
-    return _measured(path, xy, own, sizes, _told(path, own, board))
+    return _measured(path, xy, own, sizes)
 
 
 def _gridded(path: Path, places: Floats) -> Board:

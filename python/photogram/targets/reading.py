@@ -26,6 +26,7 @@ from photogram.targets.regularisation import with_knot_sd
 from photogram.targets.start import Regularisation, Synchronisation
 
 NO_BOARD_SEEN = "pictures, but no board: write board.toml or give --board 9x6 --spacing 0.025"
+UNIT_ASSUMED = "does not say the unit of its board: metres are assumed (--unit)"
 NO_BOARD = "corners, but no board: write board.toml or give --board 10x10 --spacing 0.077"
 
 
@@ -113,6 +114,7 @@ def read(
         found = detected(path, pictures, own, progress)
     else:
         found = _measured(path, corners, own)
+    assumed = [Message(UNIT_ASSUMED, found.path)] if own is None and unit is None else []
     own = found.board if own is None else own
     if own is None:
         raise InputError(NO_BOARD, file=path)
@@ -133,7 +135,7 @@ def read(
         sd0=sd0,
         sync=sync,
         regularise=regularise,
-        messages=[*found.messages, *told, *_not_used(seen), *start.remarks],
+        messages=[*assumed, *found.messages, *told, *_not_used(seen), *start.remarks],
     )
     return calibration.with_offsets(offsets) if offsets else calibration
 
