@@ -1,17 +1,20 @@
 """Quantities that are declared once, as text, on a page and in a document."""
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from photogram import InputError
+from photogram import InputError, adjust, formats
+from photogram.formats.adjusted import excel_file, table_files
 from photogram.io import json
+from photogram.results.tables import TABLES
 from photogram.show.cells import page_table
 from photogram.show.lines import fact_lines, field, marks, table_lines
 from photogram.show.page import Cell, Fact
-from photogram.show.quantity import Axis, Quantity, component, of_each, records
+from photogram.show.quantity import Axis, Quantity, component, of_each, records, units
 
 AXES = (Axis.turned("omega", "deg"), Axis.of("s", "mm / m"), Axis.of("b1", "mm"))
 OF = np.arange(3)
@@ -95,3 +98,18 @@ def test_a_document_that_is_another_is_named(error, said):
     with pytest.raises(InputError, match=f"a.json: {said}") as caught, json.holding("camera", Path("a.json")):
         raise error
     assert caught.value.file == Path("a.json")
+
+
+def test_only_columns_with_a_dimension_have_a_unit():
+    block = formats.read(Path(formats.__file__).parents[1] / "examples" / "project").block
+    result = adjust(block)
+    pairs = {"d_X", "d_Y", "d_Z", "sd_X", "sd_Y", "sd_Z"}
+    first = table_files(result)["control.csv"].decode().splitlines()[0]
+    assert set(first.removeprefix("# unit of ").removesuffix(": m").split(", ")) == pairs
+    openpyxl = pytest.importorskip("openpyxl")
+    notes = openpyxl.load_workbook(io.BytesIO(excel_file(result)))["notes"]
+    assert ("control", first.removeprefix("# ")) in list(notes.iter_rows(values_only=True))
+    for what, table in TABLES.items():
+        numbers = {each.name for each in table(result) if each.kind == "number" and each.name}
+        named = [name for names in units(table(result)).values() for name in names]
+        assert not [name for name in named if name.split("_")[0] in numbers], what

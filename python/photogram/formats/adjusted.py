@@ -13,7 +13,8 @@ from photogram.io.csv_text import csv_text
 from photogram.io.sheets import workbook
 from photogram.results.features import Features
 from photogram.results.result import Result
-from photogram.show.methods import columns_of
+from photogram.results.tables import TABLES
+from photogram.show.quantity import Table, frame, units
 
 _TABLES = {
     "photos": "photo",
@@ -41,9 +42,10 @@ def table_files(result: Result) -> Mapping[str, bytes]:
     """Return the tables of a result as text of commas, by the names of files; none without rows."""
     files = {}
     for file, kind in _TABLES.items():
-        columns: dict[str, Any] = dict(columns_of(result, kind))
+        table = TABLES[kind](result)
+        columns = frame(table)
         if len(next(iter(columns.values()))):
-            files[f"{file}.csv"] = csv_text(columns, _units(result, columns))
+            files[f"{file}.csv"] = csv_text(columns, _units(table))
     if result.films:
         files["refined.csv"] = _refined(result)
     if np.isfinite(result.photo_cofactors).any():
@@ -66,16 +68,15 @@ def feature_files(features: Features) -> Mapping[str, bytes]:
 
 def excel_file(result: Result) -> bytes:
     """Return the tables of a result as a workbook: a sheet each, units in a last one, `notes`."""
-    tables = {file: dict(columns_of(result, kind)) for file, kind in _TABLES.items()}
-    filled = {file: columns for file, columns in tables.items() if len(next(iter(columns.values())))}
-    notes = {file: "; ".join(_units(result, columns)) for file, columns in filled.items()}
+    tables = {file: TABLES[kind](result) for file, kind in _TABLES.items()}
+    sheets = {file: frame(table) for file, table in tables.items()}
+    filled = {file: columns for file, columns in sheets.items() if len(next(iter(columns.values())))}
+    notes = {file: "; ".join(_units(tables[file])) for file in filled}
     return workbook(filled, {file: note for file, note in notes.items() if note})
 
 
-def _units(result: Result, columns: Mapping[str, Any]) -> list[str]:
-    rest = [name for name in columns if name.split("_")[-1] in ("X", "Y", "Z", "height")]
-    unit = result.block.linear_unit
-    return [f"unit of {', '.join(rest)}: {unit}"] if rest else []
+def _units(table: Table) -> list[str]:
+    return [f"unit of {', '.join(names)}: {unit}" for unit, names in units(table).items()]
 
 
 def _refined(result: Result) -> bytes:

@@ -40,7 +40,7 @@ _FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
     "point": ("name", "name of the point"),
     "quantity": ("name", "what is said of it"),
     "direction": ("name", "of the deviation"),
-    "unit": ("name", "unit of the numbers of this row; empty for plain numbers"),
+    "unit": ("name", "unit of values, residuals and deviations of this row; empty if dimensionless"),
     "value": ("value", "adjusted"),
     "sd": ("value", "standard deviation"),
     "k": ("number", "coverage factor"),

@@ -7,7 +7,7 @@ A table is a list of quantities of the same n things. `frame` makes files of com
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -197,7 +197,7 @@ def component(axes: tuple[Axis, ...], of: Indices) -> list[Quantity]:
     names, units = (
         np.array([getattr(each, what) for each in axes], dtype=object) for what in ("name", "unit")
     )
-    about = "unit of the numbers of this row; empty for plain numbers"
+    about = "unit of values, residuals and deviations of this row; empty if dimensionless"
     return [
         Quantity(
             names[of], axes, "name", "component", "", "which of its components", head="Component", of=of
@@ -222,19 +222,33 @@ def joined(tables: Sequence[Table]) -> list[Quantity]:
 
 def frame(table: Table) -> dict[str, Any]:
     """Return the columns of files and data frames: angles in degrees, names that say other units."""
-    found: dict[str, Any] = {}
+    return {name: values for name, _, values in _columns(table)}
+
+
+def units(table: Table) -> dict[str, list[str]]:
+    """Return the names of the columns of `frame` by their units, if the names do not have the unit."""
+    names: dict[str, list[str]] = {}
+    for name, unit, _ in _columns(table):
+        if unit:
+            names.setdefault(unit, []).append(name)
+    return names
+
+
+def _columns(table: Table) -> Iterator[tuple[str, str, Any]]:
+    """Return the names of columns, their units without those in the names, and their values."""
     for each in table:
         if each.name is None:
             continue
         if each.single:
-            found[each.name] = each.values
+            yield each.name, "", each.values
             continue
         for axis, column in zip(each.axes, each.values.T, strict=True):
-            unit = "" if each.kind == "number" else axis.suffix
-            name = f"{each.name}_{axis.name}{unit}".removeprefix("_")
+            plain = each.kind == "number"
+            suffix = "" if plain else axis.suffix
+            name = f"{each.name}_{axis.name}{suffix}".removeprefix("_")
             with np.errstate(over="ignore"):  # infinite then
-                found[name] = np.degrees(column) if axis.angle and unit else column
-    return found
+                values = np.degrees(column) if axis.angle and suffix else column
+            yield name, "" if plain or suffix else axis.unit, values
 
 
 def members(thing: object, *names: str, **others: str) -> dict[str, Any]:
