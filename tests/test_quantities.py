@@ -16,6 +16,7 @@ from photogram.show.lines import fact_lines, field, marks, table_lines
 from photogram.show.page import Cell, Fact
 from photogram.show.quantity import Axis, Quantity, component, of_each, records, units
 
+EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
 AXES = (Axis.turned("omega", "deg"), Axis.of("s", "mm / m"), Axis.of("b1", "mm"))
 OF = np.arange(3)
 VALUES = Quantity(np.array([0.5, 0.25, 292719.3]), AXES, "value", head="Value", figures=6, of=OF)
@@ -101,8 +102,7 @@ def test_a_document_that_is_another_is_named(error, said):
 
 
 def test_only_columns_with_a_dimension_have_a_unit():
-    block = formats.read(Path(formats.__file__).parents[1] / "examples" / "project").block
-    result = adjust(block)
+    result = adjust(formats.read(EXAMPLE).block)
     pairs = {"d_X", "d_Y", "d_Z", "sd_X", "sd_Y", "sd_Z"}
     first = table_files(result)["control.csv"].decode().splitlines()[0]
     assert set(first.removeprefix("# unit of ").removesuffix(": m").split(", ")) == pairs
@@ -113,3 +113,15 @@ def test_only_columns_with_a_dimension_have_a_unit():
         numbers = {each.name for each in table(result) if each.kind == "number" and each.name}
         named = [name for names in units(table(result)).values() for name in names]
         assert not [name for name in named if name.split("_")[0] in numbers], what
+
+
+def test_columns_are_wider_than_the_longest_name():
+    names = Quantity(np.array(["P1", "P12345678901"], dtype=object), kind="name")
+    lines = table_lines([*field(names, 10, head="point"), *field(names, 8)])
+    assert [line.split() for line in lines] == [["point"], ["P1", "P1"], ["P12345678901"] * 2]
+    block = formats.read(EXAMPLE).block
+    names = [f"{name:=<30}" for name in block.point_ids]
+    lines = adjust(block.replace(point_ids=names, observations=())).report().splitlines()
+    above = next(line for line in lines if line.startswith("point") and line.endswith("kind"))
+    first = lines[lines.index(above) + 2]
+    assert above.index("  kind") == first.index("  pass")

@@ -20,7 +20,7 @@ from photogram.absolute_orientation.tables import (
     tested_control,
 )
 from photogram.results.iteration_text import iteration_lines
-from photogram.show.lines import Field, fact_lines, field, marks, table_lines
+from photogram.show.lines import Field, fact_lines, field, marks, padded, table_lines
 from photogram.show.methods import report_of
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 
@@ -64,7 +64,7 @@ def _control(result: Orientation) -> list[str]:
     tests = [("studentized", studentized), *([("standardized", standardized)] if result.weighted else [])]
     fields = [
         *field(names, 12, head="station"),
-        *field(components, 1, "{name}", gap=" "),
+        *field(components, 0, "{name}", gap=" "),
         *field(model, 14, ".5g", gap=" "),
         *field(ground, 14, ".5g", gap=" "),
         *field(redundancy, 14, ".3f", "redundancy"),
@@ -128,14 +128,15 @@ def _cycle(trace: Trace, names: list[str], kappa: float, scale: float) -> list[s
     places, rows = trace.equations
     normal, auxiliary = trace.normal, trace.auxiliary
     omega, phi, kappa_after, *others = trace.parameters
+    stations = padded((names[station] for station, _ in places), 12)
     return [
         *_print(1, "after statement 2", "tan K", [[math.tan(kappa)]]),
         *_print(2, "before 10", "sin K, S", [[math.sin(kappa), scale]]),
         *_print(3, "after 8", "rotation matrix A", trace.rotation),
         f"sense switch 4, after 27: the eight P-values of {len(places)} equations",
         *(
-            f"  {names[station]:<12} {'123'[axis]}" + _numbers(row)
-            for (station, axis), row in zip(places, rows.tolist(), strict=True)
+            f"  {name} {'123'[axis]}" + _numbers(row)
+            for name, (_, axis), row in zip(stations, places, rows.tolist(), strict=True)
         ),
         *_print(
             5,

@@ -83,9 +83,11 @@ def _photos(result: AdjustedCollection) -> list[str]:
     """List the photos; of very many those whose translations are the least certain."""
     sizes = np.linalg.norm(result.photo_sd[:, 3:6], axis=1)
     (own, count, values, sd), more = largest(photos(result), sizes, "standard deviations")
-    rows = [[*field(own, 10, head="photo"), *field(count, 6, ".0f", "images"), *field(values, 14, ".6g")]]
+    (named,), (counts,) = field(own, 10, head="photo"), field(count, 6, ".0f", "images")
+    rows = [[named, counts, *field(values, 14, ".6g")]]
     if np.isfinite(sd.values).any():
-        rows.append([Field("", [f"{'sd':<16}"] * len(own.values)), *field(sd, 14, ".2g", "")])
+        label = Field("", [f"{'sd':<{len(named.head) + len(counts.head)}}"] * len(named.texts))
+        rows.append([label, *field(sd, 14, ".2g", "")])
     return [*table_lines(*rows), *more]
 
 

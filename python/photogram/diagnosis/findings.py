@@ -10,6 +10,7 @@ from photogram import _photocore
 from photogram.arguments.types import Bools
 from photogram.io import json
 from photogram.lazy_dataclasses import asdict, dataclass, field
+from photogram.show.lines import padded
 from photogram.show.methods import Paged
 from photogram.show.sections import composed, headline
 from photogram.show.summary import Brief, Rows
@@ -212,7 +213,7 @@ class Names:
 
     def lines(self) -> list[str]:
         """Return them as text."""
-        cells = [f"{name:<10}" for name in self.names]
+        cells = padded(self.names, 10)
         return [
             *([self.above] if self.above else []),
             self.heading,

@@ -25,7 +25,7 @@ from photogram.io import json
 from photogram.network.cameras import Camera
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, tests_section
-from photogram.show.lines import fact_lines, field, table_lines
+from photogram.show.lines import fact_lines, field, padded, table_lines
 from photogram.show.lines import marks as marked
 from photogram.show.methods import document_of, page_of, report_of
 from photogram.show.page import Drawing, Facts, Page, Part, Section
@@ -69,13 +69,13 @@ def _compared(certificate: Certificate) -> list[str]:
 
 
 def _explained(certificate: Certificate) -> list[str]:
-    lines = []
-    for each in certificate.check():
+    lines, checks = [], certificate.check()
+    for name, each in zip(padded((each.name for each in checks), 14), checks, strict=True):
         for one in each.explanations:
             far = "" if one.from_usual is None else f", {one.from_usual:+.3f} mm from its usual place"
-            lines.append(f"{each.name:<14}{one}: leaves {round(1e3 * one.remaining, 1) + 0.0:+.1f} um{far}")
+            lines.append(f"{name}{one}: leaves {round(1e3 * one.remaining, 1) + 0.0:+.1f} um{far}")
         if each.beyond and not each.explanations:
-            lines.append(f"{each.name:<14}no single change of a figure")
+            lines.append(f"{name}no single change of a figure")
     return lines
 
 

@@ -12,6 +12,7 @@ from photogram.network.cameras import Camera
 from photogram.results.calibration import Calibration, ParameterTest, calibrations
 from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.result import Result
+from photogram.show.lines import padded
 from photogram.show.quantity import members
 from photogram.show.sections import Section
 
@@ -66,9 +67,10 @@ def values_written(camera: Camera) -> str:
 
 def _parameter_lines(result: Result, found: Calibration) -> list[str]:
     heads = ("value", "sd", "change", f"t ({law_of(result)})", "probability", "R", "redundancy", "gain")
-    lines = [f"{'parameter':<16}" + "".join(f"{head:>15}" for head in heads) + "  verdict"]
-    for each in found.parameters:
-        name = f"{each.name} {each.unit}".strip()
+    titles = ["parameter", *(f"{each.name} {each.unit}".strip() for each in found.parameters)]
+    head, *names = padded(titles, 16)
+    lines = [head + "".join(f"{head:>15}" for head in heads) + "  verdict"]
+    for name, each in zip(names, found.parameters, strict=True):
         cells = (
             f"{each.value:>15.8g}",
             f"{each.sd:>15.3g}",
@@ -79,7 +81,7 @@ def _parameter_lines(result: Result, found: Calibration) -> list[str]:
             f"{each.redundancy:>15.3f}" if 0 < each.given_sd < math.inf else f"{'free':>15}",
             f"{each.gain:>15.4g}",
         )
-        lines.append(f"{name:<16}{''.join(cells)}  {outcome(each)}")
+        lines.append(f"{name}{''.join(cells)}  {outcome(each)}")
     return lines
 
 
@@ -98,10 +100,12 @@ def outcome(each: ParameterTest) -> str:
 def _group_lines(found: Calibration) -> list[str]:
     if not found.groups:
         return []
-    lines = ["", f"{'terms together':<31}{'F':>15}{'probability':>15}"]
+    titles = ["terms together", *(", ".join(each.names) for each in found.groups)]
+    head, *names = padded(titles, 31)
+    lines = ["", f"{head}{'F':>15}{'probability':>15}"]
     return lines + [
-        f"{', '.join(each.names):<31}{each.test_value:>15.2f}{each.probability:>15.4f}  {each.outcome}"
-        for each in found.groups
+        f"{name}{each.test_value:>15.2f}{each.probability:>15.4f}  {each.outcome}"
+        for name, each in zip(names, found.groups, strict=True)
     ]
 
 

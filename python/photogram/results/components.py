@@ -9,6 +9,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.network import AdjustedNetwork
+from photogram.show.lines import padded
 from photogram.show.methods import Shown, axes_of, columns_of, document_of, findings_of, report_of
 from photogram.show.sections import Section, composed, headline, verdict_sections
 from photogram.show.summary import Brief
@@ -200,8 +201,9 @@ def component_lines(found: VarianceComponents) -> list[str]:
     """Write a line for each component: plain numbers, but for the number of observations."""
     reference = found.estimate.reference
     columns = ("redundancy", "v P v", "component", "sd", "from", "to", "to images", "factor of sd", "p")
-    lines = [f"{'group':<34}{'number':>8}" + "".join(f"{column:>13}" for column in columns)]
-    for each in found.components:
+    head, *names = padded(["group", *(each.name for each in found.components)], 34)
+    lines = [f"{head}{'number':>8}" + "".join(f"{column:>13}" for column in columns)]
+    for name, each in zip(names, found.components, strict=True):
         parts = (
             each.redundancy,
             each.squares,
@@ -213,5 +215,5 @@ def component_lines(found: VarianceComponents) -> list[str]:
         )
         cells = "".join(f"{part:>13.3f}" if math.isfinite(part) else f"{'-':>13}" for part in parts)
         p = f"{each.probability:>13.2g}" if not each.held else f"{'held':>13}"
-        lines.append(f"{each.name:<34}{each.count:>8}{cells}{p}")
+        lines.append(f"{name}{each.count:>8}{cells}{p}")
     return lines

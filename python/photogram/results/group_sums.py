@@ -30,6 +30,7 @@ from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.show.lines import padded
 from photogram.show.methods import Shown, Way, columns_of, report_of
 from photogram.show.summary import Brief
 from photogram.statistics.components import balanced
@@ -182,8 +183,9 @@ def _columns(sums: GroupSums, what: str) -> dict[str, Any]:
 def _report(sums: GroupSums) -> str:
     """Return the groups as lines of text."""
     columns = (("redundancy", 12), ("v P v", 12), ("factor of sd", 14), ("p low", 10), ("p high", 10))
-    lines = [f"{'group':<34}{'number':>8}" + "".join(f"{column:>{width}}" for column, width in columns)]
-    for each in sums.groups:
+    head, *names = padded(["group", *(each.name for each in sums.groups)], 34)
+    lines = [f"{head}{'number':>8}" + "".join(f"{column:>{width}}" for column, width in columns)]
+    for name, each in zip(names, sums.groups, strict=True):
         test = each.test
         tests = (
             f"{'not tested':>20}"
@@ -191,8 +193,7 @@ def _report(sums: GroupSums) -> str:
             else f"{test.probability_below:>10.2g}{test.probability_above:>10.2g}"
         )
         lines.append(
-            f"{each.name:<34}{each.count:>8}{each.redundancy:>12.2f}{each.squares:>12.2f}"
-            f"{each.factor:>14.3f}{tests}"
+            f"{name}{each.count:>8}{each.redundancy:>12.2f}{each.squares:>12.2f}{each.factor:>14.3f}{tests}"
         )
     found = sums.rejected
     tested = sum(each.test is not None for each in sums.groups)

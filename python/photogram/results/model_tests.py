@@ -33,6 +33,7 @@ from photogram.results.distortion import INTERIOR, rows_of_images
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
 from photogram.results.scores import quadratic, score
+from photogram.show.lines import padded
 from photogram.show.methods import Shown, columns_of, report_of
 from photogram.show.summary import Brief
 
@@ -174,11 +175,12 @@ def _columns(found: Comparison, what: str) -> dict[str, Any]:
 def _report(found: Comparison) -> str:
     """Return the models as lines of text, the best first."""
     heads = ("v P v", "freedom", "parameters", "BIC", "rms of checks")
-    lines = [found.statement(), f"{'model':<24}" + "".join(f"{head:>15}" for head in heads)]
-    for each in found.models:
+    head, *names = padded(["model", *(each.name for each in found.models)], 24)
+    lines = [found.statement(), head + "".join(f"{head:>15}" for head in heads)]
+    for name, each in zip(names, found.models, strict=True):
         checks = f"{each.checks:>15.5g}" if math.isfinite(each.checks) else f"{'-':>15}"
         lines.append(
-            f"{each.name:<24}{each.squares:>15.3f}{each.freedom:>15}{each.parameters:>15}{each.bic:>15.2f}{checks}"
+            f"{name}{each.squares:>15.3f}{each.freedom:>15}{each.parameters:>15}{each.bic:>15.2f}{checks}"
         )
     lines += [
         f"{small} within {large}: T {value:.3f} with {dimension}, probability {probability:.2g}"

@@ -27,6 +27,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances
 from photogram.results.network_trial import NetworkTrial
 from photogram.results.selection import Selection
+from photogram.show.lines import padded
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
@@ -361,8 +362,8 @@ class Reliability:
         lines = [
             f"errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
             f" {self.level:g}, unit weight {weight}",
-            f"{'kind':<12}{'worst of it':<44}{'redundancy':>11}{'detectable':>20}{'moves up to sd':>15}",
         ]
+        rows = [("kind", "worst of it", f"{'redundancy':>11}{'detectable':>20}{'moves up to sd':>15}")]
         groups = self.row_groups()
         testable = self.redundancy > TESTABLE
         for kind, name in enumerate(self.suspects.kind_names):
@@ -372,9 +373,10 @@ class Reliability:
             row = int(np.where(own, self.external, -math.inf).argmax())
             what = f"{self.suspects.row_name(row)} of {self.suspects.name(int(groups[row]))}"
             size = f"{self.detectable[row]:.4g} {self.suspects.unit(row)}"
-            lines.append(
-                f"{name:<12}{what:<44}{self.redundancy[row]:>11.3f}{size:>20}{self.external[row]:>15.2f}"
-            )
+            numbers = f"{self.redundancy[row]:>11.3f}{size:>20}{self.external[row]:>15.2f}"
+            rows.append((name, what, numbers))
+        kinds, worst, figures = zip(*rows, strict=True)
+        lines += map("".join, zip(padded(kinds, 12), padded(worst, 44), figures, strict=True))
         count = int(self.untestable.sum())
         if count:
             first = ", ".join(map(self.suspects.name, np.flatnonzero(self.untestable)[:3].tolist()))

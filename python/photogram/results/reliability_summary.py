@@ -14,6 +14,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.results.reliability import Inseparable, Reliability
+from photogram.show.lines import padded
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Suspects, Tests
 
@@ -137,26 +138,28 @@ class ReliabilitySummary:
     def lines(self, unit: str) -> list[str]:
         """Return the section of a report; `unit` is that of the object space."""
         weight = "known" if self.known else "estimated"
+        head, *names = padded(["kind", *(each.kind for each in self.kinds)], 16)
         lines = [
-            f"{'kind':<16}{'groups':>10}{'components':>12}{'redundancy':>12}{'mean':>8}{'unchecked':>11}"
+            f"{head}{'groups':>10}{'components':>12}{'redundancy':>12}{'mean':>8}{'unchecked':>11}"
             f"{'one-sided':>11}"
         ]
         lines += [
-            f"{each.kind:<16}{each.groups:>10}{each.components:>12}{each.redundancy:>12.3f}"
+            f"{name}{each.groups:>10}{each.components:>12}{each.redundancy:>12.3f}"
             f"{each.redundancy / max(each.components, 1):>8.3f}{each.unchecked:>11}{each.one_sided:>11}"
-            for each in self.kinds
+            for name, each in zip(names, self.kinds, strict=True)
         ]
+        head, *names = padded(["group", *(each.name for each in self.weakest)], 44)
         lines += [
             "",
             f"errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
             f" {self.level:g}, unit weight {weight}; what does most when it is not found:",
-            f"{'group':<44}{'least redundancy':>17}{'detectable sd':>15}{'moves up to sd':>16}"
+            f"{head}{'least redundancy':>17}{'detectable sd':>15}{'moves up to sd':>16}"
             f"{f'own point {unit}'.rstrip():>18}",
         ]
         lines += [
-            f"{each.name:<44}{each.redundancy:>17.3f}{each.detectable_sd:>15.2f}{each.external_sd:>16.2f}"
+            f"{name}{each.redundancy:>17.3f}{each.detectable_sd:>15.2f}{each.external_sd:>16.2f}"
             f"{f'{each.own_point:.4f}' if math.isfinite(each.own_point) else '-':>18}"
-            for each in self.weakest
+            for name, each in zip(names, self.weakest, strict=True)
         ]
         lines += ["", *self._pair_lines()]
         return lines

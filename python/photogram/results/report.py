@@ -37,7 +37,7 @@ from photogram.results.observation_rows import (
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observed_components, redundancy_by_kind, unheld, unknowns
 from photogram.results.weakest import weakest_lines
-from photogram.show.lines import Field, field, stacked, table_lines
+from photogram.show.lines import Field, blank, field, padded, stacked, table_lines
 from photogram.show.methods import report_of
 from photogram.show.quantity import Axis, Quantity, chosen, labelled
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
@@ -281,7 +281,7 @@ def _kind(result: Result, kind: ObservedKind) -> list[str]:
     _, of, names, _, *numbers = table
     forms = [_decimals_of(labelled(numbers, "sd"), 5)] * 2 + [".3f", ".2f"]
     fields = [field(each, 14, form, str(each.label)) for each, form in zip(numbers, forms, strict=True)]
-    first = field(of, _width(of.values, 28), head=kind.kind)
+    first = field(of, 28, head=kind.kind)
     return [*table_lines([*first, *field(names, 22, head="component"), *chain(*fields)]), *note]
 
 
@@ -289,11 +289,6 @@ def _is_flown(observation: Observation) -> bool:
     """Whether an observation is of a trajectory or of a knot: there may be thousands."""
     of_knot = isinstance(observation, Prior) and isinstance(observation.unknown, Knot)
     return of_knot or observation.moment is not None or isinstance(observation, Smoothness)
-
-
-def _width(names: Iterable[str], least: int) -> int:
-    """Return how wide a column of names is: one more than the longest."""
-    return max([least, *(len(name) + 1 for name in names)])
 
 
 def _unknowns(result: Result) -> list[str]:
@@ -309,7 +304,7 @@ def _unknowns(result: Result) -> list[str]:
         for label in ("value", "change", "sd given", "sd")
     ]
     fields.append(field(labelled(numbers, "redundancy"), 15, ".3f", "redundancy"))
-    first = field(titles, _width(titles.values, 28), head="unknown")
+    first = field(titles, 28, head="unknown")
     lines = table_lines([*first, *field(names, 22, head="component"), *chain(*fields)])
     return [*lines, *([note] if note else [])]
 
@@ -328,9 +323,9 @@ def _courses(result: Result) -> list[str]:
     widths = {"count": (14, ".0f"), "first": (14, ".3f"), "last": (14, ".3f"), "largest": (20, ".6f")}
     widths |= {"at": (14, ".3f"), "tested": (14, ".2f")}
     fields = [
-        *field(names, _width(names.values, 20), head="trajectory"),
+        *field(names, 20, head="trajectory"),
         *field(of, 18, head="correction"),
-        *field(basis, _width(basis.values, 24), head="basis"),
+        *field(basis, 24, head="basis"),
         *(
             each
             for label, (width, form) in widths.items()
@@ -349,18 +344,18 @@ def _photos(result: Result) -> list[str]:
     sizes = np.linalg.norm(result.photo_sd[:, :3] * _lengths(result), axis=1)
     (names, values, sd), more = largest(photos(result), sizes, "standard deviations")
     place, turn, unit = slice(0, 3), slice(3, 6), "sd {unit}"
-    blank = Field(f"{'':<10}", [f"{'':<10}"] * len(names.values))
+    (named,) = field(names, 10, head="photo")
     first = [*field(part(values, place), 20, ".4f"), *field(part(values, turn), 15, ".7f")]
     second = [*field(part(sd, place), 20, ".5f", unit), *field(part(sd, turn), 15, ".3f", unit)]
-    lines = table_lines([*field(names, 10, head="photo"), *first], [blank, *second, *_long(result, sd)])
+    lines = table_lines([named, *first], [blank(named), *second, *_long(result, sd)])
     return [*_datum(result), *([POSES] if result.block.timed else []), *lines, *more]
 
 
 def _held_cameras(result: Result) -> list[str]:
+    held = [each for each in result.cameras if each.given.is_held]
     return [
-        f"{each.name:<16}{each.camera.model}, {each.photos} photos: {values_written(each.camera)}"
-        for each in result.cameras
-        if each.given.is_held
+        f"{name}{each.camera.model}, {each.photos} photos: {values_written(each.camera)}"
+        for name, each in zip(padded((each.name for each in held), 16), held, strict=True)
     ]
 
 
@@ -368,10 +363,10 @@ def _points(result: Result) -> list[str]:
     table = points(result)
     sizes = np.linalg.norm(np.asarray(table[-1].values) * _lengths(result), axis=1)
     (names, kinds, rays, values, sd), more = largest(table, sizes, "standard deviations")
-    blank = Field(f"{'':<10}", [f"{'':<10}"] * len(names.values))
+    (named,) = field(names, 10, head="point")
     rest = [*field(rays, 4, ".0f", "rays", "  "), *field(kinds, 0, head="kind", gap="  ")]
-    first = [*field(names, 10, head="point"), *field(values, 20, ".4f"), *rest]
-    lines = table_lines(first, [blank, *field(sd, 20, ".5f", "sd {unit}"), *_long(result, sd)])
+    first = [named, *field(values, 20, ".4f"), *rest]
+    lines = table_lines(first, [blank(named), *field(sd, 20, ".5f", "sd {unit}"), *_long(result, sd)])
     return [*_datum(result), *lines, *more]
 
 

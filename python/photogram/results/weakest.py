@@ -12,6 +12,7 @@ from photogram.network.geometry import geographic_to_geocentric, lengths_of_unit
 from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
+from photogram.show.lines import padded
 from photogram.show.methods import Way
 
 WORST = 10
@@ -162,23 +163,27 @@ def weakest_lines(result: AdjustedNetwork) -> list[str]:
     points, photos = weakest_points(result), weakest_photos(result)
     lines = []
     if points:
+        head, *names = padded(["point", *(each.point for each in points)], 16)
         lines += [
             "largest standard deviation over the smallest (nearly parallel rays: above 10,000), and distance",
             "from the nearest station in the median of such distances (at its own place: below 0.001)",
-            f"{'point':<16}{'ratio':>12}{'distance':>12}{'rays':>6}",
+            f"{head}{'ratio':>12}{'distance':>12}{'rays':>6}",
         ]
         lines += [
-            f"{each.point:<16}{each.ratio:>12.4g}"
+            f"{name}{each.ratio:>12.4g}"
             f"{f'{each.distance:.4g}' if math.isfinite(each.distance) else '-':>12}{each.rays:>6}"
-            for each in points
+            for name, each in zip(names, points, strict=True)
         ]
     if photos:
+        head, *names = padded(["photo", *(each.photo for each in photos)], 16)
         lines += [
             *([""] if lines else []),
             "condition of the covariance matrix of position and attitude, scaled to a diagonal of ones",
-            f"{'photo':<16}{'condition':>12}{'images':>8}",
+            f"{head}{'condition':>12}{'images':>8}",
         ]
-        lines += [f"{each.photo:<16}{each.condition:>12.4g}{each.images:>8}" for each in photos]
+        lines += [
+            f"{name}{each.condition:>12.4g}{each.images:>8}" for name, each in zip(names, photos, strict=True)
+        ]
     return lines
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +35,8 @@ def field(
     quantity
         Numbers are set to the right, names to the left.
     width
-        Of each; 0 for as many characters as it takes.
+        Of each; 0 for as many characters as it takes. A column of longer names is one character wider than
+        the longest name.
     form
         How numbers are written, `.3f`, all of them or those of each component; with fewer digits where they
         are too long; those that are not finite are `-` unless the quantity has a word for them. How
@@ -51,8 +52,8 @@ def field(
             written = form if form and isinstance(form, str) else "{name} {unit}"
             components = [written.format(name=axis.name, unit=axis.small).rstrip() for axis in quantity.axes]
             plain = [components[k] for k in quantity.of.tolist()]
-        texts = [f"{gap}{text:<{width}}" for text in plain]
-        return [Field(f"{gap}{head.format(name='', unit='').strip():<{width}}", texts)]
+        above, *texts = padded([head.format(name="", unit="").strip(), *plain], width)
+        return [Field(f"{gap}{above}", [f"{gap}{text}" for text in texts])]
     values = quantity.outward()
     forms = [form] * max(len(quantity.axes), 1) if isinstance(form, str) else form
     if quantity.single:
@@ -65,6 +66,22 @@ def field(
         _numbers(quantity, axis, column, width, [own] * len(column), head, gap)
         for axis, column, own in zip(quantity.axes, values.T, forms, strict=True)
     ]
+
+
+def padded(texts: Iterable[str], least: int) -> list[str]:
+    """Return the texts of a column, with blanks to one width: `least`, or one more than the longest text.
+
+    A `least` of 0 adds no blanks.
+    """
+    column = list(texts)
+    width = least and max(least, 1 + max(map(len, column), default=0))
+    return [f"{text:<{width}}" for text in column]
+
+
+def blank(names: Field) -> Field:
+    """Return a field without text that is as wide as another field."""
+    width = len(names.head)
+    return Field(" " * width, [" " * width] * len(names.texts))
 
 
 def _numbers(
@@ -152,14 +169,12 @@ def stacked(
     `quantities` have the forms in which their numbers are written, `first` stands behind the first of the
     lines, `above` are heads of the components.
     """
-    longest = max((len(str(name)) for name in np.asarray(names.values).tolist()), default=0)
-    width = max(10, longest + 1)
-    named = field(names, width, head=head)
-    blank = [Field("", [" " * width] * len(named[0].texts))]
+    (named,) = field(names, 10, head=head)
+    below = Field("", blank(named).texts)
     rows = []
     for place, (each, form) in enumerate(quantities):
-        labels = [each.label] * len(named[0].texts) if isinstance(each.label, str) else each.label
+        labels = [each.label] * len(named.texts) if isinstance(each.label, str) else each.label
         label = [Field(f"{'':<14}" if place == 0 else "", [f"{text:<14}" for text in labels])]
         own = field(each, 18, form, above if place == 0 else "")
-        rows.append([*(named if place == 0 else blank), *label, *own, *(first if place == 0 else ())])
+        rows.append([named if place == 0 else below, *label, *own, *(first if place == 0 else ())])
     return table_lines(*rows)

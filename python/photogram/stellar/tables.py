@@ -9,6 +9,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
+from photogram.show.lines import padded
 from photogram.stellar.comparator_frame import comparator_frame
 from photogram.stellar.curves import (
     distortion_curves,
@@ -143,10 +144,12 @@ def _groups(result: Result) -> list[int]:
 def stars(result: Result) -> list[str]:
     """Residuals of right ascension (seconds of time, of arc) and declination (of arc)."""
     problem = result.problem
+    names = problem.star_names or problem.star_ids
+    (star, *ids), (name, *own) = padded(["star", *problem.star_ids], 8), padded(["name", *names], 8)
     lines = [
-        _head(
-            "star<8",
-            "name<8",
+        star
+        + name
+        + _head(
             "ra s>14",
             "ra arcsec>12",
             "dec arcsec>12",
@@ -158,7 +161,6 @@ def stars(result: Result) -> list[str]:
             "dec>9",
         )
     ]
-    names = problem.star_names or problem.star_ids
     for i in np.flatnonzero(problem.known):
         ra, dec = result.star_residuals[i] / ARCSEC
         tests = (*result.solved.star_redundancy[i], *result.star_standardized[i])
@@ -168,7 +170,7 @@ def stars(result: Result) -> list[str]:
             else "".join(f"{value:9.3f}" for value in _before(result, problem.star_weights[i], ARCSEC))
         )
         lines.append(
-            f"{problem.star_ids[i]:<8}{names[i]:<8}{ra / 15:14.6f}{ra:12.4f}{dec:12.4f}"
+            f"{ids[i]}{own[i]}{ra / 15:14.6f}{ra:12.4f}{dec:12.4f}"
             + "".join(f"{value:8.2f}" for value in tests)
             + f"{before:>27}"
         )
@@ -178,8 +180,8 @@ def stars(result: Result) -> list[str]:
 def directions(result: Result) -> list[str]:
     """Unknown directions; ellipses from the orientation alone, in total, and in total with m_i."""
     rows = result.directions()
-    head = _head(
-        "number<8",
+    number, *ids = padded(["number", *(d.star for d in rows)], 8)
+    head = number + _head(
         "right ascension>18",
         "declination>18",
         "azimuth deg>13",
@@ -190,10 +192,10 @@ def directions(result: Result) -> list[str]:
     )
     kinds = [f"{kind + ' a, b, deg':>30}" for kind in ("orientation", "total", "with m_i")]
     lines = [head + "".join(kinds)]
-    for d in rows:
+    for star, d in zip(ids, rows, strict=True):
         ellipses = "".join(_ellipse(e) for e in (d.orientation, d.total, d.published))
         lines.append(
-            f"{d.star:<8}{hours(d.place[0] % math.tau):>18}{degrees(d.place[1]):>18}"
+            f"{star}{hours(d.place[0] % math.tau):>18}{degrees(d.place[1]):>18}"
             f"{math.degrees(d.azimuth):13.5f}{math.degrees(d.elevation):15.5f}"
             f"{d.mean_errors[0] / ARCSEC:13.4f}{d.mean_errors[1] / ARCSEC:9.4f}"
             f"{1e6 * d.image_mean_error:9.3f}{ellipses}"
@@ -234,10 +236,12 @@ def fictitious(result: Result) -> list[str]:
 def images(result: Result) -> list[str]:
     """Plate coordinates with residuals, redundancy numbers r and standardized residuals w."""
     problem = result.problem
+    star, *stars_ = padded(["star", *(problem.star_ids[k] for k in problem.image_stars)], 8)
+    head, *points = padded(["point", *problem.image_points], 8)
     lines = [
-        _head(
-            "star<8",
-            "point<8",
+        star
+        + head
+        + _head(
             "group<7",
             "x mm>13",
             "y mm>13",
@@ -252,13 +256,13 @@ def images(result: Result) -> list[str]:
             "w y>8",
         )
     ]
-    for i, point in enumerate(problem.image_points):
+    for i, point in enumerate(points):
         x, y = problem.image_xy[i] * 1e3
         vx, vy = result.solved.residuals[i] * 1e6
         time = hours(problem.image_times[i])
         before = _before(result, problem.image_weights[i], 1e-6)
         lines.append(
-            f"{problem.star_ids[problem.image_stars[i]]:<8}{point:<8}{GROUPS[problem.image_groups[i]]:<7}{x:13.5f}{y:13.5f}{time:>18}"
+            f"{stars_[i]}{point}{GROUPS[problem.image_groups[i]]:<7}{x:13.5f}{y:13.5f}{time:>18}"
             f"{before[0]:10.3f}{before[1]:8.3f}{vx:9.3f}{vy:9.3f}"
             + "".join(f"{value:7.3f}" for value in result.solved.redundancy[i])
             + "".join(f"{value:8.2f}" for value in result.standardized[i])
@@ -273,10 +277,12 @@ def _before(result: Result, weight: Floats, unit: float) -> Floats:
 
 def means(result: Result) -> list[str]:
     """Means of stars with two images at least, and the radial and tangential parts of their residuals."""
-    lines = [_head("star<8", "x mm>13", "y mm>13", "vx um>9", "vy um>9", "radial>9", "tangential>12")]
-    for star, (x, y), (vx, vy), (radial, tangential) in star_means(result):
+    rows = list(star_means(result))
+    head, *names = padded(["star", *(star for star, *_ in rows)], 8)
+    lines = [head + _head("x mm>13", "y mm>13", "vx um>9", "vy um>9", "radial>9", "tangential>12")]
+    for star, (_, (x, y), (vx, vy), (radial, tangential)) in zip(names, rows, strict=True):
         lines.append(
-            f"{star:<8}{1e3 * x:13.5f}{1e3 * y:13.5f}{1e6 * vx:9.3f}{1e6 * vy:9.3f}"
+            f"{star}{1e3 * x:13.5f}{1e3 * y:13.5f}{1e6 * vx:9.3f}{1e6 * vy:9.3f}"
             f"{1e6 * radial:9.3f}{1e6 * tangential:12.3f}"
         )
     return lines if len(lines) > 1 else []
@@ -286,9 +292,11 @@ def pre_run(result: Result) -> list[str]:
     """Residuals of the images that took no part in the minimum solution."""
     if result.pre_run is None:
         return []
-    rows = zip(result.pre_run.stars, result.pre_run.points, 1e6 * result.pre_run.residuals, strict=True)
-    head = _head("star<8", "point<8", "vx um>12", "vy um>12")
-    return [head, *(f"{star:<8}{point:<8}{vx:12.3f}{vy:12.3f}" for star, point, (vx, vy) in rows)]
+    star, *stars_ = padded(["star", *result.pre_run.stars], 8)
+    head, *points = padded(["point", *result.pre_run.points], 8)
+    rows = zip(stars_, points, 1e6 * result.pre_run.residuals, strict=True)
+    lines = [f"{own}{point}{vx:12.3f}{vy:12.3f}" for own, point, (vx, vy) in rows]
+    return [star + head + _head("vx um>12", "vy um>12"), *lines]
 
 
 def movement(result: Result) -> list[str]:

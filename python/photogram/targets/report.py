@@ -54,10 +54,9 @@ def calibration_summary(calibrated: Calibrated) -> list[Section]:
 
 
 def _views(table: list[Quantity]) -> list[str]:
-    width = max(len(str(each)) for each in table[0].values)
     forms = {"rms_px": ".3f", "redundancy": ".1f", "chi2": ".1f", "largest_standardized": ".2f"}
     heads = {"left_out": "left out", "largest_standardized": "largest w", "rms_px": "rms px"}
-    fields = field(table[0], max(width, 4), head="view")
+    fields = field(table[0], 4, head="view")
     for each in table[1:]:
         name = str(each.name)
         fields += field(each, 12, forms.get(name, ".0f"), head=heads.get(name, name))
