@@ -49,6 +49,13 @@ def test_there_and_back(name):
     )
 
 
+@pytest.mark.parametrize("name", ["EPSG:32632", "EPSG:4979", "EPSG:4978"])
+def test_one_standard_deviation_of_all_axes_stays_as_it_was_typed(name):
+    place, _ = crs.from_frame(name, np.array([[812.0, -433.0, 60.0]]), np.zeros((1, 3, 3)), FRAME)
+    _, turned, _ = crs.to_frame(name, place, np.eye(3)[np.newaxis] * 0.010**2, FRAME)
+    assert np.sqrt(np.diagonal(turned[0])).tolist() == [0.010] * 3
+
+
 def test_covariances_of_a_projected_system_are_along_its_grid():
     place = np.array([[465254.6, 5247458.8, 448.4]])
     along_north = np.diag([0.0, 1.0, 0.0])[np.newaxis]

@@ -23,8 +23,10 @@ from photogram import (
 )
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
+from photogram.io.units import scaled
 from photogram.network import Attitude, Boresight, Control, Difference, Drift, Mount, Sensor, Shift
 
+ANGLES = ("omega", "phi", "kappa")
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
 
 
@@ -45,6 +47,24 @@ def written(project, place, file_format="plain"):
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         (place / name).write_bytes(content)
     return place
+
+
+# Numbers
+
+
+def test_angles_are_written_as_they_were_typed(example, tmp_path):
+    again = written(formats.read(example), tmp_path / "again")
+    typed, back = (
+        read_columns(place / "photos.csv", known=(), numbers=ANGLES).vectors(ANGLES)
+        for place in (example, again)
+    )
+    np.testing.assert_array_equal(back, typed)
+
+
+def test_micrometres_are_millimetres_as_they_were_typed():
+    typed = np.arange(1, 20_001) / 1000
+    exact = np.array([float(f"{count}e-6") for count in range(1, 20_001)])
+    np.testing.assert_array_equal(scaled(typed, 1e-3), exact)
 
 
 # What is read

@@ -22,6 +22,7 @@ from photogram.formats.column_words import (
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import NAMELESS
 from photogram.io.numbers import finite_number
+from photogram.io.units import scaled
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed, quoted
 
@@ -230,9 +231,9 @@ def settled(
             ready[column] = table.numbers(column, read=partial(_on_axis, letters))
         factor = abs(factor) if column.startswith("sd") else factor
         if column == "sd_xy":
-            ready["sd_x"] = ready["sd_y"] = table.numbers(column, infinite=True) * factor
+            ready["sd_x"] = ready["sd_y"] = scaled(table.numbers(column, infinite=True), factor)
         elif factor != 1.0 and column in _LENGTHS:
-            ready[column] = table.numbers(column, infinite=column.startswith("sd")) * factor
+            ready[column] = scaled(table.numbers(column, infinite=column.startswith("sd")), factor)
     wide = tuple(each for each in ("sd_x", "sd_y") if each in ready and each not in table.columns)
     check_unread(table, columns, known, name, messages)
     return replace(

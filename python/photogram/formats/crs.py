@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import pyproj
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
-ROUND = 1e-4
-"""Degrees to which a chosen origin is rounded; its height to a metre."""
+ORIGIN_DECIMALS = 4
+"""Of the degrees of a chosen origin; its height is rounded to a metre."""
 _ENU = re.compile(r"\s*ENU:\s*([-+.\d]+)\s*,\s*([-+.\d]+)\s*(?:,\s*([-+.\d]+)\s*)?", re.IGNORECASE)
 _GEOID = re.compile(r"\+geoid=([-+]?\d+(?:\.\d*)?)\s*$", re.IGNORECASE)
 """Behind a system: the height of the geoid above the ellipsoid, one for all."""
@@ -163,8 +163,8 @@ def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
     """Return latitude, longitude and height amid positions, rounded."""
     middle = _transformed(GEOCENTRIC, GEOGRAPHIC, geocentric(crs, xyz).mean(axis=0)[np.newaxis])[0]
     return (
-        round(float(middle[1]) / ROUND) * ROUND,
-        round(float(middle[0]) / ROUND) * ROUND,
+        round(float(middle[1]), ORIGIN_DECIMALS),
+        round(float(middle[0]), ORIGIN_DECIMALS),
         float(round(middle[2])),
     )
 
@@ -195,18 +195,24 @@ def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[
     remarks = _remarks(crs)
     earth = geocentric(crs, xyz)
     axes = _axes(crs, xyz, earth)
-    turned = axes.transpose(0, 2, 1) @ covariances @ axes
+    turned = turned_covariances(axes.transpose(0, 2, 1), covariances)
     if frame.kind == "geocentric":
         return earth, turned, remarks
     if frame.kind == "geographic":
         found = _transformed(GEOCENTRIC, GEOGRAPHIC, earth)
         found[:, :2] = np.radians(found[:, :2])
         local = local_frames(found)
-        return found, local @ turned @ local.transpose(0, 2, 1), remarks
+        return found, turned_covariances(local, turned), remarks
     if frame.origin is None:
         raise InputError("a topocentric frame has an origin")
     rows = east_north_up(frame.origin)
-    return (earth - _geocentric_of(frame.origin)) @ rows.T, rows @ turned @ rows.T, remarks
+    return (earth - _geocentric_of(frame.origin)) @ rows.T, turned_covariances(rows, turned), remarks
+
+
+def turned_covariances(turns: Floats, covariances: Floats) -> Floats:
+    """Return (n, 3, 3) covariances along turned axes; one variance of all axes stays to the last bit."""
+    alike = covariances[:, :1, :1] * np.eye(3)
+    return alike + turns @ (covariances - alike) @ turns.swapaxes(-1, -2)
 
 
 def from_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats]:
@@ -218,7 +224,7 @@ def from_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tupl
         As :func:`to_system`.
     """
     found, turns = to_system(crs, xyz, frame)
-    return found, turns @ covariances @ turns.transpose(0, 2, 1)
+    return found, turned_covariances(turns, covariances)
 
 
 def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:

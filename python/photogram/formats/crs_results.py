@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.arrays import natural_order
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.crs import axes_of, has_place, is_on, to_system
+from photogram.formats.crs import axes_of, has_place, is_on, to_system, turned_covariances
 from photogram.formats.project import frame_of
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass, replace
@@ -172,7 +172,7 @@ def placed(result: Result, crs: str = "") -> Placed:
     elif block.geographic:
         names, units = ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
     turned = [
-        turns @ own @ turns.transpose(0, 2, 1)
+        turned_covariances(turns, own)
         for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
     ]
     own = _own_attitudes(result)

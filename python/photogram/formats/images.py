@@ -13,6 +13,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
+from photogram.io.units import scaled
 from photogram.network.cameras import Camera
 
 
@@ -83,7 +84,7 @@ def in_unit(settings: Settings, xy: Floats, *, pixels: bool) -> Floats:
 
     `pixels` says that they are pixels: columns and rows, or samples and lines of scanners.
     """
-    found = xy * 1e-3 if settings.image == "um" and not pixels else xy
+    found = scaled(xy, 1e-3) if settings.image == "um" and not pixels else xy
     return found + 0.5 if pixels and settings.pixel_origin == "center" else found
 
 

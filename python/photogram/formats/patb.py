@@ -34,6 +34,7 @@ from photogram.formats.reduced_coordinates import (
 )
 from photogram.formats.rotations import is_rotation
 from photogram.io.csv_text import csv_text
+from photogram.io.units import scaled
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 
@@ -90,7 +91,7 @@ def _images(path: Path, names: dict[str, str], found: Reduced) -> None:
             c = card.number(1, "the principal distance") * MICROMETRES
             found.photos[photo] = found.principal_distance(c, card.place)
         else:
-            x, y = (MICROMETRES * card.numbers(1, "x y")).tolist()
+            x, y = (scaled(card.numbers(1, "x y"), MICROMETRES)).tolist()
             found.images.append((photo, names.get(card.words[0], card.words[0]), x, y))
 
 

@@ -82,13 +82,13 @@ def read_cameras(tables: Tables) -> Cameras:
         if own.each not in _EACH:
             raise table.error(row, f"column for_each: {quoted(own.each)} is none of {', '.join(_EACH)}")
         size = _size(table, row, own)
-        scale = 1e-3 if tables.settings.image == "um" else 1.0
+        parts = 1000.0 if tables.settings.image == "um" else 1.0
         if size is not None and found.lines[row] is None:
-            scale, converted = _from_mm(tables.settings.image, table, row, own, size[0], scale)
+            parts, converted = _from_mm(tables.settings.image, table, row, own, size[0], parts)
             in_mm += [own.name] * converted
         certificate = _of_camera(tables, table, row, own, certificates)
         if certificate is None:
-            make = partial(_camera, tables, table, row, own, size, scale)
+            make = partial(_camera, tables, table, row, own, size, parts)
         else:
             make = partial(certified, tables, own.name, own.model, certificate)
         found.cameras.append(made(table, row, make))
@@ -114,9 +114,9 @@ def read_cameras(tables: Tables) -> Cameras:
 
 
 def _from_mm(
-    image: str, table: ColumnTable, row: int, own: _Row, width: int, scale: float
+    image: str, table: ColumnTable, row: int, own: _Row, width: int, parts: float
 ) -> tuple[float, bool]:
-    """Return the factor from lengths of a row to the unit of the camera, and whether it converts mm to px.
+    """Return the divisor from lengths of a row to the unit of the camera, and whether it converts mm to px.
 
     Raises
     ------
@@ -124,15 +124,15 @@ def _from_mm(
         A principal distance that is too small in pixels.
     """
     pixel = own.pixel_mm if own.pixel_mm and own.pixel_mm > 0 else math.nan
-    least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel / scale)
+    least = SMALLEST_DISTANCE * width * (1.0 if image == "px" else pixel * parts)
     small = [name for name in _DISTANCES if abs(own.values.get(name, math.inf)) < least]
     if not small:
-        return scale, False
+        return parts, False
     value = own.values[small[0]]
     of_mm = [abs(own.values[name]) / pixel for name in _DISTANCES if name in own.values]
     in_mm = image == "px" and all(each >= SMALLEST_DISTANCE * width for each in of_mm)
     if in_mm and not {"cx", "cy"} & own.values.keys():
-        return 1 / pixel, True
+        return pixel, True
     if in_mm:
         remedy = f"if it is in mm, give {value / pixel:.10g} px, for cx and cy are in px"
     elif image == "px":
@@ -259,7 +259,7 @@ def _calibrated(tables: Tables, table: ColumnTable, row: int, given: _Row) -> Ca
 
 
 def _camera(
-    tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None, scale: float
+    tables: Tables, table: ColumnTable, row: int, given: _Row, size: Size | None, parts: float
 ) -> Camera:
     if given.calibration:
         return _calibrated(tables, table, row, given)
@@ -279,7 +279,7 @@ def _camera(
     deviations = _spread(own, given.deviations)
     if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
         raise table.error(row, f"the model {model} has no {strange[0]}, but {', '.join(powers)}")
-    values = {own[k]: v * scale ** powers[own[k]] for k, v in parameters.items() if k in own}
+    values = {own[k]: v / parts ** powers[own[k]] for k, v in parameters.items() if k in own}
     if size is not None and image == "px":
         if "w" in own:
             values |= {own["w"]: float(size[0]), own["h"]: float(size[1])}
@@ -295,7 +295,7 @@ def _camera(
         model,
         values,
         {
-            own[k]: v * scale ** powers[own[k]]
+            own[k]: v / parts ** powers[own[k]]
             for k, v in deviations.items()
             if k in own and own[k] not in constants
         },

@@ -16,6 +16,7 @@ from photogram.formats.plain.common_unknowns import made
 from photogram.formats.plain.tables import Tables
 from photogram.formats.project import Size
 from photogram.io.column_table import ColumnTable
+from photogram.io.units import scaled
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import Direction, LineSensor, Shutter
@@ -37,8 +38,8 @@ def line_sensors(tables: Tables, table: ColumnTable) -> list[LineSensor | None]:
         A line without a pitch, or whose middle is not known.
     """
     unit = 1e-3 if tables.settings.image == "um" else 1.0
-    pitches = table.vectors(("pitch_x", "pitch_y")) * unit
-    places = table.vectors(("x0", "y0"), 0.0) * unit
+    pitches = scaled(table.vectors(("pitch_x", "pitch_y")), unit)
+    places = scaled(table.vectors(("x0", "y0"), 0.0), unit)
     middles = table.numbers("s0")
     middles = np.where(np.isnan(middles), table.numbers("width") / 2, middles)
     found: list[LineSensor | None] = []

@@ -15,6 +15,7 @@ from photogram.formats.plain.schema import AXES, BIAS, OPK, SD_ROTATIONS, deviat
 from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, columns_of
 from photogram.io.column_table import ColumnTable
+from photogram.io.units import degrees_typed
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.observations import Attitude, Position, Rate, Velocity
@@ -221,7 +222,7 @@ def inertial_columns(groups: Mapping[str, Inertial], block: Block) -> dict[str, 
     angles[[each is None or (isinstance(each, Boresight) and each.is_open) for each in boresights]] = np.nan
     sd = np.array([each.deviations if isinstance(each, Boresight) else np.zeros(3) for each in boresights])
     found: dict[str, Any] = {"group": list(groups), **columns_of(OPK, angles)}
-    found |= columns_of(SD_ROTATIONS, np.degrees(sd))
+    found |= columns_of(SD_ROTATIONS, degrees_typed(sd))
     words = [_boresight_word(name, each) for name, each in zip(groups, boresights, strict=True)]
     if set(words) != {"true"}:
         found["boresight"] = words

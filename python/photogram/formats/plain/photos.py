@@ -17,6 +17,7 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.formats.plain.transform import Transform
 from photogram.io.column_table import ColumnTable
+from photogram.io.units import scaled
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import listed, quoted
 from photogram.network.observations import Attitude, Observation
@@ -245,7 +246,7 @@ def image_coordinates(
     Those of line scanners are samples and lines, whatever the unit of images: their deviations are in this.
     Those of scanned films are readings, as they are.
     """
-    sd = images.sd if images.sd is None or settings.image != "um" else images.sd * 1e-3
+    sd = images.sd if images.sd is None or settings.image != "um" else scaled(images.sd, 1e-3)
     pixels = settings.image == "px" and settings.image_y == "down"
     found = in_unit(settings, images.xy, pixels=pixels).copy()
     of_images = photo_cameras[images.photos]
@@ -256,5 +257,5 @@ def image_coordinates(
         else:
             found[own] = from_tables(settings, camera, cameras.sizes[row], found[own])
     own = scanned[images.photos]
-    found[own] = images.xy[own] * (1e-3 if settings.image == "um" else 1.0)
+    found[own] = scaled(images.xy[own], 1e-3 if settings.image == "um" else 1.0)
     return found, sd

@@ -16,6 +16,7 @@ from photogram.formats.plain.subjects import scalar_columns, scalars
 from photogram.formats.plain.tables import Tables, angles_of, columns_of, indices_of
 from photogram.formats.rigging import FrameOf, Rig
 from photogram.io.column_table import ColumnTable
+from photogram.io.units import degrees_typed
 from photogram.messages import quoted
 from photogram.network.block import Block
 from photogram.network.observations import Base, Observation
@@ -328,7 +329,7 @@ def _poses(sensors: Sequence[Sensor | None], block: Block) -> dict[str, Any]:
     unsaid = [each is not None and each.is_open for each in sensors]
     values[unsaid] = angles[unsaid] = np.nan
     sd = np.array([np.zeros(6) if each is None else each.deviations for each in sensors])
-    sd[:, 3:] = np.degrees(sd[:, 3:])
+    sd[:, 3:] = degrees_typed(sd[:, 3:])
     return {
         **columns_of(AXES, values),
         **columns_of(OPK, angles),

@@ -20,6 +20,7 @@ from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.places import Place
+from photogram.io.units import MATRIX_ROUNDING, degrees_typed
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed, quoted
 from photogram.network.attitudes import Attitudes, Representation
@@ -321,8 +322,7 @@ def places_written(block: Block, values: Floats) -> Floats:
     """Return positions as tables have them."""
     if not block.geographic:
         return values
-    found: Floats = np.column_stack([np.degrees(values[:, :2]), values[:, 2]])
-    return found
+    return np.column_stack([degrees_typed(values[:, :2]), values[:, 2]])
 
 
 def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
@@ -333,5 +333,4 @@ def different(unknowns: Sequence[Unknown | None]) -> list[Any]:
 def angles_of(matrices: Floats, block: Block) -> Floats:
     """Return (n, 3) omega, phi, kappa in degrees of attitudes, axes of a photo as columns."""
     kind: Representation = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
-    found: Floats = np.degrees(Attitudes(matrices).values(kind))
-    return found
+    return degrees_typed(Attitudes(matrices).values(kind), MATRIX_ROUNDING)

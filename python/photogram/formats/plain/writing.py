@@ -27,6 +27,7 @@ from photogram.formats.plain.trajectories_written import lost_smoothness, smooth
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
 from photogram.io.toml import quoted_text
+from photogram.io.units import MATRIX_ROUNDING, degrees_typed
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -257,8 +258,8 @@ def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
     attitudes, angle_sd = _given(block, "attitude")
     columns: dict[str, Any] = {"photo": block.photo_ids, "camera": cameras}
     columns |= columns_of(AXES, places_written(block, positions))
-    columns |= columns_of(OPK, np.degrees(attitudes))
-    for names, values in ((AXES, sd), (OPK, np.degrees(angle_sd))):
+    columns |= columns_of(OPK, degrees_typed(attitudes, MATRIX_ROUNDING))
+    for names, values in ((AXES, sd), (OPK, degrees_typed(angle_sd))):
         if np.isfinite(values).any():
             columns |= columns_of(deviation_columns(names), values)
     drifts = any(isinstance(each, Position) and each.drift is not None for each in block.observations)
