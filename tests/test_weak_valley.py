@@ -99,6 +99,22 @@ def test_with_more_iterations_all_images_end_where_another_solver_ends(bathtub):
     assert result.sums_of_squares.total / 2 == pytest.approx(15430.19, abs=0.005)
 
 
+def test_a_camera_that_is_unknown_too_converges_without_options(project):
+    result = adjust(self_calibrated(project, ["f", "k1", "k2"]).block)
+    assert result.converged
+    assert result.cameras[0].value("f") == pytest.approx(4520.0, abs=20.0)
+
+
+def test_what_iterations_leave_open_has_figures_and_a_remedy(project):
+    result = adjust(self_calibrated(project, ["f", "k1", "k2"]).block, max_iterations=50)
+    assert result.status == "not converged"
+    [weak] = [str(each) for each in result.messages if "hardly determine" in str(each)]
+    camera = result.cameras[0]
+    for figure in (f"{camera.value('f'):.6g} px", f"{camera.deviation('f'):.3g} px", "with k1", "with k2"):
+        assert figure in weak
+    assert any("--iterations N" in each and "--self-calibrate" in each for each in result.verdict.next)
+
+
 def test_a_camera_that_is_unknown_too_comes_to_rest_with_a_loss(project):
     result = adjust(self_calibrated(project, ["f", "k1", "k2"]).block, loss="huber")
     assert result.converged

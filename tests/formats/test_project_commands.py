@@ -259,6 +259,28 @@ def test_a_blunder_is_said_and_taken_out(run, tmp_path):
     assert "t24" in checked.output
 
 
+def test_the_number_of_iterations_is_an_option_and_a_key(run, tmp_path):
+    run("new", "own")
+    few = run("adjust", "own", "--iterations", 1, "--out", "few", "--json", "few.json", "-q")
+    assert few.exit_code == 3, few.output
+    document = json.loads((tmp_path / "few.json").read_text())
+    assert document["status"] == "not converged"
+    assert len(document["iterations"]) == 1
+    assert "iterations = 1\n" in (tmp_path / "few" / "adjusted" / "project.toml").read_text()
+    path = tmp_path / "own" / "project.toml"
+    settings = path.read_text()
+    assert "[adjust]" in settings
+    path.write_text(settings.replace("[adjust]", "[adjust]\niterations = 1"))
+    assert formats.read(tmp_path / "own").options.max_iterations == 1
+    assert run("adjust", "own", "-q").exit_code == 3
+    assert run("adjust", "own", "--iterations", 20, "-q").exit_code == 0
+    for wrong in ("0", "1.5", "true", '"ten"'):
+        path.write_text(settings.replace("[adjust]", f"[adjust]\niterations = {wrong}"))
+        refused = run("info", "own")
+        assert refused.exit_code == 1
+        assert "project.toml, record" in refused.stderr.replace("\n", " ")
+
+
 def test_what_a_format_cannot_hold_is_listed(run, tmp_path):
     run("new", "own")
     done = run("convert", "own", "other")

@@ -65,6 +65,8 @@ Ordering = Literal["auto", "input", "rcm", "amd", "dissection", "graph-dissectio
 
 AS_PUBLISHED = 4
 """Iterations of the 1987 program, where nobody says how many."""
+OF_CAMERAS = 200
+"""Largest number of iterations if a camera has free parameters: weak networks have a curved valley."""
 OF_KNOTS = 400
 """Iterations at the most with the knots of a splined lens: few views leave many of them to their priors."""
 NOTABLE_RISE = 1e-3
@@ -157,9 +159,10 @@ def adjust(
         weight), or until the rate of convergence shows that none would by more than a tenth of it. A step
         that raises the sum of squares is damped (Levenberg-Marquardt). Or as the 1987 program did.
     max_iterations
-        Iterations at the most. When None, 50; 200 with a loss, as reweighting takes more of them; 400 with a
-        splined lens, whose knots few images leave to their priors, and steps along these are short; 4 as the
-        1987 program did.
+        Largest number of iterations. When None, 50; 200 with a loss, because reweighting needs more of them,
+        or with free parameters of cameras, because a weak network follows a curved valley; 400 with a splined
+        lens, whose knots few images leave to their priors, and steps along these are short; 4 as the 1987
+        program did.
     ordering
         How photos are ordered for elimination: in input order, in a narrow band (reverse Cuthill-McKee), by
         approximate minimum degree, by nested dissection across their positions, or across their ties alone.
@@ -196,10 +199,13 @@ def adjust(
     if not (keep or isinstance(covariance, bool | np.bool_)):
         raise InputError(f"covariance is True, False or 'verdict', not {shown(covariance)}")
     check_datum(datum)
-    if max_iterations is None and any(each.knot_unknowns for each in block.cameras):
-        max_iterations = OF_KNOTS
     options = core_options(
-        unit_variance, loss, bool(covariance), tolerance, max_iterations, ordering=ordering
+        unit_variance,
+        loss,
+        bool(covariance),
+        tolerance,
+        iteration_limit(block, tolerance) if max_iterations is None else max_iterations,
+        ordering=ordering,
     )
     processors = core_threads(threads)
     check_cameras(block)
@@ -217,6 +223,17 @@ def adjust(
         result = _adjusted(block, options, processors, progress, inner, keep=keep)
     said += stays(result)
     return replace(result, messages=[*said, *result.messages]) if said else result
+
+
+def iteration_limit(block: Block, tolerance: float | AsPublished = 1e-5) -> int | None:
+    """Return the default largest number of iterations for the cameras of a block; None if they need none."""
+    if any(each.knot_unknowns for each in block.cameras):
+        return OF_KNOTS
+    if isinstance(tolerance, AsPublished) or not any(
+        np.isinf(each.deviations).any() for each in block.cameras
+    ):
+        return None
+    return OF_CAMERAS
 
 
 def with_datum(

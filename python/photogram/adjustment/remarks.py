@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.undetermined import named_unknowns, weak_in_words
+from photogram.adjustment.undetermined import named_unknowns, weak_in_words, weak_parameters
 from photogram.errors import AdjustmentError, InputError, RankError
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import Block, position_columns
@@ -16,11 +17,14 @@ from photogram.network.motion import on_shared
 from photogram.network.refraction import metres_per_unit
 from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import Coefficient
+from photogram.results.cameras import adjusted_cameras
 
 NEAR = 1e-3
 """A point nearer to a station than this part of the median of such distances is at its place."""
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
+MOST_CORRELATIONS = 8
+"""Correlations, and weak parameters of cameras with their figures, that a message lists at most."""
 HIGHEST_GIANT = 9000.0
 """Metres: the flying height up to which Appendix F of the GIANT guide holds."""
 
@@ -33,9 +37,10 @@ def undetermined(
     if error is not None:
         what = error.what if isinstance(error, RankError) else str(error)
         messages.append(Undetermined(f"there are no covariances: {error}", what=what))
-    weak = _unknowns(block, solution.weak, solution.weak_cameras, solution.weak_unknowns)
+    weak = _weak_unknowns(block, solution)
     if weak:
-        messages.append(hardly_determined(solution.status, weak, weak_in_words(block, solution)))
+        words = [weak_in_words(block, solution), *_weak_figures(block, solution)]
+        messages.append(hardly_determined(solution.status, weak, "; ".join(filter(None, words))))
     return messages
 
 
@@ -100,28 +105,39 @@ def harmful_points(weak: Sequence[tuple[int, float, float]], point_ids: Sequence
     return messages
 
 
-def _unknowns(
-    block: Block,
-    of_photos: list[tuple[int, int]],
-    of_cameras: Sequence[tuple[int, int]] = (),
-    of_others: Sequence[tuple[int, int]] = (),
-) -> str:
-    """Name photos and their unknowns (0 to 5, then those of a camera of their own), cameras, common ones."""
+def _weak_figures(block: Block, solution: _photocore.BlockSolution) -> list[str]:
+    """Return value, standard deviation and correlations of each weak parameter of cameras."""
+    found = []
+    cameras = adjusted_cameras(block, solution, solution.variance_of_unit_weight or 1.0)
+    for row, k in dict.fromkeys(weak_parameters(block, solution)):
+        camera = cameras[row]
+        if not (math.isfinite(camera.sd[k]) and camera.sd[k] > 0):
+            continue
+        unit = f" {camera.camera.unit_of(camera.names[k])}".rstrip()
+        others = [
+            f"{camera.correlations[k, j]:+.2f} with {camera.names[j]}" for j in camera.estimated if j != k
+        ]
+        correlated = f", correlation {listed(others, MOST_CORRELATIONS)}" if others else ""
+        found.append(
+            f"{camera.names[k]} of {camera.name} is {camera.values[k]:.6g}{unit}"
+            f" (standard deviation {camera.sd[k]:.3g}{unit}{correlated})"
+        )
+    return found[:MOST_CORRELATIONS]
+
+
+def _weak_unknowns(block: Block, solution: _photocore.BlockSolution) -> str:
+    """Name photos and their unknowns (0 to 5), parameters of cameras, common unknowns."""
+    of_photos, of_others = solution.weak, solution.weak_unknowns
     names = [*position_columns(block), *ATTITUDE_COLUMNS]
     parts = [
         f"{names[unknown].removesuffix('_deg')} of"
         f" {listed([block.photo_ids[photo] for photo, other in of_photos if other == unknown])}"
         for unknown in sorted({unknown for _, unknown in of_photos if unknown < len(names)})
     ]
-    if block.photo_cameras is not None:
-        cameras = block.photo_cameras.tolist()
-        own = [
-            (cameras[photo], unknown - len(names)) for photo, unknown in of_photos if unknown >= len(names)
-        ]
-        parts += [
-            f"{block.cameras[camera].names[k]} of {block.camera_names[camera]}"
-            for camera, k in [*own, *of_cameras]
-        ]
+    parts += [
+        f"{block.cameras[camera].names[k]} of {block.camera_names[camera]}"
+        for camera, k in weak_parameters(block, solution)
+    ]
     common = block.unknowns if of_others else []
     parts += [
         f"{common[row].components[k]} of {common[row].title}"

@@ -222,13 +222,18 @@ def _of_unknowns(block: Block, kinds: set[str], photos: int, at: Setting) -> str
     return ""
 
 
+def weak_parameters(block: Block, solution: _photocore.BlockSolution) -> list[tuple[int, int]]:
+    """Return the cameras and parameters of the combination that no step could follow to its end."""
+    if block.photo_cameras is None:
+        return list(solution.weak_cameras)
+    cameras = block.photo_cameras.tolist()
+    own = [(cameras[photo], unknown - 6) for photo, unknown in solution.weak if unknown >= 6]
+    return [*own, *solution.weak_cameras]
+
+
 def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
     """Say what the combination is that no step could follow to its end; see :func:`in_words`."""
-    names = {block.cameras[camera].names[k] for camera, k in solution.weak_cameras}
-    if block.photo_cameras is not None:
-        cameras = block.photo_cameras.tolist()
-        own = [(cameras[photo], unknown - 6) for photo, unknown in solution.weak if unknown >= 6]
-        names |= {block.cameras[camera].names[k] for camera, k in own}
+    names = {block.cameras[camera].names[k] for camera, k in weak_parameters(block, solution)}
     at = setting_of(block)
     if not names:
         kinds = {block.unknowns[row].KIND for row, _ in solution.weak_unknowns}
@@ -250,7 +255,7 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> str:
         for name, sd in zip(each.names, each.deviations, strict=True)
         if np.isinf(sd) and name in _OF_RING
     }
-    return _of_setting(names | free, at) or in_words(names, poses, at)
+    return _of_setting(names | free, at) or in_words(names, poses, at) or _of_distances(names, poses)
 
 
 def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> str:
@@ -289,6 +294,16 @@ def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -
     if names == {"b2"} and "swing" in poses:
         return "shear and kappa of all photos: photos turned by 90 degrees tell them apart"
     return ""
+
+
+def _of_distances(names: set[str], poses: set[str]) -> str:
+    """Return what helps if principal distances are weak together with positions; nothing for others."""
+    if not (names and names <= _DISTANCES and poses):
+        return ""
+    return (
+        "principal distance and distances from the photos to the points: control at different depths,"
+        " convergent photos, or a fixed principal distance separate them"
+    )
 
 
 def _of_setting(names: set[str], at: Setting) -> str:

@@ -294,6 +294,7 @@ def adjusted_block(
             "unit_variance": project.options.unit_variance,
             "threads": threads,
             "progress": progress,
+            "max_iterations": project.options.max_iterations,
         }
         with errors_explained(block):
             call = adjusting(project, _call(chosen, choices.loss_of(project), ordering, division))

@@ -45,6 +45,14 @@ class Choices:
             " `redundancy` (numbers), or `unity`: 1. Default: what PATH says, else constrained.",
         ),
     ] = None
+    iterations: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Largest number of iterations [PATH, else 50; 200 with a loss or free cameras].",
+        ),
+    ] = None
     self_calibrate: Annotated[
         str | None,
         typer.Option(
@@ -63,12 +71,17 @@ class Choices:
         return None if self.loss == "none" else self.loss
 
     def of(self, project: Project) -> Project:
-        """Return the project with what is chosen of cameras, coordinates and the variance of unit weight."""
+        """Return the project with the chosen cameras, coordinates, variance of unit weight and iterations."""
         from photogram.formats.supplements import held_points, self_calibrated
 
         wanted = [name.strip() for name in self.self_calibrate.split(",")] if self.self_calibrate else []
         project = self_calibrated(project, wanted)
         project = held_points(project, [each.strip() for each in self.hold.split(",")] if self.hold else [])
-        if self.unit_variance is None:
-            return project
-        return project.replace(options=replace(project.options, unit_variance=self.unit_variance))
+        options = project.options
+        return project.replace(
+            options=replace(
+                options,
+                unit_variance=self.unit_variance or options.unit_variance,
+                max_iterations=self.iterations or options.max_iterations,
+            )
+        )

@@ -14,8 +14,8 @@ PANELS = {
     " shape knots knot_sd cameras size views within sync offsets",
     "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"
     " pdf to trace points_out part_two restart_out ident date",
-    "Adjustment": "datum datum_points hold loss scale tolerance max_iterations covariance unit_variance"
-    " self_calibrate keep_all keep_repeated as_published weights method polynomial"
+    "Adjustment": "datum datum_points hold loss scale tolerance max_iterations iterations covariance"
+    " unit_variance self_calibrate keep_all keep_repeated as_published weights method polynomial"
     " estimate_grid each_case angle lens common_scale without any_roll blind air_refraction"
     " water_refraction water_level water_index limits invert extrapolate components regularise"
     " together calibrate radius distances intrinsics_only knot_grid",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TAKEN = frozenset(
     (
         *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--loss", "--keep-all"),
-        *("--cluster", "--workers", "--parts", "--memory", "--run", "--plan"),
+        *("--iterations", "--cluster", "--workers", "--parts", "--memory", "--run", "--plan"),
     )
 )
 """Options that a project on disk takes. Any other is refused: nothing is left out without a word."""
@@ -102,7 +102,11 @@ def adjusted_on_disk(
     from photogram.formats import in_parts
 
     wishes, folder = Wishes(), divided.run or target / "run"
-    chosen: Any = {"unit_variance": choices.unit_variance, "loss": choices.loss_of}
+    chosen: Any = {
+        "unit_variance": choices.unit_variance,
+        "loss": choices.loss_of,
+        "max_iterations": choices.iterations,
+    }
     if divided.plan:
         print_plan(in_parts.planned_on_disk(path, wishes, folder, division, **chosen))
         return True

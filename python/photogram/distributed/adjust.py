@@ -20,6 +20,7 @@ from photogram.adjustment.adjustment import (
     adjust,
     core_options,
     core_threads,
+    iteration_limit,
     with_datum,
 )
 from photogram.adjustment.first_features import started
@@ -113,6 +114,8 @@ def adjust_in_parts(
     ModuleNotFoundError
         A cluster is asked for, and dask.distributed is not installed (extra `distributed`).
     """
+    if max_iterations is None:
+        max_iterations = iteration_limit(checked(block), tolerance)
     options = core_options(unit_variance, loss, covariance, tolerance, max_iterations)
     core_threads(threads)  # refused here, not by a worker
     block, options, row = _ready(block, options, datum)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from photogram.adjustment.adjustment import Progress, UnitVariance, core_options
+from photogram.adjustment.adjustment import Progress, UnitVariance, core_options, iteration_limit
 from photogram.adjustment.robust import Loss
 from photogram.distributed.adjust import Run, opened
 from photogram.distributed.division import Division
@@ -76,6 +76,7 @@ def adjusted_on_disk(
     *,
     unit_variance: UnitVariance | None = None,
     loss: Callable[[Project], Loss | None] = _as_said,
+    max_iterations: int | None = None,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> OnDisk:
@@ -92,6 +93,8 @@ def adjusted_on_disk(
     unit_variance, loss
         What the variance of unit weight is based on; None: as the project says. The loss of the project: by
         default what it says.
+    max_iterations
+        Largest number of iterations. When None, the number of the project, else 50; 200 with a loss.
     threads, progress
         As of :func:`photogram.adjust_in_parts`.
 
@@ -100,7 +103,8 @@ def adjusted_on_disk(
     RankError, AdjustmentError, OutOfMemoryError, InputError
         As of :func:`photogram.adjust_in_parts`, and as of projects that are read whole.
     """
-    with _run(path, wishes, folder, division, (unit_variance, loss), threads) as run:
+    chosen = (unit_variance, loss, max_iterations)
+    with _run(path, wishes, folder, division, chosen, threads) as run:
         outcome = run.adjust(progress)
         found = [result_folder(folder, node) for node in range(len(run.manifest.tree))]
         return OnDisk(outcome, run.manifest, found)
@@ -114,9 +118,10 @@ def planned_on_disk(
     *,
     unit_variance: UnitVariance | None = None,
     loss: Callable[[Project], Loss | None] = _as_said,
+    max_iterations: int | None = None,
 ) -> PartsPlan:
     """Plan the same: its parts are written, and wait in the folder for the adjustment."""
-    with _run(path, wishes, folder, division, (unit_variance, loss), None) as run:
+    with _run(path, wishes, folder, division, (unit_variance, loss, max_iterations), None) as run:
         return run.plan()
 
 
@@ -126,15 +131,21 @@ def _run(
     wishes: Wishes,
     folder: Path,
     division: Division,
-    chosen: tuple[UnitVariance | None, Callable[[Project], Loss | None]],
+    chosen: tuple[UnitVariance | None, Callable[[Project], Loss | None], int | None],
     threads: int | None,
 ) -> Iterator[Run]:
     with ExitStack() as stack:
         stack.enter_context(alone(folder))
         streamed = Streamed(path, wishes, folder)
         stack.callback(streamed.close)
-        project, (unit_variance, loss) = streamed.project, chosen
-        options = core_options(unit_variance or project.options.unit_variance, loss(project))
+        project, (unit_variance, loss, max_iterations) = streamed.project, chosen
+        options = core_options(
+            unit_variance or project.options.unit_variance,
+            loss(project),
+            max_iterations=max_iterations
+            or project.options.max_iterations
+            or iteration_limit(streamed.block),
+        )
         source = streamed.source(options)
         with opened(
             folder,

@@ -47,11 +47,18 @@ def frame_of(block: Block) -> Frame:
 
 @dataclass(frozen=True)
 class Options:
-    """How a project asks to be adjusted; None: it does not say."""
+    """How a project asks to be adjusted; None: it does not say.
+
+    Attributes
+    ----------
+    datum, loss, unit_variance, max_iterations
+        As of :func:`photogram.adjust`.
+    """
 
     datum: DatumName | None = None
     loss: Literal["huber", "cauchy"] | None = None
     unit_variance: Literal["constrained", "unity", "redundancy"] = "constrained"
+    max_iterations: int | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -181,6 +181,13 @@ class Sections(TomlFile):
             self.fail(section, key, f"{key} is true or false, not {shown(value)}")
         return value
 
+    def count(self, section: str, key: str) -> int:
+        """Return a whole number of at least 1."""
+        value = self.value(section, key)
+        if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value < 2**31:
+            self.fail(section, key, f"{key} must be a whole number from 1 to {2**31 - 1}, got {shown(value)}")
+        return value
+
     def numbers(self, section: str, key: str, counts: tuple[int, ...]) -> tuple[float, ...]:
         """Return a number, or some of them."""
         value = self.value(section, key)

@@ -101,8 +101,20 @@ def block_findings(result: Result) -> Findings:
         if intersected
         else "`--snoop` (`photogram.snoop`) takes gross errors out one after the other, and says which cannot"
         " be told apart.",
+        iterate=_iterated(result),
         if_usable=_unproved(result),
     )
+
+
+def _iterated(result: Result) -> str:
+    """Return how to end iterations that ran out; nothing for other ends."""
+    if result.status != "not converged":
+        return ""
+    more = f"Allow more iterations than {len(result.iterations)}: `--iterations N` (`max_iterations=N`)"
+    weak = any(isinstance(each, Undetermined) for each in result.messages)
+    if not weak or not any(np.isinf(each.deviations).any() for each in result.block.cameras):
+        return f"{more}."
+    return f"{more}, or leave weak parameters of cameras out of `--self-calibrate`."
 
 
 def _unproved(result: Result) -> list[str]:

@@ -309,6 +309,8 @@ class Findings:
         How the program looks for mistakes of the input, as part of a sentence.
     take_out
         How gross errors are taken out, in a sentence of what to do next.
+    iterate
+        How an adjustment that has not converged gets more iterations or fewer unknowns, in such a sentence.
     if_usable, if_withheld
         What else is to be done next where nothing forbids the use, and where something does: sentences.
     level
@@ -340,6 +342,7 @@ class Findings:
     calibrate: str = ""
     check: str = "look at units, names and signs"
     take_out: str = ""
+    iterate: str = ""
     if_usable: Sequence[str] = ()
     if_withheld: Sequence[str] = ()
     level: float = LEVEL

@@ -7,6 +7,7 @@ from photogram.statistics.findings import Findings
 _NEXT = {
     "not-converged": (
         "Do not use any of these figures: they are those of the last iteration, not of a solution.",
+        "{iterate}",
         "Look for mistakes of the input first: {check}. Poor first values are the usual cause.",
     ),
     "undetermined": (
@@ -110,6 +111,7 @@ def next_steps(code: str, found: Findings, *, usable: bool, take_out: bool) -> t
         "check": found.check,
         "take_out": found.take_out if take_out else "",
         "calibrate": _calibrated(found.calibrate),
+        "iterate": found.iterate,
     }
     sentences = [each.format(**words) for each in _NEXT.get(code, ())]
     sentences += found.if_usable if usable else found.if_withheld

@@ -56,7 +56,7 @@ _KEYS: Mapping[str, tuple[str, ...] | None] = {
     "sd": tuple(WITH_SD),
     "tables": tuple(TABLES),
     "film": ("model", "interior", "certificate", "flown"),
-    "adjust": ("datum", "loss", "unit_variance"),
+    "adjust": ("datum", "loss", "unit_variance", "iterations"),
     **dict.fromkeys(WITH_CRS, ("crs", "columns", "roles")),
     "photos": ("crs", "columns", "roles", "directory", "directory_crs", "mrk_antenna"),
     "features": None,
@@ -186,6 +186,7 @@ def read_settings(path: Path, wishes: Wishes | None = None) -> Settings:
             cast("Any", {"none": None}.get(loss := file.word("adjust", "loss"), loss)),
             # `free` is what earlier versions wrote where nobody had asked for anything.
             cast("Any", {"free": "constrained"}.get(basis := file.word("adjust", "unit_variance"), basis)),
+            file.count("adjust", "iterations") if file.has("adjust", "iterations") else None,
         ),
         **words,
         time_origin=file.time_origin(),

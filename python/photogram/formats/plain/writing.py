@@ -190,7 +190,8 @@ def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
     lines += [*_time(project), *films.settings(), "", "[adjust]"]
     if options.datum is not None:
         lines.append(f'datum = "{options.datum}"')
-    lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"', ""]
+    lines += [f'loss = "{options.loss or "none"}"', f'unit_variance = "{options.unit_variance}"']
+    lines += ["" if options.max_iterations is None else f"iterations = {options.max_iterations}\n"]
     if project.features:
         lines += ["[features]", *(_feature(*each) for each in project.features.items()), ""]
     lines += asked_lines(project.statement, unit)
