@@ -12,7 +12,17 @@ import pytest
 from example_scripts import load
 from golden_data import golden
 from golden_network import free_network
-from photogram import AdjustmentError, Block, InnerConstraints, InputError, MinimumConstraints, Result, adjust
+from photogram import (
+    AdjustmentError,
+    Block,
+    InnerConstraints,
+    InputError,
+    MinimumConstraints,
+    Result,
+    adjust,
+    snoop,
+)
+from photogram.network.subset import kept_images
 
 FINE = 1e-9
 
@@ -204,6 +214,29 @@ def apart(*, joined: bool) -> Block:
         if joined
         else [],
     )
+
+
+@pytest.mark.parametrize(
+    "datum",
+    [
+        InnerConstraints(),
+        InnerConstraints(points=["point4", "point5", "point6", "point7"], photos=None),
+        MinimumConstraints(photo="photo3"),
+    ],
+)
+@pytest.mark.parametrize("bars", [True, False])
+def test_snooping_is_in_any_datum(datum, bars):
+    """Tests do not depend on the datum; coordinates are those of an adjustment without the wrong image."""
+    block = free_network(bars=bars)
+    xy = block.image_xy.copy()
+    xy[5] += 1.0
+    found = snoop(block.replace(image_xy=xy), datum=datum)
+    [name] = {entry.name for entry in found.removed}
+    assert name == f"image of point {block.point_ids[block.image_points[5]]} on photo {block.photo_ids[0]}"
+    expected = adjust(kept_images(block, np.arange(len(xy)) != 5), datum=datum)
+    assert found.result.datum.kind == expected.datum.kind
+    np.testing.assert_allclose(found.result.point_positions, expected.point_positions, atol=1e-9)
+    np.testing.assert_allclose(found.result.point_sd, expected.point_sd, atol=1e-9)
 
 
 def test_every_part_of_a_network_has_its_datum():

@@ -143,7 +143,8 @@ def test_what_is_not_done_of_a_project_on_disk_is_refused(tmp_path, project, opt
     value = given if isinstance(given, list) else [] if given is None else [given]
     value = [tmp_path / each if str(each).startswith("found") else each for each in value]
     said = called(project, "--parts", 3, option, *value, "--out", tmp_path / "out", code=2)
-    assert f"Invalid value for {option}: is not done of a project" in " ".join(said.replace("│", " ").split())
+    words = " ".join(said.replace("│", " ").split())
+    assert f"Invalid value for {option}: cannot be combined with --parts if images are in Parquet" in words
     assert not (tmp_path / "out" / "report.txt").exists()
 
 

@@ -1,6 +1,7 @@
 """`photogram new`, `adjust`, `info`, `convert`."""
 
 import json
+import re
 import runpy
 from pathlib import Path
 
@@ -254,9 +255,60 @@ def test_a_blunder_is_said_and_taken_out(run, tmp_path):
     assert done.exit_code in (0, 4), done.output
     removed = pd.read_csv(tmp_path / "out" / "removed.csv")
     assert any("t24" in name and "DJI_0105" in name for name in removed["name"])
-    assert run("adjust", "own", "--snoop", "--datum", "inner").exit_code == 2
+    for datum in ("control", "minimum"):
+        done = run("adjust", "own", "--snoop", "--datum", datum, "--out", "chosen", "-q")
+        assert done.exit_code in (0, 4), done.output
+        assert any("t24" in name for name in pd.read_csv(tmp_path / "chosen" / "removed.csv")["name"])
     checked = run("check", "own")
     assert "t24" in checked.output
+
+
+def test_snooping_follows_the_datum_and_replaces_the_loss_of_a_project(run, tmp_path):
+    run("new", "own")
+    own = tmp_path / "own"
+    for name in ("control", "gnss", "distances"):
+        (own / f"{name}.csv").unlink()
+    settings = (own / "project.toml").read_text()
+    (own / "project.toml").write_text(
+        settings.replace("[adjust]", '[adjust]\ndatum = "inner"\nloss = "huber"')
+        .replace('\nloss = "none"', "")
+        .replace('\ndatum = "control"', "")
+    )
+    lines = (own / "images.csv").read_text().splitlines(keepends=True)
+    row = next(k for k, line in enumerate(lines) if line.startswith("DJI_0105,t24,"))
+    (own / "images.csv").write_text("".join([*lines[:row], *lines[row + 1 :]]))
+    assert run("adjust", "own", "--loss", "none", "--out", "without", "-q").exit_code in (0, 4)
+    photo, point, column, height = lines[row].strip().split(",")
+    lines[row] = f"{photo},{point},{float(column) + 30!r},{height}\n"
+    (own / "images.csv").write_text("".join(lines))
+    done = run("adjust", "own", "--snoop", "--out", "out")
+    assert done.exit_code in (0, 4), done.output
+    report = (tmp_path / "out" / "report.txt").read_text()
+    record = 1 + (own / "project.toml").read_text().splitlines().index('loss = "huber"')
+    assert f"project.toml, record {record}: loss in [adjust]" in report
+    assert "inner constraints" in report
+    assert pd.read_csv(tmp_path / "out" / "removed.csv")["name"].str.contains("t24").all()
+    points, others = (
+        pd.read_csv(tmp_path / name / "points.csv", comment="#").set_index("point")
+        for name in ("out", "without")
+    )
+    np.testing.assert_allclose(points[["X", "Y", "Z"]], others.loc[points.index, ["X", "Y", "Z"]], atol=1e-6)
+
+
+def test_options_that_cannot_be_combined_are_those_that_were_typed(run):
+    run("new", "own")
+    for words, typed in (
+        (("adjust", "own", "--snoop", "--parts", 2), "--parts"),
+        (("adjust", "own", "--ordering", "rcm", "--memory", "1GB"), "--memory"),
+        (("adjust", "own", "--photos-crs", "EPSG:4326"), "--photos-dir"),
+        (("collection", "--example", "--snoop", "--loss", "huber"), "--loss"),
+        (("calibrate", "--example", "--snoop", "--loss", "huber"), "--loss"),
+    ):
+        refused = run(*words)
+        assert refused.exit_code == 2, refused.output
+        named = set(re.findall(r"--[a-z-]+", " ".join(refused.stderr.split("Error")[-1].split())))
+        assert typed in named
+        assert named <= {typed, *map(str, words)}
 
 
 def test_the_number_of_iterations_is_an_option_and_a_key(run, tmp_path):

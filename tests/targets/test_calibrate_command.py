@@ -113,7 +113,7 @@ def test_outliers_as_mrcal_marks_them(left):
         (["--board", "9by6", "--spacing", "25"], "is two numbers"),
         (["--spacing", "25"], "goes with --board"),
         (["--sd", "control=1"], "images=S"),
-        (["--snoop", "--loss", "huber"], "goes without --loss"),
+        (["--snoop", "--loss", "huber"], "cannot be combined with --loss"),
         (["--model", "pinhole9"], "did you mean pinhole?"),
     ],
 )

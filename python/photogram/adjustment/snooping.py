@@ -18,6 +18,8 @@ from photogram.adjustment.adjustment import (
     adjusted_from,
     core_options,
     core_threads,
+    iteration_limit,
+    with_datum,
     with_rejections,
 )
 from photogram.adjustment.first_values import FirstValues, first_values
@@ -28,6 +30,7 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
+from photogram.network.datum import InnerConstraints, MinimumConstraints, check_datum
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows
 from photogram.results.exchanged_names import Exchange, exchanged_names
@@ -111,7 +114,8 @@ def snoop(
     progress
         Told of the adjustments before and after.
     options
-        Of a collection: further ones of :func:`photogram.collection.adjust`.
+        Of a block: `datum` and `max_iterations` of :func:`photogram.adjust`; tests do not depend on the
+        datum. Of a collection: further ones of :func:`photogram.collection.adjust`.
 
     Returns
     -------
@@ -185,24 +189,36 @@ def _snoop_block(
     unit_variance: UnitVariance,
     threads: int | None,
     progress: Callable[[Progress], None] | None,
+    datum: InnerConstraints | MinimumConstraints | None = None,
+    max_iterations: int | None = None,
 ) -> Snooped:
     block = checked(network)
     check_cameras(block)
+    check_datum(datum)
     one_of("unit_variance", unit_variance, get_args(UnitVariance))
+    limit = iteration_limit(block) if max_iterations is None else max_iterations
+    core, inner = with_datum(block, core_options(unit_variance, None, max_iterations=limit), datum)
 
     def adjusted(given: Block, **options: Any) -> Result:
-        return adjust(given, unit_variance=unit_variance, threads=threads, progress=progress, **options)
+        return adjust(
+            given,
+            **{"datum": None if inner else datum, **options},
+            unit_variance=unit_variance,
+            max_iterations=max_iterations,
+            threads=threads,
+            progress=progress,
+        )
 
     def afresh() -> Aside | None:
         found = started_by_consensus(block)
         if found is None:
             return None
         start, aside = found
-        trial.restart(core_trial(start, None, core_options(unit_variance, None), threads))
+        trial.restart(core_trial(start, None, core, threads))
         return aside
 
     try:
-        trial = block_trial(block, None, core_options(unit_variance, None), threads, parts=parts)
+        trial = block_trial(block, None, core, threads, parts=parts)
         outcome = snooped(trial, settings, afresh)
     except (LostSupportError, _photocore.BlockError):
         # It says by name what is not determined, or goes on where points have to leave.
@@ -211,8 +227,15 @@ def _snoop_block(
         if not first.converged and settings.robust is not False:
             first = adjusted(block, covariance=covariance, loss="huber")
         trial, outcome = _snooped_from(first, settings, threads, parts=parts)
-    cleaned, options = _without(block, trial, outcome.out), core_options(unit_variance, None)
-    result = with_rejections(adjusted_from(cleaned, options, threads=threads, progress=progress), block)
+    cleaned = _without(block, trial, outcome.out)
+    result = adjusted_from(cleaned, core, threads=threads, progress=progress)
+    exchanged = _exchanged(block, trial, outcome, result)
+    if isinstance(datum, InnerConstraints) and result.converged:
+        # Points without given coordinates carry the datum at the places of their first intersection.
+        poses = {"photo_positions": block.photo_positions, "photo_attitudes": block.photo_attitudes}
+        again = adjusted(cleaned.replace(**poses), datum=datum)
+        result = again if again.converged else result.in_datum(datum)
+    result = with_rejections(result, block)
     has_held = any(
         (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
     )
@@ -222,7 +245,7 @@ def _snoop_block(
         outcome,
         settings,
         held=lambda: held_tested(adjusted(block)) if has_held else [],
-        exchanged=_exchanged(block, trial, outcome, result),
+        exchanged=exchanged,
     )
 
 

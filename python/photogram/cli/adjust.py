@@ -12,7 +12,7 @@ import typer
 from photogram.cli.choices import Choices
 from photogram.cli.console import ON_TOP, print_remark, print_sections
 from photogram.cli.documents import Documents, Pictures, check_maps
-from photogram.cli.in_parts import Parts, adjusted_on_disk, print_plan
+from photogram.cli.in_parts import DIVIDING, Parts, adjusted_on_disk, print_plan
 from photogram.cli.job import Job, OutputFolder, with_job
 from photogram.cli.options import (
     Ordering,
@@ -21,6 +21,7 @@ from photogram.cli.options import (
     Snooping,
     Strict,
     Threads,
+    check_alone,
     default_out,
     out_option,
 )
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.distributed import Division
     from photogram.formats import Project
+    from photogram.messages import Message
     from photogram.results.snooping_result import Snooped
     from photogram.results.statement.statement import Statement
     from photogram.show.page import Section as Chapter
@@ -118,8 +120,11 @@ def adjust(
             division=division,
         )
         if snooping.snoop:
-            _check_snooping(project, choices, division)
-            removed = _snooped(job, project, block, started, run, threads, snooping)
+            check_alone(job, "--snoop", DIVIDING)
+        if ordering != "auto":
+            check_alone(job, "--ordering", DIVIDING)
+        if snooping.snoop:
+            removed = _snooped(job, project, block, started, run, choices, threads, snooping)
             result = cast("Result", removed.result)
         else:
             removed, result = None, run(started or block)
@@ -224,18 +229,21 @@ def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValu
     return found.usable(), found
 
 
-def _check_snooping(project: Project, choices: Choices, division: Division | None) -> None:
-    """Refuse what does not go with taking gross errors out."""
+def _replaced_by_snooping(job: Job, project: Project, choices: Choices) -> list[Message]:
+    """Return what a project or a user requests and `--snoop` does in another way."""
     from photogram import adjust
     from photogram.formats import adjusting
+    from photogram.messages import Message
 
+    messages = []
+    if choices.loss_of(project) is not None:
+        source = choices.source(job, project, "loss")
+        messages.append(
+            Message(f"{source}: --snoop starts with a robust loss, but its result is by least squares")
+        )
     if adjusting(project, adjust) is not adjust:
-        raise typer.BadParameter("goes without OUTLIER_REJECTION", param_hint="--snoop")
-    if division is not None:
-        raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--snoop")
-    chosen = choices.datum is not None or choices.loss is not None
-    if chosen or project.options.datum in ("inner", "minimum"):
-        raise typer.BadParameter("goes without --datum and --loss", param_hint="--snoop")
+        messages.append(Message("OUTLIER_REJECTION=yes is not used: --snoop tests the observations instead"))
+    return messages
 
 
 def _snooped(
@@ -244,6 +252,7 @@ def _snooped(
     block: Block,
     started: FirstValues | None,
     run: Callable[[FirstValues], Result],
+    choices: Choices,
     threads: int | None,
     snooping: Snooping,
 ) -> Snooped:
@@ -260,15 +269,31 @@ def _snooped(
     with adjustment_status(job, "adjusting and testing") as progress, errors_explained(block):
         found = snoop(
             block,
+            datum=_datum(choices.datum_of(project)),
+            robust=None if choices.loss_of(project) is None else True,
             unit_variance=project.options.unit_variance,
+            max_iterations=project.options.max_iterations,
             threads=threads,
             **snooping.options,
             progress=progress,
         )
         result = diagnosed(cast("Result", found.result))
     assert isinstance(result, Result)
-    result = with_rejections(replace(result, set_aside=aside), project.block)
+    _check_control(job, project, choices, result)
+    messages = [*_replaced_by_snooping(job, project, choices), *result.messages]
+    result = with_rejections(replace(result, set_aside=aside, messages=messages), project.block)
     return replace(found, result=with_features(result, project.features))
+
+
+def _check_control(job: Job, project: Project, choices: Choices, result: Result) -> None:
+    """Reject a result without a datum of control if the user or the project requires one."""
+    from photogram import InputError
+
+    if choices.datum_of(project) == "control" and result.datum.is_chosen:
+        raise InputError(
+            f"{choices.source(job, project, 'datum')}: the control points give no datum; --control FILE adds"
+            " control points, --datum inner or --datum minimum needs none"
+        )
 
 
 def adjusted_block(
@@ -282,7 +307,7 @@ def adjusted_block(
     division: Division | None = None,
 ) -> Result:
     """Adjust a block as its project says, but for what a user chooses, with its features."""
-    from photogram import FirstValues, InputError, adjust_started
+    from photogram import FirstValues, adjust_started
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.formats import adjusting
     from photogram.formats.supplements import repeated_remarks
@@ -303,11 +328,7 @@ def adjusted_block(
             else:
                 result = call(block, **how)
         result = diagnosed(result)
-    if chosen == "control" and result.datum.is_chosen:
-        raise InputError(
-            "control gives no datum: --control FILE adds it, --datum inner or minimum does without it",
-            file=project.path,
-        )
+    _check_control(job, project, choices, result)
     again = repeated_remarks(project, result) if not isinstance(block, FirstValues) else []
     told = replace(result, messages=[*project.messages, *again, *result.messages])
     return with_features(told, project.features)
@@ -351,8 +372,6 @@ def _call(
         from photogram import adjust
 
         return partial(adjust, datum=datum, loss=loss, ordering=ordering, covariance="verdict")
-    if ordering != "auto":
-        raise typer.BadParameter("goes without --cluster, --parts and --memory", param_hint="--ordering")
     from photogram import adjust_in_parts
 
     return partial(adjust_in_parts, division=division, datum=datum, loss=loss)

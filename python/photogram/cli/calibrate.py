@@ -15,7 +15,7 @@ from photogram.cli.components import COMPONENTS
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, with_job
-from photogram.cli.options import Quiet, Snooping, Strict, Threads, default_out, out_option
+from photogram.cli.options import Quiet, Snooping, Strict, Threads, check_alone, default_out, out_option
 from photogram.cli.progress import adjustment_status, estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
 
@@ -235,8 +235,8 @@ def _adjusted(
     job: Job, calibration: Calibration, how: dict[str, Any], threads: int | None, snooping: Snooping
 ) -> Calibrated:
     """Adjust a calibration, without gross errors where they are looked for."""
-    if snooping.snoop and (how["loss"] or how["outliers"]):
-        raise typer.BadParameter("goes without --loss and --outliers", param_hint="--snoop")
+    if snooping.snoop:
+        check_alone(job, "--snoop", ("--loss", "--outliers"))
     with adjustment_status(job) as progress:
         if snooping.snoop:
             return calibration.snoop(**snooping.options, threads=threads, progress=progress)

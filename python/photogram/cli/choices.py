@@ -11,6 +11,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
+    from photogram.cli.job import Job
     from photogram.formats import Project
 
 LossName = Literal["none", "huber", "cauchy"]
@@ -69,6 +70,21 @@ class Choices:
         if self.loss is None:
             return project.options.loss
         return None if self.loss == "none" else self.loss
+
+    def source(self, job: Job, project: Project, name: str) -> str:
+        """Return where `datum` or `loss` is set: an option, or the key and the line of a file."""
+        if getattr(self, name) is not None:
+            return f"--{name} {getattr(self, name)}"
+        key = f"adjust.{name}"
+        if key in job.given.get("--set", ""):
+            return f"--set {key}={getattr(project.options, name)}"
+        settings = project.path / "project.toml" if project.path.is_dir() else project.path
+        if settings.suffix != ".toml" or not settings.is_file():
+            return f"{project.path}: {name}"
+        from photogram.io.toml import TomlFile
+
+        record = TomlFile(settings).place(name, "adjust").record
+        return f"{settings}, record {record}: {name} in [adjust]"
 
     def of(self, project: Project) -> Project:
         """Return the project with the chosen cameras, coordinates, variance of unit weight and iterations."""

@@ -18,6 +18,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     UnitWeight,
+    check_alone,
     example_out,
     out_option,
 )
@@ -124,8 +125,8 @@ def collection(
         documents.announce(job, out, TEXT, adjusted, *([COMPONENTS] if components else []))
         pictures = documents.pictures(job, out)
         photos = photos.replace(image_sd=fit.sd)
-        if snooping.snoop and fit.robust is not None:
-            raise typer.BadParameter("not with a robust loss", param_hint="--snoop")
+        if snooping.snoop:
+            check_alone(job, "--snoop", ("--loss", "--scale"))
         # Nothing vouches for --sd: the default is not that of blocks.
         snooping = replace(snooping, unit_weight=unit_weight)
         result = _adjusted(job, photos, fit, snooping, components, ordering, threads)

@@ -22,6 +22,7 @@ from photogram.cli.options import (
     Strict,
     Threads,
     WaterModel,
+    check_alone,
     default_out,
     out_option,
 )
@@ -151,9 +152,14 @@ def giant(
         documents.announce(job, out, *RESULTS, *([COMPONENTS] if how.components else []))
         pictures = documents.pictures(job, out)
         project, block, allowed = _project_and_block(job, directory, limits, how)
-        if snooping.snoop and (how.as_published or project.common.intersection_only):
-            refused = "not with --as-published or an intersection"
-            raise typer.BadParameter(refused, param_hint="--snoop")
+        if snooping.snoop:
+            check_alone(job, "--snoop", ("--as-published",))
+            if project.common.intersection_only:
+                raise typer.BadParameter(
+                    "needs photos that are adjusted: column 10 of the second record of COMMON requests an"
+                    " intersection only; leave it blank",
+                    param_hint="--snoop",
+                )
         found = _adjusted_project(job, project, block, how, threads, snooping)
         written = _result_files(project, block, found, out, how.as_published)
         found = found.estimated(job, block, how.components, threads)

@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from photogram.distributed import Division
     from photogram.distributed.plan import PartsPlan
 
+DIVIDING = ("--cluster", "--workers", "--parts", "--memory", "--run")
+"""Options that divide an adjustment into parts."""
 TAKEN = frozenset(
     (
         *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--loss", "--keep-all"),
-        *("--iterations", "--cluster", "--workers", "--parts", "--memory", "--run", "--plan"),
+        *(*DIVIDING, "--iterations", "--plan"),
     )
 )
 """Options that a project on disk takes. Any other is refused: nothing is left out without a word."""
@@ -93,10 +95,10 @@ def adjusted_on_disk(
         return False
     for name in job.given:
         if name not in TAKEN:
+            typed = ", ".join(each for each in job.given if each in DIVIDING)
             raise typer.BadParameter(
-                "is not done of a project whose images are read batch by batch from Parquet, in parts: it"
-                " goes without --cluster, --parts, --memory and --run, or with images in CSV, which are read"
-                " whole",
+                f"cannot be combined with {typed} if images are in Parquet, which are then read in batches;"
+                " images in CSV are read whole",
                 param_hint=name,
             )
     from photogram.formats import in_parts

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import typer
 
-from photogram.cli.job import OutputFile
+from photogram.cli.job import Job, OutputFile
 from photogram.lazy_dataclasses import dataclass
 
 PictureFormat = Literal["png", "pdf", "svg"]
@@ -72,6 +73,12 @@ class Snooping:
     def options(self) -> dict[str, Any]:
         """As :func:`photogram.snoop` takes them."""
         return {"level": self.level, "fdr": self.fdr, "unit_weight": self.unit_weight}
+
+
+def check_alone(job: Job, option: str, others: Collection[str]) -> None:
+    """Reject an option beside others; the message names those of them that the user typed."""
+    if typed := [name for name in job.given if name in others]:
+        raise typer.BadParameter(f"cannot be combined with {', '.join(typed)}", param_hint=option)
 
 
 def out_option(help: str) -> Any:  # noqa: A002  # as typer calls it

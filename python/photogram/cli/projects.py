@@ -146,7 +146,8 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
     from photogram.formats.supplements import deviations, with_control, with_images, with_repeated, with_sd
 
     if added.photos_dir is None and (added.photos_crs or added.mrk_antenna):
-        raise typer.BadParameter("says something of --photos-dir", param_hint="--photos-crs, --mrk-antenna")
+        option = "--photos-crs" if added.photos_crs else "--mrk-antenna"
+        raise typer.BadParameter("requires --photos-dir DIR", param_hint=option)
     if added.cubes is None and added.jigsaw is not None:
         raise typer.BadParameter("says how the images of --cubes are adjusted", param_hint="--jigsaw")
     job.reads_inside(path)

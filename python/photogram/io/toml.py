@@ -67,6 +67,10 @@ class TomlFile:
 
     def error(self, key: str, message: str, section: str = "") -> InputError:
         """Return an error at the first line that has a key or table: of the section, if there."""
+        return self.place(key, section).error(message)
+
+    def place(self, key: str, section: str = "") -> Place:
+        """Return the first line that has a key or table: of the section, if there."""
         word = rf"[\"']?{re.escape(key)}[\"']?\s*[\]=.]"
         own, every = list(self._lines_of(section)), list(enumerate(self.lines, 1))
         first = rf"^\s*\[?\[?\s*{word}"
@@ -74,8 +78,8 @@ class TomlFile:
         for lines, pattern in ((own, first), (own, rf"^[^#]*[\[{{,.\s]{word}"), (every, first)):
             for record, line in lines:
                 if re.match(pattern, line):
-                    return self._place(record).error(message)
-        return self._place(None).error(message)
+                    return self._place(record)
+        return self._place(None)
 
     def _lines_of(self, section: str) -> Iterator[tuple[int, str]]:
         """Yield the lines of a section with their numbers: below its header, or with its name before keys."""

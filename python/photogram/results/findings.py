@@ -79,6 +79,8 @@ def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
     # Held to look for blunders before the photos are adjusted: nobody takes these places for true.
     intersected = not result.photo_given_sd.any()
+    # Data snooping needs the whole block and adjusted photos.
+    tests_more = result.WHOLE and not intersected
     labels = [each.label for each in observations_of_core(result.block)]
     found = network_findings(
         result, [] if intersected else held_tested(result), [] if intersected else _patterns(result), labels
@@ -93,12 +95,12 @@ def block_findings(result: Result) -> Findings:
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
-        snoop="" if intersected else found.snoop,
+        snoop=found.snoop if tests_more else "",
         weigh="--sd control=...",
         calibrate=how_to_calibrate(result.block),
         check="`photogram check` (`photogram.diagnose`)",
         take_out=""
-        if intersected
+        if not tests_more
         else "`--snoop` (`photogram.snoop`) takes gross errors out one after the other, and says which cannot"
         " be told apart.",
         iterate=_iterated(result),
