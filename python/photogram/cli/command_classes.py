@@ -8,8 +8,9 @@ from typer.core import TyperCommand, TyperGroup
 
 PANELS = {
     "Input": "example day name packaged file_format control control_crs columns roles images names camera sd"
-    " settings cubes jigsaw photos_dir photos_crs mrk_antenna pixel_origin model angles grid hand against"
-    " against_spacing against_position_sd catalogue utc epoch faintest points point_sd decimals"
+    " settings cubes jigsaw photos_dir photos_crs gnss gnss_crs gnss_antenna mrk_antenna pixel_origin model"
+    " angles grid hand against against_spacing against_position_sd catalogue utc epoch faintest points"
+    " point_sd decimals"
     " format zero_missing ground_unit model_unit restart start reject photos kind board spacing unit"
     " shape knots knot_sd cameras size views within sync offsets",
     "Results": "out overwrite json xlsx html no_html plots plot_format parquet crs map ply ply_origin listing"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -101,6 +102,24 @@ class Additions:
         ),
     ] = None
     photos_crs: PhotosCrs = None
+    gnss: Annotated[
+        InputFile,
+        typer.Option(
+            metavar="FILE",
+            help="Positions of photos: table, geo.txt, .MRK, RTKLIB events.",
+        ),
+    ] = None
+    gnss_crs: Annotated[
+        str | None,
+        typer.Option(metavar="CRS", help="CRS of --gnss. Default: of PATH."),
+    ] = None
+    gnss_antenna: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z[,SD]",
+            help="Antenna: right, up, back of the camera (m; SD 0).",
+        ),
+    ] = None
     mrk_antenna: MrkAntenna = False
     pixel_origin: Annotated[
         OriginName | None,
@@ -140,14 +159,18 @@ def project_path(job: Job, path: Path | None) -> Path:
 
 def read_project(job: Job, path: Path, added: Additions) -> Project:
     """Read what lies at a path, with what a user adds; its files are inputs of the job from now on."""
-    from photogram.formats import PhotoFiles, Wishes, read
+    from photogram.formats import GnssFile, PhotoFiles, Wishes, read
     from photogram.formats.columns import columns_given
     from photogram.formats.names import with_names
     from photogram.formats.supplements import deviations, with_control, with_images, with_repeated, with_sd
 
-    if added.photos_dir is None and (added.photos_crs or added.mrk_antenna):
-        option = "--photos-crs" if added.photos_crs else "--mrk-antenna"
-        raise typer.BadParameter("requires --photos-dir DIR", param_hint=option)
+    if added.photos_dir is None and added.photos_crs:
+        raise typer.BadParameter("requires --photos-dir DIR", param_hint="--photos-crs")
+    if added.photos_dir is None and added.gnss is None and added.mrk_antenna:
+        raise typer.BadParameter("requires --photos-dir DIR or --gnss FILE", param_hint="--mrk-antenna")
+    if added.gnss is None and (added.gnss_crs or added.gnss_antenna):
+        option = "--gnss-crs" if added.gnss_crs else "--gnss-antenna"
+        raise typer.BadParameter("requires --gnss FILE", param_hint=option)
     if added.cubes is None and added.jigsaw is not None:
         raise typer.BadParameter("says how the images of --cubes are adjusted", param_hint="--jigsaw")
     job.reads_inside(path)
@@ -164,6 +187,9 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
         photos=None
         if added.photos_dir is None
         else PhotoFiles(added.photos_dir, added.photos_crs, added.mrk_antenna),
+        gnss=None
+        if added.gnss is None
+        else GnssFile(added.gnss, added.gnss_crs, _antenna(added.gnss_antenna), added.mrk_antenna),
         cubes=added.cubes,
         jigsaw=added.jigsaw,
         settings=added.settings or (),
@@ -180,6 +206,22 @@ def read_project(job: Job, path: Path, added: Additions) -> Project:
     if added.control is not None:
         project = with_control(project, added.control, sd, added.control_crs, columns)
     return project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
+
+
+def _antenna(text: str | None) -> tuple[float, float, float, float] | None:
+    """Return the position of an antenna and its standard deviation from `X,Y,Z` or `X,Y,Z,SD`."""
+    if text is None:
+        return None
+    try:
+        x, y, z, sd = map(float, (text if text.count(",") == 3 else f"{text},0").split(","))
+    except ValueError:
+        sd = x = y = z = math.nan
+    if not (math.isfinite(x + y + z) and sd >= 0):
+        raise typer.BadParameter(
+            f"must be 3 or 4 numbers in metres, as 0.0,0.08,0.1,0.01, got {text!r}",
+            param_hint="--gnss-antenna",
+        )
+    return x, y, z, sd
 
 
 def described(project: Project) -> list[Section]:

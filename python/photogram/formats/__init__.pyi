@@ -6,6 +6,7 @@ from .crs import to_frame as to_frame
 from .crs_results import Placed as Placed
 from .crs_results import placed as placed
 from .format import Format as Format
+from .format import GnssFile as GnssFile
 from .format import PhotoFiles as PhotoFiles
 from .format import Wishes as Wishes
 from .metadata.merged import Metadata as Metadata

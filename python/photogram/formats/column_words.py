@@ -10,6 +10,10 @@ import re
 import unicodedata
 from collections.abc import Mapping
 
+PHOTO_WORDS = frozenset(
+    {"photo", "image", "image name", "imagename", "filename", "file name", "file", "picture"}
+)
+"""Headings of the column of photos, in tables that have one."""
 ROLE = "use"
 """The column that says who is check and who is control."""
 _COLUMNS: Mapping[str, Mapping[str, str]] = {

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.formats.column_words import (
     ANGULAR,
+    PHOTO_WORDS,
     ROLE,
     UNITS,
     column_of,
@@ -98,7 +99,9 @@ class Columns:
             for place in _places(heading, own):
                 names[place] = heading
         taken = {*names, *(each for each in own if each in known)}
-        for k, heading in enumerate(own):
+        # A heading of photos has precedence over one that names anything.
+        for k in sorted(range(len(own)), key=lambda k: not is_photo(own[k])):
+            heading = own[k]
             if names[k] or not heading:
                 continue
             if heading in known:
@@ -107,17 +110,23 @@ class Columns:
                 continue
             meaning = column_of(heading) or ""
             column = ANGULAR.get(meaning, meaning)
-            column = "photo" if column == "point" and "point" not in known else column
+            if "photo" in known and (is_photo(heading) or (column == "point" and "point" not in known)):
+                column = "photo"
             fits = (column in known and (column != ROLE or "cov_xz" in known)) or (
                 column == "sd_xy" and "sd_x" in known
             )
-            first = column not in taken or column not in ("point", ROLE)
+            first = column not in taken or column not in ("point", "photo", ROLE)
             names[k] = column if fits and first and column not in self.headings else heading
             taken.add(names[k])
         return names
 
 
 PLAIN = Columns()
+
+
+def is_photo(heading: str) -> bool:
+    """Whether a heading is the column of photos."""
+    return " ".join(words_of(heading)) in PHOTO_WORDS
 
 
 def _places(heading: str, own: Sequence[str]) -> list[int]:

@@ -17,6 +17,8 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 
 WGS84 = "EPSG:4979"
+SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")
+"""How the first line of a list begins, in capital letters."""
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 DIFFER = 1e-6
 _IMAGES = ("photo", "point", "column", "row")
@@ -55,7 +57,7 @@ def read_control_list(path: Path, project: Project) -> ControlList | None:
     if path.suffix.lower() == ".json":
         return _of_json(path, project)
     first = next((line.strip() for line in read_lines(path) if line.strip()), "")
-    if first.upper().startswith(("WGS84", "EPSG:", "+PROJ=")):
+    if first.upper().startswith(SYSTEMS):
         return _of_text(path)
     return None
 

@@ -12,7 +12,7 @@ from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.results.result import Result
 
-__all__ = ["Format", "PhotoFiles", "Wishes", "later"]
+__all__ = ["Format", "GnssFile", "PhotoFiles", "Wishes", "later"]
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
@@ -44,6 +44,38 @@ class PhotoFiles:
 
 
 @dataclass(frozen=True)
+class GnssFile:
+    """A file with positions of photos, and what a user specifies about them.
+
+    Attributes
+    ----------
+    path
+        A table of photo, x, y, z, a geolocation file of Pix4D, a reference of Metashape, `geo.txt` of
+        OpenDroneMap, an .MRK file of DJI, or events of RTKLIB (`*_events.pos`).
+    crs
+        The system of positions if the file does not name it; None: the frame of the project.
+    antenna
+        x, y, z of the antenna in the axes of the photo (right, up, back towards the viewer) from the
+        projection centre, and one standard deviation of them (0: fixed; `inf`: free), metres; None: positions
+        are projection centres.
+    mrk_antenna
+        Whether positions of .MRK files are antenna positions.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from photogram.formats import GnssFile, Wishes
+    >>> Wishes(gnss=GnssFile(Path("geo.txt"), antenna=(0.0, 0.08, 0.1, 0.01))).gnss.crs is None
+    True
+    """
+
+    path: Path
+    crs: str | None = None
+    antenna: tuple[float, float, float, float] | None = None
+    mrk_antenna: bool = False
+
+
+@dataclass(frozen=True)
 class Wishes:
     """What a user says of files that do not say it themselves.
 
@@ -63,6 +95,8 @@ class Wishes:
         What the columns of the control of a plain project are.
     photos
         Where its photographs lie, whose files carry positions; None: as the project says.
+    gnss
+        A file with positions of photos, which become observations; None: without.
     cubes
         The list of cubes or ISDs of a control network.
     jigsaw
@@ -78,6 +112,7 @@ class Wishes:
     sd: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     columns: Columns = PLAIN
     photos: PhotoFiles | None = None
+    gnss: GnssFile | None = None
     cubes: Path | None = None
     jigsaw: str | None = None
     settings: Sequence[str] = ()

@@ -177,7 +177,7 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
             if (own := [each for each in wishes.sd if each not in SD]) and chosen.name != "plain":
                 raise InputError(f"is no plain project but {chosen.title}, which has no {own[0]}: --sd")
             project = chosen.read(path, wishes)
-            if wishes.photos is not None or "settings" in project.details:
+            if wishes.photos or wishes.gnss or "settings" in project.details:
                 from photogram.formats.metadata.adding import with_wished_photos
 
                 project = with_wished_photos(project, wishes)

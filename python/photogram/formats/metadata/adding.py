@@ -3,36 +3,69 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.format import PhotoFiles, Wishes
+from photogram.formats.format import GnssFile, PhotoFiles, Wishes
+from photogram.formats.metadata.gnss_file import read_gnss_file
 from photogram.formats.metadata.merged import WITHOUT, Metadata, counts, read_metadata, remarks_on, told
 from photogram.formats.metadata.record import ELLIPSOIDAL
+from photogram.formats.metadata.rtklib import SOURCE as EVENTS
 from photogram.formats.metadata.search import Photos
-from photogram.formats.metadata.systems import LEVER_SD, SHIFT_SD, Located, located
+from photogram.formats.metadata.systems import GNSS_CRS, LEVER_SD, PHOTOS_CRS, SHIFT_SD, Located, located
 from photogram.formats.models import carried, is_free
 from photogram.formats.plain.settings import Settings
+from photogram.formats.plain.tables import covariances_of
 from photogram.formats.project import Frame, Project
 from photogram.messages import Message, counted, listed
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 from photogram.network.unknowns import LeverArm, Shift
 
+SIMILAR = 10.0
+"""How much better a model must fit positions in its own frame after a similarity to be carried onto them."""
 DETERMINED = 3.0
 """How much wider than their misfit positions must spread across their line to turn a model."""
 
 
 def with_wished_photos(project: Project, wishes: Wishes) -> Project:
-    """Return a project with the positions that files of its photographs carry, where these are named."""
+    """Return a project with the positions of a file `--gnss`, and of the files of its photographs."""
     settings = project.details.get("settings")
     own = settings if isinstance(settings, Settings) else None
     files = wishes.photos or (None if own is None else own.photo_files)
-    if files is None:
-        return project
-    return with_photo_files(project, files, wishes.sd if own is None else own.sd)
+    sd = wishes.sd if own is None else own.sd
+    if wishes.gnss is not None:
+        project = with_gnss_file(project, wishes.gnss, sd, None if files is None else files.directory)
+    return project if files is None else with_photo_files(project, files, sd)
+
+
+def with_gnss_file(
+    project: Project, file: GnssFile, sd: Mapping[str, tuple[float, ...]], directory: Path | None = None
+) -> Project:
+    """Return a project with the positions of a file as observations, which replace those of the project.
+
+    `sd` are standard deviations by table, of which `gnss` applies to positions without one; `directory` is
+    the folder of all photographs, in whose order events belong to photos.
+    """
+    metadata = read_gnss_file(file.path, project.block.photo_ids, directory, mrk_antenna=file.mrk_antenna)
+    keys = _keys(project, metadata, weighted_only=True)
+    others = [
+        each for each in project.block.observations if not (isinstance(each, Position) and each.photo in keys)
+    ]
+    messages = list(project.messages)
+    if replaced := len(project.block.observations) - len(others):
+        text = f"{counted(replaced, 'observed position')} of the project are replaced by those of this file"
+        messages.append(Message(text, file.path))
+    if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
+        text = "events belong to photos in their order"
+        if file.antenna is None:
+            text += "; they are antenna positions, and --gnss-antenna X,Y,Z gives the lever arm (assumed: 0)"
+        messages.append(Message(text, file.path))
+    project = project.replace(block=project.block.replace(observations=others), messages=tuple(messages))
+    return _with_positions(project, metadata, keys, file.crs, sd, GNSS_CRS, file.antenna)
 
 
 def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple[float, ...]]) -> Project:
@@ -45,32 +78,50 @@ def with_photo_files(project: Project, files: PhotoFiles, sd: Mapping[str, tuple
     any.
     """
     metadata = read_metadata(files.directory, mrk_antenna=files.mrk_antenna)
-    records = {name: metadata.photos[key] for name, key in _keys(project, metadata).items()}
+    return _with_positions(project, metadata, _keys(project, metadata), files.crs, sd, PHOTOS_CRS)
+
+
+def _with_positions(
+    project: Project,
+    metadata: Metadata,
+    keys: Mapping[str, str],
+    crs: str | None,
+    sd: Mapping[str, tuple[float, ...]],
+    option: str,
+    antenna: tuple[float, float, float, float] | None = None,
+) -> Project:
+    """Return a project with positions of the photos that `keys` names, as observations."""
+    records = {name: metadata.photos[key] for name, key in keys.items()}
     there = [name for name, each in records.items() if each.position is not None]
     photos = [name for name in there if records[name].deviations is not None or "gnss" in sd]
     lacking = len(there) - len(photos)
-    known = located([records[name] for name in photos], files.crs, sd.get("gnss"))
+    known = located([records[name] for name in photos], crs, sd.get("gnss"), option)
     messages = [*metadata.messages, *remarks_on(known.records)]
     if photos:
-        messages += _told(metadata, known)
+        messages += _told(metadata, known, antenna)
     lacks = list(project.lacks)
     if lacking:
         lacks.append(f"no standard deviations of {counted(lacking, 'position')} of photos (--sd gnss=...)")
-    read = {"further inputs": metadata.tables, "photo pictures": metadata.pictures}
+    inputs = tuple(project.details.get("further inputs", ())) + metadata.tables
+    pictures = tuple(project.details.get("photo pictures", ())) + metadata.pictures
+    read = {"further inputs": inputs, "photo pictures": pictures}
     project = project.replace(
         messages=(*project.messages, *messages), lacks=tuple(lacks), details={**project.details, **read}
     )
     if not photos:
         return project
     project, xyz, covariances = _in_frame(project, known, photos)
-    observed = _observations(project, known, photos, xyz, covariances)
+    observed = _observations(project, known, photos, xyz, covariances, antenna)
     return project.replace(block=project.block.replace(observations=[*project.block.observations, *observed]))
 
 
-def _keys(project: Project, metadata: Metadata) -> dict[str, str]:
-    """Return what the folder calls the photos of a project whose position nobody has observed."""
+def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) -> dict[str, str]:
+    """Return the name in the metadata of each photo whose position has no observation yet.
+
+    With `weighted_only` only weighted positions of photos count, and no other observation.
+    """
     block = project.block
-    observed = {each.photo for each in block.observations if isinstance(each, Position)}
+    observed = {each.photo for each in block.observations if isinstance(each, Position) and not weighted_only}
     weighted = np.flatnonzero(np.isfinite(block.photo_position_sd).any(axis=1)).tolist()
     observed |= {block.photo_ids[row] for row in weighted}
     photos = Photos(metadata.photos)
@@ -96,7 +147,9 @@ def _keys(project: Project, metadata: Metadata) -> dict[str, str]:
     return found
 
 
-def _told(metadata: Metadata, known: Located) -> list[Message]:
+def _told(
+    metadata: Metadata, known: Located, antenna: tuple[float, float, float, float] | None
+) -> list[Message]:
     """Return what is said of positions that are observations: their sources, and what they have in common."""
     records = known.records
     count = counted(len(records), "position")
@@ -107,10 +160,11 @@ def _told(metadata: Metadata, known: Located) -> list[Message]:
     text = f"{count} of photos are observations ({positions}); standard deviations: {', '.join(said)}"
     found = [Message(text, metadata.directory)]
     if flights := {each for each in known.flights if each}:
+        arm = f"a lever arm ({LEVER_SD:g} m)" if antenna is None else "the lever arm of the antenna"
         found.append(
             Message(
-                f"{counted(len(flights), 'flight')} of RTK: a shift ({SHIFT_SD:g} m a priori) and a lever arm"
-                f" ({LEVER_SD:g} m) for each, as standard deviations of receivers leave out the base and the"
+                f"{counted(len(flights), 'flight')} of RTK: a shift ({SHIFT_SD:g} m a priori) and {arm}"
+                " for each, as standard deviations of receivers leave out the base and the"
                 " shutter's time"
             )
         )
@@ -124,7 +178,13 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
     frame = project.frame
     if project.block.linear_unit != "m":
         raise InputError("with positions of photos the unit of length is the metre", file=project.path)
-    if frame.kind == "cartesian" and frame.crs:
+    if not known.systems[0]:
+        if frame.kind == "geographic":
+            raise InputError(f"positions of photos need their system of coordinates: {GNSS_CRS} CRS")
+        xyz, covariances, remarks = known.xyz, covariances_of(known.sd), list[str]()
+        if is_free(project) and not np.isfinite(project.block.point_sd).any():
+            project = _placed(project, photos, xyz, frame)
+    elif frame.kind == "cartesian" and frame.crs:
         earth, turned, remarks = known.in_frame(Frame("geocentric"))
         xyz, covariances = from_frame(frame.crs, earth, turned, Frame("geocentric"))
     elif has_place(frame):
@@ -158,6 +218,9 @@ def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) 
     posed = np.isfinite(model).all(axis=1)
     if np.count_nonzero(posed) > 2:
         scale, turn, shift, misfit = similarity(model[posed], xyz[posed])
+        before = float(np.sqrt(np.mean((model[posed] - xyz[posed]) ** 2)))
+        if frame == project.frame and before <= SIMILAR * misfit:
+            return project
         across = np.linalg.svd(xyz[posed] - xyz[posed].mean(axis=0), compute_uv=False)[1]
         if DETERMINED * misfit * np.sqrt(3 * np.count_nonzero(posed)) < across:
             text = f"the model is carried onto {np.count_nonzero(posed)} positions of photos by a similarity:"
@@ -176,23 +239,32 @@ def _placed(project: Project, photos: Sequence[str], xyz: Floats, frame: Frame) 
 
 
 def _observations(
-    project: Project, known: Located, photos: Sequence[str], xyz: Floats, covariances: Floats
+    project: Project,
+    known: Located,
+    photos: Sequence[str],
+    xyz: Floats,
+    covariances: Floats,
+    antenna: tuple[float, float, float, float] | None,
 ) -> list[Position]:
-    """Return the observations, with what those of a flight have in common."""
+    """Return the observations, with the unknowns that positions of a flight have in common."""
+    *arm, arm_sd = antenna or (0.0, 0.0, 0.0, LEVER_SD)
+    groups = [record.flight if record.rtk or (antenna and arm_sd) else "" for record in known.records]
     taken = {own.title for each in project.block.observations for own in each.unknowns if own is not None}
     common: dict[str, tuple[LeverArm, Shift]] = {}
-    for flight in dict.fromkeys(each for each in known.flights if each):
+    for flight in dict.fromkeys(each for each in groups if each):
         name = flight
         while taken & {f"{kind.KIND} {name}" for kind in (LeverArm, Shift)}:
             name += "'"
-        common[flight] = LeverArm(name, 0.0, LEVER_SD), Shift(name, 0.0, SHIFT_SD)
+        common[flight] = LeverArm(name, arm, arm_sd), Shift(name, 0.0, SHIFT_SD)
     return [
         Position(
             photo,
             position,
             covariance=covariance,
-            lever_arm=common[flight][0] if flight else 0.0,
-            shift=common[flight][1] if flight else None,
+            lever_arm=common[group][0] if group and arm_sd else arm,
+            shift=common[group][1] if flight else None,
         )
-        for photo, position, covariance, flight in zip(photos, xyz, covariances, known.flights, strict=True)
+        for photo, position, covariance, group, flight in zip(
+            photos, xyz, covariances, groups, known.flights, strict=True
+        )
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from photogram.formats.metadata.record import FIXED, Said
@@ -14,7 +14,16 @@ from photogram.messages import Message, counted, listed
 from photogram.show.sections import Section
 from photogram.show.summary import Brief
 
-__all__ = ["WITHOUT", "Metadata", "PhotoRecord", "counts", "read_metadata", "remarks_on", "told"]
+__all__ = [
+    "WITHOUT",
+    "Metadata",
+    "PhotoRecord",
+    "counts",
+    "metadata_of",
+    "read_metadata",
+    "remarks_on",
+    "told",
+]
 
 WITHOUT = "without"
 
@@ -55,9 +64,9 @@ class Metadata(Brief):
     Attributes
     ----------
     directory
-        The folder.
+        The folder, or the file with positions.
     photos
-        By their paths below the folder.
+        By their paths below the folder, or their names in the file.
     tables, pictures
         Files that were read: tables and .MRK files, and pictures, of these the heads.
     messages
@@ -144,19 +153,31 @@ def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = Fals
     """
     path = Path(directory)
     found = found_in(path, antenna=mrk_antenna)
+    return metadata_of(path, found.said, found.flights, found.tables, found.pictures, found.messages)
+
+
+def metadata_of(
+    path: Path,
+    said: Mapping[str, Sequence[Said]],
+    flights: Mapping[str, str],
+    tables: Sequence[Path],
+    pictures: Sequence[Path],
+    messages: Sequence[Message],
+) -> Metadata:
+    """Return the record of each photo by its sources, of which the first that has a value counts."""
     photos, without_height = {}, []
-    for key, sources in found.said.items():
+    for key, sources in said.items():
         position = next((each for each in sources if each.is_located), None)
         if position is None and any(each.position is not None for each in sources):
             without_height.append(key)
         deviations = next((each for each in sources if each.sd is not None), None)
-        photos[key] = PhotoRecord(key, found.flights[key], position, deviations)
-    messages = list(found.messages)
+        photos[key] = PhotoRecord(key, flights[key], position, deviations)
+    remarks = list(messages)
     if without_height:
-        messages.append(
+        remarks.append(
             Message(f"positions without a height are not taken: {listed(without_height, 3)}", path)
         )
-    return Metadata(path, photos, tuple(found.tables), tuple(found.pictures), tuple(messages))
+    return Metadata(path, photos, tuple(tables), tuple(pictures), tuple(remarks))
 
 
 def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:

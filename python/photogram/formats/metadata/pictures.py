@@ -11,6 +11,7 @@ import math
 import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,8 @@ from photogram.messages import quoted
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff", ".dng")
 GPS = 0x8825
 """The tag of EXIF that leads to those of GPS."""
+_EXIF, _TAKEN, _FRACTION = 0x8769, 0x9003, 0x9291
+"""Tags of EXIF: to its own tags, and of these DateTimeOriginal and SubSecTimeOriginal."""
 
 LATITUDE, LONGITUDE, ALTITUDE_REFERENCE, ALTITUDE, STATUS, DOP, ERROR = 2, 4, 5, 6, 9, 11, 31
 """Tags by their numbers (EXIF 2.32, table 15); the letter of a coordinate is the tag before it."""
@@ -49,13 +52,23 @@ _SPELLINGS = {"GpsLongtitude": "GpsLongitude"}
 
 def said_by_picture(path: Path) -> list[Said]:
     """Return what the head of a picture says: of its XMP, then of its EXIF; nothing where neither speaks."""
-    packet, tags = _head(path)
+    packet, tags = _head(path, GPS)
     found = [None if packet is None else said_by_packet(packet, path), said_by_tags(tags, Place(path))]
     return [each for each in found if each is not None]
 
 
-def _head(path: Path) -> tuple[bytes | None, Mapping[int, Any]]:
-    """Return the packet of XMP and the GPS tags of a picture.
+def time_of_picture(path: Path) -> float | None:
+    """Return the time at which a picture was taken by its EXIF, seconds; None without one."""
+    tags = _head(path, _EXIF)[1]
+    try:
+        time = datetime.strptime(str(tags[_TAKEN]).strip("\0 "), "%Y:%m:%d %H:%M:%S")
+        return (time - datetime.min).total_seconds() + float(f"0.{str(tags.get(_FRACTION, 0)).strip()}")
+    except (KeyError, ValueError):
+        return None
+
+
+def _head(path: Path, group: int) -> tuple[bytes | None, Mapping[int, Any]]:
+    """Return the packet of XMP and a group of EXIF tags of a picture.
 
     The class of the format is opened itself: Image.open refuses large pictures, which are not decoded here.
     """
@@ -74,7 +87,7 @@ def _head(path: Path) -> tuple[bytes | None, Mapping[int, Any]]:
         try:
             with kind(file) as picture:
                 packet = picture.info.get("xmp")
-                tags = dict(picture.getexif().get_ifd(GPS))
+                tags = dict(picture.getexif().get_ifd(group))
         except Exception as error:  # whatever a damaged file makes the library raise
             raise InputError(f"cannot be read as a picture: {error}", file=path) from None
     return (packet if isinstance(packet, bytes) else None), tags

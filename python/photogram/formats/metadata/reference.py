@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -12,8 +13,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.formats.cards import filled_lines
-from photogram.formats.column_words import words_of
-from photogram.formats.columns import PLAIN, is_geographic, settled
+from photogram.formats.column_words import column_of
+from photogram.formats.columns import PLAIN, is_geographic, is_photo, settled
 from photogram.formats.control_lists import system_of
 from photogram.formats.metadata.pictures import ENDINGS
 from photogram.formats.metadata.record import (
@@ -43,33 +44,63 @@ HEAD = 40
 _KNOWN = (*TABLES["gnss"].columns, "enabled")
 _NUMBERS = TABLES["gnss"].numbers
 _REQUIRED = ("photo", *AXES)
-_PIX4D = ("photo", "y", "x", "z", "sd_xy", "sd_z")
-"""Columns of Pix4D's tables, which have no header: latitude comes first."""
-_PHOTO = frozenset({"image", "imagename", "image name", "filename", "file name", "file"})
-"""Headings of the column of photos that in other tables mean something else, or nothing."""
+_PIX4D = {3: (), 5: ("sd_xy", "sd_z"), 6: ("",) * 3, 8: (*("",) * 3, "sd_xy", "sd_z")}
+"""Columns of Pix4D's tables after the position by the count of numbers: angles, accuracies; no header."""
 _SYSTEM = re.compile(r"#\s*CoordinateSystem:\s*(.+)", re.IGNORECASE)
-_CELLS = re.compile(r"[,;\t|]")
+_SEPARATORS = re.compile(r"[,;\t|]")
 
 
-def is_reference(path: Path) -> bool:
-    """Whether a text file is a table of references: photos with positions, with a header or without."""
-    return any(_is_row(line) or _is_header(line) for line in islice(read_lines(path), HEAD))
+def is_reference(path: Path, pictures: Callable[[str], object] | None = None) -> bool:
+    """Whether a text file has positions by the names of photos, with a header or as Pix4D writes them.
+
+    A table with a column of points beside the photos has image observations, as has one without a header
+    that names a photo twice. If the names may be those of points, one must name a picture: by its ending, or
+    by `pictures`, which returns the pictures of a name.
+    """
+    head = [line for line in islice(read_lines(path), HEAD) if line.strip()]
+    for k, line in enumerate(head):
+        if (names := _header(line)) is not None:
+            return _names_photos(names, head[k + 1 :], pictures)
+    first = next((line for line in head if not line.startswith("#") and len(_cells(line)) > 1), "")
+    if not _is_row(first):
+        return False
+    photos = set[str]()
+    for line in read_lines(path):
+        name = _cells(line)[0]
+        if name in photos and _is_row(line):
+            return False
+        photos.add(name)
+    return True
 
 
-def _is_header(line: str) -> bool:
-    cells = _CELLS.split(line.lstrip().removeprefix("#"))
-    return set(_REQUIRED) <= set(_spelled([each.strip().strip('"').lower() for each in cells]))
+def _cells(line: str) -> list[str]:
+    return [each.strip().strip('"') for each in _SEPARATORS.split(line)]
 
 
-def _spelled(own: Sequence[str]) -> list[str]:
-    """Return our names of columns: a photo may be called an image or a file here."""
-    return PLAIN.spelled(_KNOWN, ["photo" if " ".join(words_of(each)) in _PHOTO else each for each in own])
+def _header(line: str) -> list[str] | None:
+    """Return the headings of a line that names photos and positions; None for another line."""
+    own = [each.lower() for each in _cells(line.lstrip().removeprefix("#"))]
+    return own if set(_REQUIRED) <= set(PLAIN.spelled(_KNOWN, own)) else None
+
+
+def _names_photos(own: Sequence[str], lines: Sequence[str], pictures: Callable[[str], object] | None) -> bool:
+    if any(is_photo(each) for each in own):
+        return not any(column_of(each) == "point" for each in own)
+    column = PLAIN.spelled(_KNOWN, own).index("photo")
+    names = [cells[column] for line in lines if len(cells := _cells(line)) > column]
+    if pictures is None:
+        return own[column] == "label" or any(_is_picture(name) for name in names)
+    return any(_is_picture(name) or pictures(name) for name in names)
+
+
+def _is_picture(name: str) -> bool:
+    return name.lower().endswith(ENDINGS)
 
 
 def _is_row(line: str) -> bool:
-    """Whether a line is one of Pix4D's: a photo, and three or five numbers."""
-    name, *numbers = (each.strip() for each in _CELLS.split(line))
-    if not name.lower().endswith(ENDINGS) or len(numbers) not in (3, 5):
+    """Whether a line is one of Pix4D's: a photo, and its numbers."""
+    name, *numbers = _cells(line)
+    if not _is_picture(name) or len(numbers) not in _PIX4D:
         return False
     try:
         return all(math.isfinite(finite_number(each)) for each in numbers)
@@ -109,12 +140,17 @@ def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
 def _table(path: Path, head: Sequence[str], messages: list[Message]) -> tuple[ColumnTable, bool]:
     """Return the table with its columns in our units, and whether they are longitudes and latitudes."""
     rows = [line for line in head if _is_row(line)]
-    plain = bool(rows) and not any(_is_header(line) for line in head)
+    plain = bool(rows) and not any(_header(line) for line in head)
+    angular = False
     if plain:
-        table = read_rows(path, _PIX4D[: len(_CELLS.split(rows[0]))], numbers=(*_NUMBERS, "sd_xy"))
+        numbers = [finite_number(each) for each in _cells(rows[0])[1:]]
+        angular = abs(numbers[0]) <= 90 and abs(numbers[1]) <= 180
+        axes = ("y", "x", "z") if angular else AXES
+        table = read_rows(path, ("photo", *axes, *_PIX4D[len(numbers)]), numbers=(*_NUMBERS, "sd_xy"))
     else:
-        table = read_columns(path, known=_KNOWN, numbers=_NUMBERS, spelling=_spelled)
-    return settled(table, PLAIN, _KNOWN, 1.0, _REQUIRED, (), SOURCE, messages), plain or is_geographic(table)
+        table = read_columns(path, known=_KNOWN, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
+        angular = is_geographic(table)
+    return settled(table, PLAIN, _KNOWN, 1.0, _REQUIRED, (), SOURCE, messages), angular
 
 
 def _deviations(table: ColumnTable) -> Floats:

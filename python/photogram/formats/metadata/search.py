@@ -17,7 +17,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, counted, listed, quoted
 
 _TEXTS = (".csv", ".txt")
-_EXPOSURES = ".mrk"
+EXPOSURES = ".mrk"
 
 
 @dataclass
@@ -43,12 +43,12 @@ def found_in(directory: Path, *, antenna: bool) -> Found:
     with reading(directory):
         if not directory.is_dir():
             raise InputError("is no folder of photographs", file=directory)
-        files = list(_files(directory))
+        files = list(files_of(directory))
     found = Found()
     pictures = {_key(directory, path): path for path in files if path.suffix.lower() in ENDINGS}
     found.pictures = list(pictures.values())
     given = _tables(directory, files, found)
-    exposures = {path: read_exposures(path) for path in files if path.suffix.lower() == _EXPOSURES}
+    exposures = {path: read_exposures(path) for path in files if path.suffix.lower() == EXPOSURES}
     found.tables += exposures
     if not (pictures or given or exposures):
         endings = ", ".join((*ENDINGS, "*_Timestamp.MRK"))
@@ -65,7 +65,7 @@ def found_in(directory: Path, *, antenna: bool) -> Found:
     return found
 
 
-def _files(directory: Path) -> Iterator[Path]:
+def files_of(directory: Path) -> Iterator[Path]:
     """Yield the files of a folder in their order, but for hidden ones."""
     for folder, folders, names in os.walk(directory):
         folders[:] = sorted(each for each in folders if not each.startswith("."))
@@ -112,7 +112,7 @@ def _tables(directory: Path, files: Sequence[Path], found: Found) -> dict[str, S
     for path in sorted(texts, key=lambda each: (each.name.lower() != GEO_TXT, each)):
         if path.name.lower() == GEO_TXT:
             rows = read_geo_txt(path)
-        elif is_reference(path):
+        elif is_reference(path, photos.meant if found.pictures else None):
             rows = read_reference(path, found.messages)
         else:
             continue

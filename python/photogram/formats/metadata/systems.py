@@ -26,9 +26,10 @@ SHIFT_SD = 0.05
 LEVER_SD = 0.01
 """Metres: that of a lever arm which is already applied."""
 ABOVE = {False: "above the ellipsoid", True: "above the geoid"}
-_OPTION = "--photos-crs EPSG:4326+geoid=46.5 (heights above sea level, and the geoid above the ellipsoid)"
+PHOTOS_CRS, GNSS_CRS = "--photos-crs", "--gnss-crs"
+"""Options that name the system of positions."""
+_SEA_LEVEL = "EPSG:4326+geoid=46.5 (heights above sea level, and the geoid above the ellipsoid)"
 _UNKNOWN = "above the geoid (as mostly) or above the ellipsoid"
-_SAY = f"{_OPTION} or --photos-crs {ELLIPSOIDAL} (heights above the ellipsoid) says it"
 GROUPS = "gnss_groups.csv"
 _COMMENT = (
     "longitude and latitude (degrees), height above the ellipsoid (metres) of WGS 84, standard deviations of"
@@ -83,17 +84,24 @@ class Located:
 
 
 def located(
-    records: Sequence[PhotoRecord], crs: str | None = None, sd: Sequence[float] | None = None
+    records: Sequence[PhotoRecord],
+    crs: str | None = None,
+    sd: Sequence[float] | None = None,
+    option: str = PHOTOS_CRS,
 ) -> Located:
     """Return the positions of photos that have one; heights have to be of one kind.
 
     `crs` is the system of positions whose source does not say it, or not what heights are above; `sd` are
-    standard deviations where no source has any: one number or three, metres.
+    standard deviations where no source has any: one number or three, metres. `option` names the system;
+    positions of `--gnss` without any system are in the frame of the project, and their system is empty.
     """
     known = [each for each in records if each.position is not None]
     said = [each.position for each in known if each.position is not None]
-    systems = _systems(said, crs)
-    _check_heights(known, said, systems)
+    if option == GNSS_CRS and crs is None and not any(each.crs for each in said):
+        systems = [""] * len(said)
+    else:
+        systems = _systems(said, crs, option)
+        _check_heights(known, said, systems, option)
     default = np.broadcast_to(np.nan if sd is None else np.asarray(sd, dtype=float), 3)
     deviations = [each.deviations.sd if each.deviations is not None else default for each in known]
     return Located(
@@ -104,24 +112,28 @@ def located(
     )
 
 
-def _systems(said: Sequence[Said], crs: str | None) -> list[str]:
+def _systems(said: Sequence[Said], crs: str | None, option: str) -> list[str]:
     """Return the system of each position: its own, else the one that a user names; empty without both."""
     from photogram.formats.crs import is_on
 
     if crs is not None and any(each.crs and each.heights for each in said) and not is_on(crs, _WGS84):
         first = next(each for each in said if each.crs and each.heights)
         raise first.place.error(
-            f"its position is longitude and latitude of WGS 84, which {crs} is not: {_SAY}"
+            f"its position is longitude and latitude of WGS 84, which {crs} is not: {_ways(option)}"
         )
     for each in said:
         if not each.crs and crs is None:
-            raise each.place.error(
-                "its file names no system of coordinates: --photos-crs CRS (EPSG:25832 ...)"
-            )
+            raise each.place.error(f"its file names no system of coordinates: {option} CRS (EPSG:25832 ...)")
     return [each.crs if each.crs and not each.heights else crs or "" for each in said]
 
 
-def _check_heights(records: Sequence[PhotoRecord], said: Sequence[Said], systems: Sequence[str]) -> None:
+def _ways(option: str) -> str:
+    return f"{option} {_SEA_LEVEL} or {option} {ELLIPSOIDAL} (heights above the ellipsoid) says it"
+
+
+def _check_heights(
+    records: Sequence[PhotoRecord], said: Sequence[Said], systems: Sequence[str], option: str
+) -> None:
     kinds: dict[str, list[str]] = {}
     for record, own, system in zip(records, said, systems, strict=True):
         kinds.setdefault(_kind(own, system), []).append(f"{record.photo} ({own.source})")
@@ -135,10 +147,10 @@ def _check_heights(records: Sequence[PhotoRecord], said: Sequence[Said], systems
         if own.heights == SEA_LEVEL and not _is_above_geoid(system):
             but = f"heights of {system} are above the ellipsoid" if system else "nothing says where that is"
             raise own.place.error(
-                f"its height is above sea level (altitude reference 2 or 3), but {but}: {_OPTION}"
+                f"its height is above sea level by its file, but {but}: {option} {_SEA_LEVEL}"
             )
     if "" in systems:
-        raise said[0].place.error(f"its height is {_UNKNOWN}, and nothing says which: {_SAY}")
+        raise said[0].place.error(f"its height is {_UNKNOWN}, and nothing says which: {_ways(option)}")
 
 
 def _kind(said: Said, system: str) -> str:
