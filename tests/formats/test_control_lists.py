@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from photogram import InputError, formats
-from photogram.formats.column_words import column_of, role_of, unit_of
+from photogram.formats.column_words import column_of, role_of, units_of
 from photogram.formats.columns import columns_given, degrees
 from photogram.formats.supplements import with_control
 from photogram.io.numbers import marks_of
@@ -131,11 +131,12 @@ def test_roles_and_units():
         *("control", "control", "check", "check", "?", "?"),
         None,
     ]
-    assert [unit_of(each) for each in ("X (ft)", "Elev_us-ft", "Easting [m]", "Höhe")] == [
-        "ft",
-        "us-ft",
-        "m",
-        None,
+    assert [units_of(each) for each in ("X (ft)", "Elev_us-ft", "Easting [m]", "Höhe", "U (k=2) [mm]")] == [
+        ["ft"],
+        ["us-ft"],
+        ["m"],
+        [],
+        ["mm"],
     ]
 
 

@@ -1,5 +1,6 @@
 """The plain project: what is read, what is refused and where, round trips."""
 
+import csv
 import shutil
 from pathlib import Path
 
@@ -417,3 +418,83 @@ def test_a_geographic_block_whose_frame_nobody_has_said_is_written_in_degrees(tm
     flat = simulate(strips=1, photos_per_strip=3).block
     with pytest.raises(InputError, match="the frame is geographic, but the block is rectangular"):
         project.replace(block=flat, frame=formats.Frame("geographic"))
+
+
+# Headings of other tables, units, coverage factors
+
+
+def head_of(path, *pairs):
+    """Give columns other headings, and their numbers other units: heading before, after, factor."""
+    table = list(csv.reader(line for line in path.read_text().splitlines() if not line.startswith("#")))
+    for old, new, factor in pairs:
+        k = table[0].index(old)
+        table[0][k] = new
+        for row in table[1:]:
+            row[k] = row[k] if factor is None or not row[k] else repr(float(row[k]) * factor)
+    path.write_text("\n".join(",".join(row) for row in table) + "\n")
+
+
+def same_project(found, expected):
+    for name in ("image_xy", "image_sd", "point_positions", "point_sd", "photo_positions"):
+        np.testing.assert_allclose(getattr(found.block, name), getattr(expected.block, name), rtol=1e-12)
+
+
+def test_tables_of_images_have_the_headings_of_tables_of_pixels(example):
+    expected = formats.read(example)
+    pairs = (("photo", "Image"), ("point", "track"), ("column", "u [px]"), ("row", "v (px)"))
+    head_of(example / "images.csv", *((old, new, None) for old, new in pairs))
+    same_project(formats.read(example), expected)
+
+
+def test_units_and_coverage_factors_of_headings(example):
+    control = example / "control.csv"
+    lines = [line for line in control.read_text().splitlines() if not line.startswith("#")]
+    more = ["sd_x,sd_y,sd_z", *["0.02,0.03,0.04"] * (len(lines) - 1)]
+    control.write_text("\n".join(map(",".join, zip(lines, more, strict=True))) + "\n")
+    expected = formats.read(example)
+    axes = [(axis, f"{axis.upper()} [mm]", 1000.0) for axis in "xyz"]
+    sds = [(f"sd_{axis}", f"U_{axis} (k=2) [mm]", 2000.0) for axis in "xyz"]
+    head_of(example / "control.csv", *axes, *sds)
+    head_of(example / "photos.csv", *((axis, f"{axis} (m)", None) for axis in "xyz"))
+    project = formats.read(example)
+    same_project(project, expected)
+    remark = next(each for each in project.messages if each.file and each.file.name == "control.csv")
+    assert "u_x (k=2) [mm] is sd_x in mm, divided by k = 2" in remark.text
+
+
+def test_units_of_tables_without_a_system_are_those_of_the_project(example):
+    text = "from,to,distance [mm],U (k=2) [mm]\nnorth-1,south-1,12345,4\n"
+    (example / "distances.csv").write_text(text)
+    (found,) = (each for each in formats.read(example).block.observations if each.KIND == "distance")
+    assert (float(np.ravel(found.observed)[0]), float(np.ravel(found.sd)[0])) == pytest.approx(
+        (12.345, 0.002)
+    )
+    for old, new in (("[mm],U", "[deg],U"), ("distance [mm]", "distance (k=2)"), ("k=2", "k=0")):
+        (example / "distances.csv").write_text(text.replace(old, new))
+        with pytest.raises(InputError) as caught:
+            formats.read(example)
+        assert (caught.value.file, caught.value.record) == (example / "distances.csv", 1)
+
+
+def test_images_name_the_photos_of_a_project_without_a_table_of_photos(example):
+    expected = formats.read(example)
+    (example / "photos.csv").unlink()
+    found = formats.read(example)
+    assert set(found.block.photo_ids) == set(expected.block.photo_ids)
+    assert np.isnan(found.block.photo_positions).all()
+    cameras = (example / "cameras.csv").read_text().splitlines()
+    rows = [line for line in cameras if not line.startswith("#")]
+    other = rows[1].split(",")
+    other[0] = "other"
+    (example / "cameras.csv").write_text("\n".join([*rows, ",".join(other)]) + "\n")
+    with pytest.raises(InputError, match="column camera"):
+        formats.read(example)
+    table = [line for line in (example / "images.csv").read_text().splitlines() if not line.startswith("#")]
+    name = rows[1].split(",")[0]
+    lines = [f"{table[0]},camera", *(f"{line},{name}" for line in table[1:])]
+    (example / "images.csv").write_text("\n".join(lines) + "\n")
+    assert {each.name for each in formats.read(example).block.cameras} >= {name}
+    lines[1] = lines[1].removesuffix(name) + "other"
+    (example / "images.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match="another camera"):
+        formats.read(example)

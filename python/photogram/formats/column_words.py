@@ -6,20 +6,26 @@ a heading is known where it is one of them, or where all its words mean the same
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 PHOTO_WORDS = frozenset(
     {"photo", "image", "image name", "imagename", "filename", "file name", "file", "picture"}
 )
 """Headings of the column of photos, in tables that have one."""
+PIXEL_WORDS: Mapping[str, str] = {
+    **dict.fromkeys(("x", "u", "col"), "column"),
+    **dict.fromkeys(("y", "v"), "row"),
+}
+"""Headings of image coordinates, in tables that have columns and rows."""
 ROLE = "use"
 """The column that says who is check and who is control."""
 _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "point": {
         "en": "point, points, name, id, pid, number, no, nr, p, pt, pnt, label, marker, target,"
-        " station, mark, ident",
+        " station, mark, ident, track",
         "de": "punkt, punktnummer, punktname, punktnr, pktnr, ptnr, pkt, nummer, bezeichnung, kennung",
         "fr": "nom, numero, num, matricule, repere, cible",
         "es/it/pt": "punto, nombre, nome, ponto, codigo",
@@ -113,10 +119,27 @@ _METRES: Mapping[float, str] = {
     0.01: "cm",
     0.001: "mm",
     0.3048: "ft, feet, foot, ift",
+    1e-6: "um, μm, micron, microns, micrometer, micrometre",
     1200 / 3937: "us-ft, usft, ftus, sft, us survey ft, us survey feet",
+}
+_RADIANS: Mapping[float, str] = {
+    1.0: "rad",
+    1e-3: "mrad",
+    math.pi / 180: "deg, degree, degrees, °",
+    math.pi / 10_800: "arcmin",
+    math.pi / 648_000: "arcsec",
+    math.pi / 200: "gon, grad, grads",
+    math.pi / 200_000: "mgon",
 }
 UNITS: Mapping[str, float] = {word: size for size, words in _METRES.items() for word in words.split(", ")}
 """Units of length in headings, in metres."""
+KINDS_OF_UNITS: Mapping[str, Mapping[str, float]] = {
+    "length": UNITS,
+    "angle": {word: size for size, words in _RADIANS.items() for word in words.split(", ")},
+    "pixel": dict.fromkeys(("px", "pixel", "pixels"), 1.0),
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3},
+}
+"""Units in headings: metres, radians, pixels, seconds."""
 ANGULAR: Mapping[str, str] = {"longitude": "x", "latitude": "y"}
 _SMALL = (
     "coordinate coordinates coord koordinate coordonnee the of de du la des in value wert point"
@@ -127,6 +150,9 @@ _SMALL = (
 )
 _FILLERS = frozenset(_SMALL.split())
 _BRACKETS = re.compile(r"[(\[{]([^)\]}]*)[)\]}]")
+_COVERAGE = re.compile(r"\bk\s*=\s*(\d+(?:[.,]\d*)?)")
+_EXPANDED = re.compile(r"u(xyz|xy|[xyzenh])?")
+"""U, the expanded uncertainty, of which the heading names the coverage factor."""
 
 
 def _looked_up(table: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
@@ -170,11 +196,13 @@ _TOGETHER = {word: column for column, words in _OF_SEVERAL.items() for word in w
 
 def column_of(heading: str) -> str | None:
     """Return our column that a heading means; nothing for one that needs no reading, None if unknown."""
-    words = words_of(heading)
+    words = words_of(_COVERAGE.sub(" ", heading.casefold()))
     if len(words) > 1 and words[-1] in UNITS:
         words.pop()
     if not words:
         return None
+    if coverage_of(heading) is not None and (expanded := _EXPANDED.fullmatch(words[0])):
+        words = ["sd", *([expanded[1]] if expanded[1] else []), *words[1:]]
     if (whole := _KNOWN.get(" ".join(words))) is not None:
         return whole
     if len(words) == 1 and (glued := _GLUED.fullmatch(words[0])):
@@ -198,14 +226,29 @@ def is_angular(heading: str) -> bool:
     return any(_KNOWN.get(word) in ANGULAR for word in words_of(heading))
 
 
-def unit_of(heading: str) -> str | None:
-    """Return the unit of length that a heading has in brackets or at its end, a key of :data:`UNITS`."""
-    inside = _BRACKETS.findall(heading.casefold())
-    words = re.sub(r"[^0-9a-z-]+", " ", heading.casefold()).split()
-    for each in (*inside, words[-1] if len(words) > 1 else ""):
-        if (own := " ".join(each.replace("_", " ").split())) in UNITS:
-            return own
-    return None
+def units_of(heading: str) -> list[str]:
+    """Return the words in brackets of a heading without k=2, else its unit of length at the end."""
+    inside = [_COVERAGE.sub(" ", each) for each in _BRACKETS.findall(heading.casefold())]
+    found = [" ".join(each.replace("_", " ").split()).strip(" ,;") for each in inside]
+    words = re.sub(r"[^0-9a-zμ-]+", " ", heading.casefold()).split()
+    return [each for each in found if each] or ([words[-1]] if len(words) > 1 and words[-1] in UNITS else [])
+
+
+def coverage_of(heading: str) -> float | None:
+    """Return the coverage factor that a heading names as k=2; None without."""
+    match = _COVERAGE.search(heading.casefold())
+    return None if match is None else float(match[1].replace(",", "."))
+
+
+def bare_name(heading: str, known: Collection[str]) -> str | None:
+    """Return the known column that a heading names beside its unit and coverage factor; None for another."""
+    if not all(any(word in units for units in KINDS_OF_UNITS.values()) for word in units_of(heading)):
+        return None
+    words = _COVERAGE.sub(" ", _BRACKETS.sub(" ", heading.casefold())).replace("_", " ").split()
+    names = ["_".join(words)]
+    if len(words) > 1 and words[-1] in UNITS:
+        names.append("_".join(words[:-1]))
+    return next((each for each in names if each in known), None)
 
 
 def role_of(text: str) -> str | None:

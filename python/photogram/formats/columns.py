@@ -5,19 +5,23 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.formats.column_words import (
     ANGULAR,
+    KINDS_OF_UNITS,
     PHOTO_WORDS,
+    PIXEL_WORDS,
     ROLE,
-    UNITS,
+    bare_name,
     column_of,
+    coverage_of,
     is_angular,
     role_of,
-    unit_of,
+    units_of,
     words_of,
 )
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
@@ -40,7 +44,10 @@ SHORT = {"p": "point", "n": "y", "e": "x", "z": "z", "d": "d", "x": "x", "y": "y
 _PLAIN_ROLES = frozenset({"use", "used", "usage", "role", "rolle", "verwendung", "ruolo", "papel", "uso"})
 """Headings of roles and nothing else; a type or a status may be of something else."""
 _FLAGS = {"check": "check", "enabled": "enabled"}
-_LENGTHS = ("x", "y", "z", "sd", "sd_x", "sd_y", "sd_z")
+_WITH_NOTES = ("x", "y", "z", "sd", "sd_x", "sd_y", "sd_z", "sd_xy")
+"""Columns whose headings may have other words in brackets than units: X (UTM32)."""
+Units = Mapping[str, tuple[str, float]]
+"""Kind of the unit of each column, a key of `KINDS_OF_UNITS` or empty, and the size of our unit."""
 _MARKED = frozenset({"x", "xx", "ja", "oui", "si", "sim"})
 _DMS = re.compile(
     r"([NSEW]?)\s*([+-]?)(\d+(?:[.,]\d*)?)"
@@ -108,14 +115,16 @@ class Columns:
                 # Where a user says that another is this column, this is none.
                 names[k] = "" if heading in self.headings else heading
                 continue
-            meaning = column_of(heading) or ""
+            meaning = bare_name(heading, known) or column_of(heading) or ""
             column = ANGULAR.get(meaning, meaning)
             if "photo" in known and (is_photo(heading) or (column == "point" and "point" not in known)):
                 column = "photo"
+            elif column not in known:
+                column = PIXEL_WORDS.get(" ".join(words_of(heading)), column)
             fits = (column in known and (column != ROLE or "cov_xz" in known)) or (
                 column == "sd_xy" and "sd_x" in known
             )
-            first = column not in taken or column not in ("point", "photo", ROLE)
+            first = column not in taken or column not in ("point", "photo", "column", "row", ROLE)
             names[k] = column if fits and first and column not in self.headings else heading
             taken.add(names[k])
         return names
@@ -181,7 +190,7 @@ def settled(
     table: ColumnTable,
     columns: Columns,
     known: Collection[str],
-    length: float,
+    units: Units,
     required: Collection[str],
     names: Collection[str],
     name: str,
@@ -197,8 +206,8 @@ def settled(
         What a user says of it.
     known
         Columns that such a table may have.
-    length
-        What a metre is in the unit of lengths.
+    units
+        Kind and size of the unit of each column.
     required
         Columns that it must have.
     names
@@ -228,21 +237,17 @@ def settled(
         )
     if name == "control":
         table = _with_roles(table, columns, messages)
+    table = in_units(table, units, name, messages, columns.headings)
     ready = dict(table.ready)
     for column, own in table.headings:
         heading = columns.headings.get(column, own)
-        factor = -1.0 if heading.startswith("-") and heading.lower() != own else 1.0
-        unit = unit_of(heading) or unit_of(own)
-        if unit is not None and column in (*_LENGTHS, "sd_xy"):
-            factor *= UNITS[unit] * length
         if column in ("x", "y") and is_angular(own):
             letters = "NS" if column == "x" else "EW"
             ready[column] = table.numbers(column, read=partial(_on_axis, letters))
-        factor = abs(factor) if column.startswith("sd") else factor
         if column == "sd_xy":
-            ready["sd_x"] = ready["sd_y"] = scaled(table.numbers(column, infinite=True), factor)
-        elif factor != 1.0 and column in _LENGTHS:
-            ready[column] = scaled(table.numbers(column, infinite=column.startswith("sd")), factor)
+            ready["sd_x"] = ready["sd_y"] = table.numbers(column, infinite=True)
+        elif column in ("x", "y", "z") and heading.startswith("-") and heading.lower() != own:
+            ready[column] = -table.numbers(column)
     wide = tuple(each for each in ("sd_x", "sd_y") if each in ready and each not in table.columns)
     check_unread(table, columns, known, name, messages)
     return replace(
@@ -251,6 +256,76 @@ def settled(
         columns=(*table.columns, *wide),
         own=(*(table.own or table.columns), *("" for _ in wide)),
     )
+
+
+def in_units(
+    table: ColumnTable,
+    units: Units,
+    name: str,
+    messages: list[Message],
+    headings: Mapping[str, str] = MappingProxyType({}),
+) -> ColumnTable:
+    """Return a table with its numbers in our units, by the units and coverage factors of its headings.
+
+    Parameters
+    ----------
+    table
+        The table, its columns named.
+    units
+        Kind and size of the unit of each column.
+    name
+        Of the table.
+    messages
+        Where a remark with the columns and their units goes.
+    headings
+        Headings that a user gives to columns, whose units count before those of the file.
+
+    Raises
+    ------
+    InputError
+        A unit of another kind, a coverage factor of a column without standard deviations.
+    """
+    ready, remarks = dict(table.ready), list[str]()
+    for column, own in table.headings:
+        heading = headings.get(column, own)
+        heading = heading if units_of(heading) else own
+        kind, size = units.get("sd_x" if column == "sd_xy" else column, (None, 1.0))
+        if kind is None or heading == column:
+            continue
+        factor, parts = 1.0, list[str]()
+        known = KINDS_OF_UNITS.get(kind, {})
+        words = [word for word in units_of(heading) if word in known or not _has_notes(column, own, word)]
+        for word in words[:1]:
+            if word not in known:
+                required = f"one of {', '.join(known)}" if known else "no unit"
+                raise table.head.error(f"column {quoted(own)}: {quoted(word)} must be {required}")
+            factor = known[word] / size
+            parts.append(f"in {word}")
+        if (coverage := coverage_of(own)) is not None:
+            if not column.startswith("sd") or not coverage > 0:
+                raise table.head.error(
+                    f"column {quoted(own)}: only an uncertainty has a coverage factor, which is positive;"
+                    " name the column U (k=2), or remove the factor"
+                )
+            factor /= coverage
+            parts.append(f"divided by k = {coverage:g}")
+        if factor != 1.0:
+            ready[column] = scaled(table.numbers(column, infinite=column.startswith("sd")), factor)
+        if parts:
+            remarks.append(f"{own} is {column} {', '.join(parts)}")
+    remark = Message(f"columns of the table {name} with units: {'; '.join(remarks)}", table.path)
+    if remarks and remark not in messages:
+        messages.append(remark)
+    return replace(table, ready=ready)
+
+
+def _has_notes(column: str, own: str, word: str) -> bool:
+    """Whether a word in brackets of a heading may be a note: X (UTM32), or degrees of longitudes."""
+    angle = word in KINDS_OF_UNITS["angle"]
+    units = any(word in known for known in KINDS_OF_UNITS.values())
+    if column.startswith("sd") and "%" in word:
+        return False
+    return column in _WITH_NOTES and (not units or (angle and (column in "xy" or is_angular(own))))
 
 
 def is_geographic(table: ColumnTable) -> bool:

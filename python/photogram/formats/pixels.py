@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.formats.columns import PLAIN, in_units
 from photogram.formats.format import Format, Wishes
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.plain.cameras import read_cameras
+from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
 from photogram.formats.plain.writing import camera_table, known_cameras
@@ -20,46 +23,28 @@ from photogram.io.column_table import ColumnTable
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
+from photogram.io.rows import DELIMITERS
 from photogram.messages import Message, quoted
 
 TITLE = "table of pixels"
 FILE = "images.csv"
 CAMERAS = "cameras.csv"
-_SYNONYMS = {
-    "image": "photo",
-    "file": "photo",
-    "filename": "photo",
-    "name": "point",
-    "id": "point",
-    "target": "point",
-    "track": "point",
-    "marker": "point",
-    "x": "column",
-    "u": "column",
-    "col": "column",
-    "y": "row",
-    "v": "row",
-}
 _NEEDED = ("photo", "point", "column", "row")
 _NUMBERS = {"column", "row", "sd", "sd_column", "sd_row"}
+_KNOWN = (*_NEEDED, "sd", "sd_column", "sd_row", "camera", "use")
 
 
-def pixel_table(path: Path) -> ColumnTable:
-    """Read a table of image measurements under all usual names of its columns.
+def pixel_table(path: Path, messages: list[Message] | None = None) -> ColumnTable:
+    """Read a table of image measurements under all usual names of its columns; `messages` gets remarks.
 
     Raises
     ------
     InputError
         A column that is missing, or whatever a table refuses.
     """
-    table = read_columns(
-        path,
-        known=_NEEDED,
-        numbers=_NUMBERS,
-        spelling=lambda names: [_SYNONYMS.get(name, name) for name in names],
-    )
+    table = read_columns(path, known=_NEEDED, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
     table.require(*_NEEDED)
-    return table
+    return in_units(table, column_units("images"), "images", [] if messages is None else messages)
 
 
 def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
@@ -81,28 +66,27 @@ def _recognises(path: Path) -> bool:
         begin = read_beginning(path)
     except InputError:
         return False
-    words = {_SYNONYMS.get(each, each) for each in _words(begin)}
-    return set(_NEEDED) <= words
+    return set(_NEEDED) <= set(PLAIN.spelled(_KNOWN, _headings(begin)))
 
 
-def _words(begin: str) -> set[str]:
+def _headings(begin: str) -> list[str]:
     lines = [line for line in begin.replace("\r", "\n").split("\n") if line.strip()]
     for line in lines:
         if not line.lstrip("\xef\xbb\xbf \t").startswith("#"):
             break
     else:
-        return set()
-    for mark in ",;\t|":
-        line = line.replace(mark, " ")
-    return {word.strip('"').lower() for word in line.lstrip("\xef\xbb\xbf").split()}
+        return []
+    line = line.lstrip("\xef\xbb\xbf").casefold()
+    mark = next((each for each in DELIMITERS if each in line), None)
+    return [word.strip().strip('"') for word in line.split(mark)]
 
 
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a table; photos have the only camera of `--camera FILE`, or that of a column `camera`."""
     if wishes.cameras is None:
         raise InputError("a table of pixels has no cameras: --camera FILE gives them", file=path)
-    table = pixel_table(path)
     messages: list[Message] = []
+    table = pixel_table(path, messages)
     cameras = read_cameras(Tables(Settings(path, tables={"cameras": wishes.cameras}), messages))
     photos, points = table.names("photo"), table.names("point")
     which = _cameras_of(table, [each.name for each in cameras.cameras])

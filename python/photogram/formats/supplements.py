@@ -231,7 +231,9 @@ def with_images(project: Project, path: Path, pixel_origin: str | None) -> Proje
     InputError
         Photos that are not there, images that are there already, cameras in millimetres.
     """
-    return _with_table(project, path, pixel_table(path), pixel_origin)
+    messages: list[Message] = []
+    found = _with_table(project, path, pixel_table(path, messages), pixel_origin)
+    return found.replace(messages=(*found.messages, *messages))
 
 
 def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: str | None) -> Project:

@@ -26,7 +26,7 @@ from photogram.formats.metadata.record import (
     geographic_position,
     usable_deviations,
 )
-from photogram.formats.plain.schema import AXES, TABLES, deviation_columns
+from photogram.formats.plain.schema import AXES, TABLES, column_units, deviation_columns
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.files import read_lines
@@ -150,7 +150,7 @@ def _table(path: Path, head: Sequence[str], messages: list[Message]) -> tuple[Co
     else:
         table = read_columns(path, known=_KNOWN, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
         angular = is_geographic(table)
-    return settled(table, PLAIN, _KNOWN, 1.0, _REQUIRED, (), SOURCE, messages), angular
+    return settled(table, PLAIN, _KNOWN, column_units("gnss"), _REQUIRED, (), SOURCE, messages), angular
 
 
 def _deviations(table: ColumnTable) -> Floats:

@@ -57,7 +57,7 @@ def streamable(path: Path) -> bool:
     tables = settings.tables
     return (
         settings.photo_files is None
-        and "images" in tables
+        and {"images", "photos"} <= set(tables)
         and tables["images"].suffix == ".parquet"
         and set(tables) <= {"images", "points", *HELD}
     )

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.formats.images import from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.common_unknowns import made
@@ -50,8 +49,7 @@ class Photos:
 def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
     """Read the table of photos; errors as of :func:`read`."""
     table = tables.read("photos")
-    if table is None:
-        raise InputError("has no table of photos (photos.csv)", file=tables.settings.path)
+    assert table is not None  # the images name photos, too
     texts = table.names_once("photo")
     use = table.flags("use")
     centres = table.vectors(AXES)
@@ -169,6 +167,8 @@ def read_images(tables: Tables, photos: Photos) -> Images:
     """Read the table of images; errors as of :func:`read`."""
     table = tables.read("images")
     assert table is not None
+    if "camera" in table and "photos" in tables.settings.tables:
+        tables.tell("cameras are those of the table photos; the column camera is not read", table.path)
     xs, ys = ("column", "row") if "column" in table else ("x", "y")
     table.require(xs, ys)
     places = {name: row for row, name in enumerate(photos.names)}

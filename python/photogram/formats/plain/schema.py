@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from photogram import _photocore
+from photogram.formats.column_words import KINDS_OF_UNITS, UNITS
+from photogram.formats.columns import Units
 from photogram.lazy_dataclasses import dataclass, field
 
 AXES = ("x", "y", "z")
@@ -170,10 +172,11 @@ TABLES: Mapping[str, Schema] = {
     ),
     "images": Schema(
         ("photo", "point"),
-        ("photo", "point", "use"),
+        ("photo", "point", "use", "camera"),
         ("column", "row", "x", "y", "sd", "sd_x", "sd_y", "sd_column", "sd_row", "level", "correlation"),
         "`photo`, `point`, `column`, `row` (or `x`, `y`); `sd`, or `sd_column`, `sd_row`, or `level` l: that"
-        " of `[sd]`, or 1, times 2^l; `use`; of a line scanner sample and line",
+        " of `[sd]`, or 1, times 2^l; `use`; `camera` (if there are several and no table `photos`); of a line"
+        " scanner sample and line",
         deviations=(1, 2),
     ),
     "points": Schema(
@@ -516,6 +519,53 @@ TABLES: Mapping[str, Schema] = {
     ),
 }
 """In the order in which they are read and written."""
+
+_OF_IMAGES = ("images", "fiducial_images")
+_IMAGE_UNITS = frozenset(("f", "fx", "fy", "c", "cx", "cy", "x0", "y0"))
+"""Parameters of cameras in the unit of images."""
+_OTHER_UNITS = frozenset(
+    (
+        "rates",
+        "velocities",
+        "smoothness",
+        "trajectory_coefficients",
+        "films",
+        "scanners",
+        "knots",
+        "covariances",
+    )
+)
+"""Tables without one unit for all lengths."""
+_LENGTHS = frozenset(
+    (
+        *(*AXES, *DIFFERENCE, *BENDS, *PITCHES, "distance", "range", "length", "constant"),
+        *(f"{kind}_{axis}" for kind in ("lever", "shift") for axis in AXES),
+    )
+)
+_ANGLES = frozenset((*ALL_ANGLES[:9], *ROTATIONS))
+
+
+def column_units(name: str, length: str = "m", angle: str = "deg", image: str = "px") -> Units:
+    """Return kind and size of the unit of each column of numbers of a table, by the units of a project."""
+    metres, radians = UNITS[length], KINDS_OF_UNITS["angle"].get(angle, KINDS_OF_UNITS["angle"]["deg"])
+    of_image = ("pixel", 1.0) if image == "px" else ("length", UNITS[image])
+    found = dict.fromkeys(TABLES[name].numbers, ("", 1.0))
+    for column in found:
+        value = column.removeprefix("sd_")
+        if name in _OF_IMAGES or (name == "cameras" and value in _IMAGE_UNITS):
+            found[column] = of_image if value not in ("level", "correlation") else ("", 1.0)
+        elif name == "fiducials":
+            found[column] = "length", UNITS["mm"]
+        elif value in ("time", "time_offset", "readout"):
+            found[column] = "time", 1.0
+        elif name in _OTHER_UNITS or name == "cameras":
+            continue
+        elif value in _LENGTHS or value == "sd":
+            found[column] = "length", metres
+        elif value in _ANGLES:
+            found[column] = "angle", radians
+    return found
+
 
 if __name__ == "__main__":
     print("| table | columns (required ones first) |\n| --- | --- |")

@@ -11,10 +11,18 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.formats.column_words import UNITS
-from photogram.formats.columns import PLAIN, check_unread, degrees, nameless, settled
+from photogram.formats.column_words import is_angular
+from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, nameless, settled
 from photogram.formats.plain.common_unknowns import Shared
-from photogram.formats.plain.schema import ALL_ANGLES, ANGLES, AXES, POSE, TABLES, covariance_columns
+from photogram.formats.plain.schema import (
+    ALL_ANGLES,
+    ANGLES,
+    AXES,
+    POSE,
+    TABLES,
+    column_units,
+    covariance_columns,
+)
 from photogram.formats.plain.settings import Settings
 from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.column_table import ColumnTable
@@ -32,8 +40,10 @@ DEGREE = 180 / np.pi
 """Of a radian."""
 
 
-def _labelled(columns: Sequence[str]) -> list[str]:
-    return ["point" if column == "label" else column for column in columns]
+def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:
+    """Return our names of columns; latitudes and longitudes need a table with a system of coordinates."""
+    names = PLAIN.spelled(known, own)
+    return [heading if is_angular(heading) else name for heading, name in zip(own, names, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -66,14 +76,14 @@ class Tables:
             It cannot be read, or a column is missing.
         """
         if name not in self.settings.tables:
-            return None
+            return self._photos_of_images() if name == "photos" and "images" in self.settings.tables else None
         schema, path = TABLES[name], self.settings.tables[name]
-        known, numbers = schema.columns, schema.numbers
+        known, numbers, own = schema.columns, schema.numbers, self.settings
+        units = column_units(name, own.length, own.angle, own.image)
         if not schema.has_system:
-            table = read_columns(
-                path, known=known, numbers=numbers, spelling=_labelled if name == "images" else tuple
-            )
+            table = read_columns(path, known=known, numbers=numbers, spelling=partial(_spelled, known))
             table.require(*schema.needed(table.columns))
+            table = in_units(table, units, name, self.messages)
             check_unread(table, PLAIN, known, name, self.messages)
             return table
         given = self.settings.columns.get(name, PLAIN)
@@ -83,9 +93,24 @@ class Tables:
             table = read_columns(
                 path, known=known, numbers=numbers, spelling=partial(given.spelled, known), hint=nameless
             )
-        metre = 1.0 / UNITS[self.settings.length]
         required = schema.needed(table.columns)
-        return settled(table, given, known, metre, required, self.names, name, self.messages)
+        return settled(table, given, known, units, required, self.names, name, self.messages)
+
+    def _photos_of_images(self) -> ColumnTable | None:
+        """Return a table of the photos that the images name, for a project without one."""
+        images = self.read("images")
+        assert images is not None
+        photos = images.names("photo")
+        _, rows = np.unique(photos.rows, return_index=True)
+        cells = {"photo": photos.names}
+        if "camera" in images:
+            texts = images.texts("camera")
+            cells["camera"] = [texts[row] for row in rows.tolist()]
+            for row, photo in enumerate(photos.rows.tolist()):
+                if texts[row] != cells["camera"][photo]:
+                    raise images.error(row, "column camera: the photo had another camera before")
+        records = [images.records[row] for row in rows.tolist()]
+        return ColumnTable(images.path, images.head, tuple(cells), len(rows), cells, records)
 
     def rows(self, name: str) -> ColumnTable:
         """Return a table, one without rows where there is none; errors as :meth:`read`."""
