@@ -39,6 +39,54 @@ def test_an_archive_that_would_grow_without_end_is_refused_by_its_header(tmp_pat
     reads(path, r"holds doc\.xml, which would grow from \d{5} to 80000021 bytes")
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("bomb.psz", b" " * 80_000_000),
+        ("entities.xml", b'<!DOCTYPE d [<!ENTITY a "b">' + b"<!ENTITY c 'd'>" * 10_000 + b"]><document/>"),
+        ("tag.xml", b'<document a="' + b"x" * 2_000_000 + b'"/>'),
+        ("cut.xml", b"<document"),
+    ],
+)
+def test_a_document_that_is_no_root_is_rejected_by_its_reason(tmp_path, name, content):
+    path = tmp_path / name
+    if name.endswith(".psz"):
+        packed(path, content)
+    else:
+        path.write_bytes(content)
+    for place in (path, tmp_path):
+        with pytest.raises(InputError) as found:
+            formats.read(place)
+        assert found.value.file == path
+        assert "plain project" not in found.value.message
+
+
+def workbook(path, cell):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["point", "x"])
+    book.active.append(["a", 1.0])
+    book.save(path)
+    with zipfile.ZipFile(path) as archive:
+        parts = {each: archive.read(each) for each in archive.namelist()}
+    sheet = "xl/worksheets/sheet1.xml"
+    own = parts[sheet].replace(b' t="n"><v>1</v>', b' t="s">' + cell)
+    assert own != parts[sheet]
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for each, content in {**parts, sheet: own}.items():
+            archive.writestr(each, content)
+    return path
+
+
+@pytest.mark.parametrize("cell", [b"<v>inf</v>", b"<v>99</v>", b"<v>" + b" " * 80_000_000 + b"</v>"])
+def test_a_damaged_workbook_is_rejected_with_a_remedy(tmp_path, cell):
+    path = workbook(tmp_path / "control.xlsx", cell)
+    with pytest.raises(InputError) as found:
+        read_columns(path)
+    assert found.value.file == path
+    assert "save " in found.value.message
+
+
 def test_an_archive_unpacks_no_more_than_its_header_says(tmp_path):
     content = b"<document>" + b"<a/>" * 100_000 + b"</document>"
     path = packed(tmp_path / "liar.xml", content)

@@ -20,6 +20,7 @@ from photogram.formats.format_coordinates import (
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.planes import plane_remarks
 from photogram.formats.project import Project
+from photogram.formats.xml_stream import check_root
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
@@ -123,6 +124,7 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
     with reading(path):
         path.stat()
         found = [(each, path) for each in among if each.recognises(path)]
+        files = [path]
         if not found and path.is_dir():
             files = [each for each in sorted(path.iterdir())[:MOST] if each.is_file()]
             found = [(each, file) for file in files for each in among if each.recognises(file)]
@@ -137,6 +139,8 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
             for each, where in found
         )
         raise InputError(f"may be read as {several}: say which", file=path)
+    for each in files:
+        check_root(each)
     what = "folder holds" if path.is_dir() else "file is"
     titles = listed([f"{each.title} ({each.name})" for each in FORMATS.values()], len(FORMATS))
     raise InputError(f"the {what} none of the formats that are known: {titles}{_beside(path)}", file=path)

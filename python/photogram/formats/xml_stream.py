@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import lzma
 import xml.parsers.expat
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,11 +13,14 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.archives import UNPACKABLE, check_unpacked_size
 from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 
+SUFFIXES = (".xml", ".psz")
+"""The endings of documents, and of archives with a document."""
 PIECE = 1 << 16
 DEEPEST = 200
 LONGEST = 1 << 20
@@ -27,12 +28,8 @@ LONGEST = 1 << 20
 MOST = 1_000_000
 """Elements that are kept until what holds them is handed over; 64 characters of theirs count as another."""
 CHARACTERS = 64
-RATIO, SMALL = 250, 1 << 26
-"""A document of more bytes than the second is no larger than so many times its packed self."""
-_PACKED_BADLY = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError)
-"""What archives that are damaged, or packed in other ways, end in."""
-_UNREADABLE = (*_PACKED_BADLY, ValueError, LookupError)
-"""And documents in encodings that are none, or none for a parser."""
+_UNREADABLE = (*UNPACKABLE, ValueError, LookupError)
+"""The errors of archives, and of documents in encodings that are none, or none for a parser."""
 
 
 @dataclass
@@ -132,14 +129,7 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
             raise InputError(
                 f"is an archive with {len(names)} documents: one, or doc.xml, is read", file=path
             )
-        header = archive.getinfo(name)
-        # No more is unpacked than the header says.
-        if header.file_size > max(SMALL, RATIO * header.compress_size):
-            raise InputError(
-                f"holds {name}, which would grow from {header.compress_size} to {header.file_size} bytes: no"
-                " document does that",
-                file=path,
-            )
+        check_unpacked_size(path, [archive.getinfo(name)])
         with archive.open(name) as packed:
             yield packed
 
@@ -155,6 +145,18 @@ def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
     except (OSError, InputError, xml.parsers.expat.ExpatError, *_UNREADABLE):
         pass
     return found[0] if found else ("", {})
+
+
+def check_root(path: Path) -> None:
+    """Reject a file that has the name of an XML document and no root element that can be read.
+
+    Raises
+    ------
+    InputError
+        Names the reason: a packed bomb, damage, declared entities, an encoding that is none.
+    """
+    if path.suffix.lower() in SUFFIXES and not (root := root_of(path)[0]):
+        read_stream(path, {}, root)
 
 
 def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: str) -> Element:
@@ -228,7 +230,7 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
                 if fed - parser.CurrentByteIndex > LONGEST:
                     raise Place(path, parser.CurrentLineNumber).error(f"a tag of more than {LONGEST} bytes")
             parser.Parse(b"", True)
-    except _PACKED_BADLY as error:
+    except UNPACKABLE as error:
         raise InputError(f"cannot be unpacked: {error}", file=path) from None
     except xml.parsers.expat.ExpatError as error:
         what = xml.parsers.expat.ErrorString(error.code)

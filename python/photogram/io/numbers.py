@@ -68,6 +68,16 @@ def finite_number(text: str) -> float:
     return value
 
 
+def number_or_text(text: str) -> int | float | str:
+    """Return the number that a text is by the rules of Python, else the text."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
 @dataclass(frozen=True)
 class Marks:
     """How the numbers of a table are written.

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from photogram.errors import InputError
+from photogram.io.archives import check_unpacked_size
 
 LARGEST = 1 << 29
 """Bytes that a workbook may unpack to: beyond, it is no table of a person but an attack."""
@@ -29,6 +30,7 @@ def sheet_text(path: Path) -> str:
         raise InputError("Excel workbooks need openpyxl: pip install photogram[excel]", file=path) from None
     try:
         with zipfile.ZipFile(path) as archive:
+            check_unpacked_size(path, archive.infolist())
             if sum(each.file_size for each in archive.infolist()) > LARGEST:
                 raise InputError(f"unpacks to more than {LARGEST >> 20} MiB", file=path)
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
@@ -41,7 +43,8 @@ def sheet_text(path: Path) -> str:
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", file=path) from None
     except Exception as error:  # whatever a damaged archive makes the library raise
-        raise InputError(f"is no workbook of Excel: {error}", file=path) from None
+        what = f"cannot be read as a workbook of Excel ({type(error).__name__}: {error})"
+        raise InputError(f"{what}: save it again as .xlsx, or as CSV", file=path) from None
     width = max((k + 1 for row in rows for k, cell in enumerate(row) if cell is not None), default=0)
     return "".join("\t".join(_cell(cell) for cell in row[:width]) + "\n" for row in rows)
 

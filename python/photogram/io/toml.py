@@ -199,7 +199,7 @@ class Sections(TomlFile):
         good = all(isinstance(each, int | float) and not isinstance(each, bool) for each in listed)
         if not good or len(listed) not in counts:
             self.fail(section, key, f"{key} is {' or '.join(map(str, counts))} numbers, not {shown(value)}")
-        return tuple(_number(each) for each in listed)
+        return tuple(float_of(each) for each in listed)
 
 
 def _value(text: str) -> Any:
@@ -211,8 +211,8 @@ def _value(text: str) -> Any:
     return value
 
 
-def _number(value: float) -> float:
-    """Return a number; whole ones that no number with decimals can be are infinite."""
+def float_of(value: float) -> float:
+    """Return a number as a float: infinite if a whole number is beyond double precision."""
     if isinstance(value, int) and abs(value) >= 2**1023:
         return math.inf if value > 0 else -math.inf
     return float(value)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from photogram.errors import InputError
-from photogram.io.toml import TomlFile
+from photogram.io.toml import TomlFile, float_of
 from photogram.messages import listed
 
 _LONGEST = 60
@@ -153,12 +153,8 @@ class Table:
         return value
 
     def _number(self, key: str, value: Any) -> float:
-        try:
-            found = (
-                math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
-            )
-        except OverflowError:
-            found = math.nan
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        found = float_of(value) if is_number else math.nan
         if not math.isfinite(found):
             raise self.error(key, f"is {_shown(value)}, not a number")
         return found

@@ -13,12 +13,14 @@ from typing import Any
 
 from photogram.errors import InputError
 from photogram.io.files import read_lines
+from photogram.io.numbers import number_or_text
 from photogram.io.places import Place
 
 DEEPEST = 50
 """Brackets and indents within each other."""
+# Possessive: a run of blanks would be tried in all ways to divide it.
 _KEY = re.compile(
-    r"""("(?:[^"\\]|\\.)*"|'[^']*'|[^\s#'"\[\]{},&*!|>%@`-][^#:]*?|-[^\s#:][^#:]*?)\s*:(?:\s+|$)"""
+    r"""("(?:[^"\\]|\\.)*+"\s*+|'[^']*+'\s*+|[^\s#'"\[\]{},&*!|>%@`-][^#:]*+|-[^\s#:][^#:]*+):(?:\s+|$)"""
 )
 _TAG = re.compile(r"!\S*\s*")
 _TOKEN = re.compile(
@@ -82,7 +84,7 @@ class _Reader:
             key = _KEY.match(line.text)
             if key is None:
                 raise line.place.error("is no `key: value`")
-            name = _scalar_text(key[1])
+            name = _scalar_text(key[1].rstrip())
             if name in found:
                 raise line.place.error(f"the key {name} is there twice")
             found[name] = self._value(line.text[key.end() :], indent, depth)
@@ -128,13 +130,14 @@ class _Reader:
         first = self.lines[self.at].place
         self.at += 1
         tokens = _tokens(text, first)
-        while (missing := _open(tokens, first)) > 0:
+        missing = _opened(tokens, 0, first)
+        while missing > 0:
             if self.at == len(self.lines):
                 raise first.error("has a bracket that is not closed")
-            tokens += _tokens(self.lines[self.at].text, self.lines[self.at].place)
+            more = _tokens(self.lines[self.at].text, self.lines[self.at].place)
+            missing = _opened(more, missing, first)
+            tokens += more
             self.at += 1
-            if missing > DEEPEST:
-                raise first.error("is nested too deeply")
         value, end = _item(tokens, 0, first)
         if end < len(tokens):
             raise first.error("goes on behind its last bracket")
@@ -158,12 +161,14 @@ def _tokens(text: str, place: Place) -> _Tokens:
     return found
 
 
-def _open(tokens: _Tokens, place: Place) -> int:
-    """Return how many brackets are not closed."""
-    kinds = [kind for kind, _ in tokens]
-    depth = sum(kind in "[{" for kind in kinds) - sum(kind in "]}" for kind in kinds)
-    if depth < 0:
-        raise place.error("closes a bracket that was not opened")
+def _opened(tokens: _Tokens, depth: int, place: Place) -> int:
+    """Return how many brackets are open after some tokens, of `depth` before them."""
+    for kind, _ in tokens:
+        depth += (kind in "[{") - (kind in "]}")
+        if depth < 0:
+            raise place.error("closes a bracket that was not opened")
+        if depth > DEEPEST:
+            raise place.error("is nested too deeply")
     return depth
 
 
@@ -206,9 +211,4 @@ def _scalar(text: str) -> Any:
         return _scalar_text(re.sub(r"""(["'])\s+#.*$""", r"\1", text))
     if text.lower() in _WORDS:
         return _WORDS[text.lower()]
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
+    return number_or_text(text)

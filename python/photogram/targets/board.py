@@ -23,6 +23,8 @@ BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric
 Shape = Literal["held", "bend", "points"]
 """What of a board is unknown: nothing, the two deflections of its middle lines, or every point."""
 
+MAX_POINTS = 100_000
+"""Points of a board of columns and rows."""
 MANY_VIEWS = 8
 """Views from which the points of a board are adjusted, where nobody says what its shape is."""
 PLANE_PARTS, SPACING_PARTS = 200.0, 500.0
@@ -61,8 +63,8 @@ class Board(Valued, Brief):
     Raises
     ------
     InputError
-        Another kind or shape, fewer than 2 columns or rows, lengths that are not positive, what does not
-        belong to the kind, a bend of points that lie anywhere.
+        Another kind or shape, fewer than 2 columns or rows, more than 100,000 points in them, lengths that
+        are not positive, what does not belong to the kind, a bend of points that lie anywhere.
     """
 
     kind: BoardKind = "chessboard"
@@ -113,6 +115,12 @@ class Board(Valued, Brief):
             if count < least:
                 raise InputError(f"a board has {least} or more {name}, not {count}")
             self._set(name, count)
+        columns, rows = self.grid
+        if columns * rows > MAX_POINTS:
+            raise InputError(
+                f"columns and rows of a board are {self.columns} and {self.rows}, {columns * rows} points:"
+                f" {MAX_POINTS} points are the most"
+            )
         if self.kind == "aprilgrid":
             self._check_tags()
             return

@@ -12,7 +12,7 @@ from photogram.errors import InputError
 from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
 from photogram.io.json import Tree
-from photogram.io.toml import TomlFile
+from photogram.io.toml import TomlFile, float_of
 from photogram.io.yaml_text import read_yaml_text
 from photogram.messages import nearest
 from photogram.targets.board import Board
@@ -103,7 +103,7 @@ def _value(file: TomlFile, key: str, kind: type | UnionType, what: str) -> Any:
 
 
 def _number(file: TomlFile, key: str) -> float:
-    return float(_value(file, key, int | float, "a number"))
+    return float_of(_value(file, key, int | float, "a number"))
 
 
 _KALIBR = {"aprilgrid": "aprilgrid", "checkerboard": "chessboard", "circlegrid": "circles"}

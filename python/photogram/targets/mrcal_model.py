@@ -131,7 +131,7 @@ def read_lens(path: Path) -> tuple[Camera, tuple[int, int]]:
     try:
         camera = lens_of_mrcal(content["lensmodel"], [*map(float, content["intrinsics"])], path.stem)
         width, height = map(int, content["imagersize"])
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         message = error.message if isinstance(error, InputError) else f"is no camera model: {error!r}"
         raise InputError(message, file=path) from None
     return camera, (width, height)
@@ -143,8 +143,14 @@ def _content(path: Path) -> dict[str, Any]:
         # Literals only: names, calls and operations are refused.
         content: Any = ast.literal_eval(text.lstrip())
     except (ValueError, SyntaxError, MemoryError, RecursionError) as error:
-        record = getattr(error, "lineno", None)
-        raise InputError(f"is no dictionary of Python: {error}", file=path, record=record) from None
+        reason, record = "it has names, calls, operations or deep brackets", None
+        if isinstance(error, SyntaxError):
+            reason, record = error.msg, error.lineno
+        raise InputError(
+            f"must be a dictionary of Python literals, but {reason}: write it again with mrcal",
+            file=path,
+            record=record,
+        ) from None
     if not isinstance(content, dict) or "lensmodel" not in content:
         raise InputError("is no camera model of mrcal: it has no lensmodel", file=path)
     return content

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import io
+import math
 import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io.archives import UNPACKABLE, check_unpacked_size
 from photogram.memory import require
+
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+"""What reads the header of an array, by the version of the format."""
 
 
 class Arrays:
@@ -74,22 +78,45 @@ class Arrays:
 def read_arrays(path: Path, data: bytes) -> Arrays:
     """Read an archive.
 
-    InputError: bytes that are no archive, or arrays of Python objects, which nothing here unpickles.
+    InputError: bytes that are no archive or would grow beyond its limits, damaged headers, or arrays of
+    Python objects, which nothing here unpickles.
     OutOfMemoryError: it would take more memory than there is.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            require(sum(each.file_size for each in archive.infolist()), f"{path}: arrays")
-            found = {
-                each.filename.removesuffix(".npy"): np.lib.format.read_array(
-                    io.BytesIO(archive.read(each)), allow_pickle=False
-                )
-                for each in archive.infolist()
-            }
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-        raise InputError(f"is no archive of arrays: {error}", file=path) from None
-    except ValueError as error:
-        objects = "Object arrays" in str(error)
-        what = "holds Python objects, which are not unpickled: save plain arrays" if objects else str(error)
-        raise InputError(what, file=path) from None
-    return Arrays(path, found)
+            members = archive.infolist()
+            check_unpacked_size(path, members)
+            require(sum(each.file_size for each in members), f"{path}: arrays")
+            arrays = {}
+            for member in members:
+                name = member.filename.removesuffix(".npy")
+                arrays[name] = _array(path, name, archive.read(member))
+    except InputError:
+        raise
+    except (*UNPACKABLE, ValueError) as error:
+        raise InputError(f"cannot be read as an archive of arrays: {error}", file=path) from None
+    return Arrays(path, arrays)
+
+
+def _array(path: Path, name: str, content: bytes) -> NDArray[Any]:
+    """Return the array of a member, whose header must announce as many bytes as there are."""
+    stream = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(stream)
+        shape, by_columns, kind = _HEADERS[version](stream)
+        announced = math.prod(shape) * kind.itemsize
+    except Exception as error:  # whatever a damaged header makes the parser raise
+        what = f"the header of the array {name} is damaged ({type(error).__name__}: {error})"
+        raise InputError(f"{what}: write the file again with numpy.savez", file=path) from None
+    if kind.hasobject:
+        raise InputError(
+            f"the array {name} holds Python objects, which are not unpickled: save plain arrays", file=path
+        )
+    own = len(content) - stream.tell()
+    if announced != own or min(shape, default=0) < 0:
+        raise InputError(
+            f"the header of the array {name} announces the shape {shape} of {kind}, {announced} bytes, but"
+            f" {own} bytes follow: write the file again with numpy.savez",
+            file=path,
+        )
+    return np.ndarray(shape, kind, content, stream.tell(), order="F" if by_columns else "C")

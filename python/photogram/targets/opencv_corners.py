@@ -13,6 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_beginning, read_bytes
 from photogram.io.json import Tree, read_json
+from photogram.io.numbers import number_or_text
 from photogram.io.yaml_text import read_yaml_text
 from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured
@@ -124,16 +125,15 @@ def _matrix(tree: Tree) -> Floats:
     given = data.value if isinstance(data.value, list) else None
     if given is None or len(given) != rows * cols * channels:
         raise data.error(f"is not {rows} x {cols} x {channels} numbers")
-    numbers = np.array([_number(data, each) for each in given])
+    numbers = np.array([_coordinate(each) for each in data])
     return numbers.reshape((rows, cols, channels) if channels > 1 else (rows, cols))
 
 
-def _number(data: Tree, value: Any) -> float:
-    if isinstance(value, str) and value.lower() in (".nan", "nan"):
-        return np.nan
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise data.error(f"holds {value!r}, which is no number")
-    return float(value)
+def _coordinate(tree: Tree) -> float:
+    """Return a finite number, or NaN, as OpenCV spells it in YAML, for a corner without a place."""
+    value = tree.value
+    missing = value.lower() in (".nan", "nan") if isinstance(value, str) else value != value
+    return np.nan if missing else tree.number()
 
 
 def _xml(path: Path) -> dict[str, Any]:
@@ -142,27 +142,20 @@ def _xml(path: Path) -> dict[str, Any]:
         root = ElementTree.fromstring(read_bytes(path))
     except ElementTree.ParseError as error:
         raise InputError(f"is no XML: {error}", file=path, record=error.position[0]) from None
+    except (ValueError, LookupError) as error:
+        raise InputError(f"is no XML: {error}: save it as UTF-8", file=path) from None
     return {each.tag: _element(each) for each in root}
 
 
 def _element(element: ElementTree.Element) -> Any:
     if len(element):
         return {
-            each.tag: [_value(word) for word in (each.text or "").split()]
+            each.tag: [number_or_text(word) for word in (each.text or "").split()]
             if each.tag == "data"
             else _element(each)
             for each in element
         }
-    return _value((element.text or "").strip())
-
-
-def _value(word: str) -> Any:
-    for kind in (int, float):
-        try:
-            return kind(word)
-        except ValueError:
-            continue
-    return word
+    return number_or_text((element.text or "").strip())
 
 
 def read_npz(path: Path, board: Board | None) -> Measured:

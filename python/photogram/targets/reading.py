@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from photogram.errors import InputError
+from photogram.io.places import Place, at_place
 from photogram.messages import Message, counted, listed
 from photogram.network.knots import KNOTTED
 from photogram.targets.board import Board, Shape
@@ -123,7 +124,8 @@ def read(
     if unit is not None:
         own = own.replace(unit=unit)
     seen, told = grouped(found, how)
-    start = first_values(own, seen, model, knots or KNOTS)
+    with at_place(Place(path)):
+        start = first_values(own, seen, model, knots or KNOTS)
     poses = start.picture_poses if sync == "none" else start.poses
     calibration = Calibration(
         board=own,

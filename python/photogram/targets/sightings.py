@@ -19,6 +19,9 @@ from photogram.targets.board import Board
 from photogram.targets.corners import Corners
 from photogram.targets.vision import composed
 
+_DEGENERATE = 1e-9
+"""The length of a column of a homography over the length of the other one, if corners are on one line."""
+
 
 def homographies(places: Floats, xy: Floats) -> Floats:
     """Return (P, 3, m + 1) the homography of the board to each picture, by direct linear transformation.
@@ -70,6 +73,9 @@ def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
     own[:, :2] -= middle[:, np.newaxis] * found[:, 2:]
     if own.shape[2] == 4:
         return _of_matrices(own[:, :, :3])
+    lengths = np.linalg.norm(own[:, :, :2], axis=1)
+    # Corners on one line determine one of both columns alone.
+    own = own[lengths.min(axis=1) > _DEGENERATE * lengths.max(axis=1)]
     a, b = own[:, :, 0], own[:, :, 1]
     weight = 1 / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))[:, np.newaxis]
     rows = np.concatenate([a * b * weight, (a * a - b * b) * weight])
