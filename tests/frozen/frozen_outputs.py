@@ -14,6 +14,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -237,8 +238,9 @@ def entries(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def is_code(text: Any) -> bool:
-    """Return if a text is a name or a code: one word."""
-    return isinstance(text, str) and not any(character.isspace() for character in text)
+    """Return if a text is a name or a code: one word, and no digest of a file."""
+    is_word = isinstance(text, str) and not any(character.isspace() for character in text)
+    return is_word and not re.fullmatch(r"[0-9a-f]{64}", text)
 
 
 def column_digest(values: list[Any]) -> Any:
