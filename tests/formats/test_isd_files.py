@@ -193,7 +193,6 @@ FAULTS = [
     (setting(None, "detector_line_summing"), "/detector_line_summing: is null, .* must be the number"),
     (setting(None, "center_ephemeris_time"), "/center_ephemeris_time: is null, .* must be the time"),
     (setting(None, "radii", "semimajor"), "/radii/semimajor: is null and must be a number"),
-    (setting(None, "instrument_pointing"), "/instrument_pointing: is null and must be of the type object"),
     (setting([0.0, 1.0], "focal2pixel_lines"), "focal2pixel_lines: has 2 numbers, not 3"),
     (setting(0, "detector_sample_summing"), "detector_sample_summing: is not positive"),
     (

@@ -71,8 +71,6 @@ class Tree:
         )
 
     def _as(self, kind: type, word: str) -> Any:
-        if self.value is None:
-            raise self.error(f"is null and must be of the type {word}")
         if not isinstance(self.value, kind) or isinstance(self.value, bool):
             raise self.error(f"is no {word}")
         return self.value
