@@ -9,6 +9,7 @@ import pytest
 
 import photogram
 from photogram import Block, adjust, diagnose, simulate, snoop
+from photogram.diagnosis.key_numbers import held_values
 from photogram.network import project
 from photogram.results.weakest import weakest_photos, weakest_points
 
@@ -302,6 +303,23 @@ def test_fixed_control_at_a_wrong_place_is_named_first(made):
     verdict = adjust(made.block.replace(point_positions=positions, point_sd=sd)).verdict
     name = made.block.point_ids[control[1]]
     assert verdict.headline.startswith(f"Gross errors likely: 1) control point {name}, which is held")
+
+
+@pytest.mark.parametrize("name", ["hall 3, photo", "A on photo B", "7, which is held", "the photo of P"])
+def test_check_names_a_held_station_or_point_in_full(made, name):
+    photos, points = list(made.block.photo_ids), list(made.block.point_ids)
+    control = int(np.flatnonzero(np.isfinite(made.block.point_sd).all(axis=1))[1])
+    photos[2] = points[control] = name
+    named = made.block.replace(photo_ids=photos, point_ids=points)
+    positions, sd = named.photo_positions.copy(), named.photo_position_sd.copy()
+    positions[2, 0] += 30.0
+    sd[2] = 0.0
+    (station,) = held_values(adjust(named.replace(photo_positions=positions, photo_position_sd=sd)))
+    assert (station.photos, station.points) == ([name], [])
+    positions, sd = named.point_positions.copy(), np.where(np.isfinite(named.point_sd), 0.0, np.inf)
+    positions[control] += [0.0, 40.0, 0.0]
+    (point,) = held_values(adjust(named.replace(point_positions=positions, point_sd=sd)))
+    assert (point.photos, point.points) == ([], [name])
 
 
 def test_the_report_and_the_document_have_the_worst(made):

@@ -421,6 +421,14 @@ SITUATIONS = {
 }
 
 
+def test_an_exchange_is_named_although_another_sentence_contains_it():
+    short, long = "1 and 2 are exchanged on photo 7", "1 and 2 are exchanged on photo 71"
+    base = vars(findings(good()))
+    snooped = Removed([{"name": "a"}], exchanged=[long])
+    assert short in verdict(Findings(**{**base, "snooped": snooped, "exchanged": [short]})).lines
+    assert long not in verdict(Findings(**{**base, "snooped": snooped, "exchanged": [long]})).lines
+
+
 @pytest.mark.parametrize("first", SITUATIONS)
 def test_no_two_sentences_contradict_each_other(first):
     """Findings that come together, three at a time; whole reports are in `test_contradictions.py`."""

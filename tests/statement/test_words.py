@@ -142,6 +142,31 @@ def test_names_of_observations_are_turned_and_those_of_users_are_not(said, germa
     assert translation.named(ENGLISH, said) == said
 
 
+@pytest.mark.parametrize(
+    ("said", "german"),
+    [
+        ("image of point A on photo B on photo C", "Bildpunkt A on photo B in Bild C"),
+        ("image of point P on photo B on photo C", "Bildpunkt P in Bild B on photo C"),
+        ("point A on photo B on photo C", "Punkt A on photo B in Bild C"),
+        ("X, Y of control point A on photo B", "X, Y von Passpunkt A on photo B"),
+        ("control point X, Y of control point P", "Passpunkt X, Y of control point P"),
+        ("control point P, which is held", "Passpunkt P, which is held"),
+        ("control point P, which is held, which is held", "Passpunkt P, which is held, festgehalten"),
+        ("photo 301 (too few known points)", "Bild 301 (too few known points)"),
+    ],
+)
+def test_names_are_never_divided(said, german):
+    points = {"A on photo B", "P", "X, Y of control point P", "P, which is held"}
+    names = {"point": points, "photo": {"C", "B on photo C"}, "camera": {"left: wide", "wide"}}
+    both = [Texts(language, names=names) for language in ("en", "de")]
+    assert [translation.named(each, said) for each in both] == [said, german]
+    assert translation.test(both[1], f"images: {said}") == f"Bildpunkte: {german}"
+    assert translation.test(both[1], "pattern over the frame of left: wide").endswith(" von left: wide")
+    assert translation.quantity(
+        Texts("de", names={"point": {"gable rotation"}}), "point gable rotation x"
+    ) == ("Punkt gable rotation x")
+
+
 def test_names_of_points_are_the_users():
     assert translation.test(GERMAN, "check points: plane 3 of house") == "Kontrollpunkte: plane 3 of house"
     assert translation.test(GERMAN, "pattern by photo: line 4") == "Muster nach Bildern: line 4"

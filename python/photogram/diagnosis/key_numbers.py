@@ -9,7 +9,7 @@ from photogram.diagnosis.editing import Edited
 from photogram.diagnosis.findings import Finding, Level, Section, Words, note, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
-from photogram.results.fixed_tests import HELD
+from photogram.results.fixed_tests import HELD, IS_HELD, OF_CONTROL, OF_PHOTOS
 from photogram.results.result import Result
 from photogram.show.methods import findings_of
 from photogram.statistics.evidence import WITHHELD, Evidence
@@ -128,8 +128,9 @@ def held_values(result: Result) -> list[Finding]:
     if least.accepted or not least.name.startswith(f"{HELD}: "):
         return []
     name, value = least.name.removeprefix(f"{HELD}: "), least.value
-    words = name.split(", ")[0].split()
-    photos, points = ([words[-1]], []) if "photo" in words else ([], [words[-1]])
+    known = name.removesuffix(f", {IS_HELD}")
+    photos = [known.removeprefix(each) for each in OF_PHOTOS if known.startswith(each)]
+    points = [] if photos else [known.removeprefix(OF_CONTROL)]
     text = (
         f"{name}, does not fit: were it free, the sum of squares would fall by {value:.4g}, more than"
         " by any observation; give it a standard deviation"

@@ -28,6 +28,12 @@ from photogram.statistics.findings import Tested
 
 HELD = "held values"
 """The kind of these tests."""
+OF_PHOTOS, OF_CONTROL, IS_HELD = (
+    ("position of photo ", "attitude of photo "),
+    "control point ",
+    "which is held",
+)
+"""Their names: one of the first two before the name of a photo or point, and the last after a comma."""
 SUSPECTED = 5
 """Fixed stations and points that are tested at the most, those with the worst images."""
 STEP = 1e-6
@@ -126,7 +132,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
     of_points = np.bincount(block.image_points, of_images, points)
     mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
     rows: list[tuple[float, Held]] = []
-    for what, sd, shift in (("position", given[:, :3], 0), ("attitude", given[:, 3:], 3)):
+    for what, sd, shift in zip(OF_PHOTOS, (given[:, :3], given[:, 3:]), (0, 3), strict=True):
         held = np.asarray(sd == 0)
         if shift or block.geographic:  # Partials are by other axes than those of the components.
             held = held & held.all(axis=1, keepdims=True)
@@ -136,13 +142,13 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
             if name not in mounted:
                 images = np.flatnonzero(used & (block.image_photos == photo))
                 own_partials = shift + np.flatnonzero(held[photo])
-                each = Held(f"{what} of photo {name}, which is held", images, own_partials)
+                each = Held(f"{what}{name}, {IS_HELD}", images, own_partials)
                 rows.append((float(of_photos[photo]), each))
     fixed = (block.point_sd == 0).all(axis=1) & (np.bincount(block.image_points[used], minlength=points) > 0)
     own = np.flatnonzero(fixed)
     for point in own[np.argsort(-of_points[own], kind="stable")][:SUSPECTED].tolist():
         images = np.flatnonzero(used & (block.image_points == point))
-        each = Held(f"control point {block.point_ids[point]}, which is held", images, np.arange(3))
+        each = Held(f"{OF_CONTROL}{block.point_ids[point]}, {IS_HELD}", images, np.arange(3))
         rows.append((float(of_points[point] / len(images)), each))
     rows.sort(key=lambda row: -row[0])
     return [each for _, each in rows[:SUSPECTED]]

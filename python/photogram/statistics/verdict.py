@@ -7,7 +7,7 @@ level and number of tests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from photogram.lazy_dataclasses import asdict, dataclass
@@ -88,13 +88,17 @@ class Verdict:
 
 @dataclass(frozen=True)
 class _Line:
-    """A sentence of a condition; `praise` goes before it where nothing forbids the use."""
+    """A sentence of a condition; `praise` goes before it where nothing forbids the use.
+
+    `exchanged` are the sentences on exchanged names that it contains.
+    """
 
     code: str
     text: str
     exit: int = 0
     warning: bool = False
     praise: str = ""
+    exchanged: Sequence[str] = ()
 
     def said(self, usable: bool) -> str:
         text = f"{self.praise} {self.text}" if usable and self.praise else self.text
@@ -136,7 +140,7 @@ def _can_be_taken_out(e: Evidence) -> bool:
 
 def _exchanged(found: Findings, lines: list[_Line]) -> list[str]:
     """Return names that are probably exchanged, unless a line has them."""
-    return [each for each in found.exchanged if not any(each in line.text for line in lines)]
+    return [each for each in found.exchanged if not any(each in line.exchanged for line in lines)]
 
 
 def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
@@ -148,7 +152,7 @@ def _not_converged(e: Evidence) -> _Line | None:
     if e.found.status == "converged":
         return None
     text = "; ".join([f"Not converged ({e.found.status}): the figures are no results", *e.found.exchanged])
-    return _Line("not-converged", text, EXIT_NOT_CONVERGED)
+    return _Line("not-converged", text, EXIT_NOT_CONVERGED, exchanged=e.found.exchanged)
 
 
 def _rank_defect(e: Evidence) -> _Line | None:
@@ -199,7 +203,7 @@ def _gross_errors(e: Evidence) -> _Line | None:
         text += f" ({e.found.weigh})" if e.found.weigh and "control point" in first.name(place) else ""
     elif e.found.snoop and e.found.status == "converged":
         text += f"; {e.found.snoop} takes them out"
-    return _Line("gross-errors", text, EXIT_NOT_USABLE)
+    return _Line("gross-errors", text, EXIT_NOT_USABLE, exchanged=e.found.exchanged)
 
 
 def _snooped(e: Evidence) -> _Line | None:
@@ -214,13 +218,14 @@ def _snooped(e: Evidence) -> _Line | None:
             f" images, {100 * found.control:.3g} of the control): model or identification is wrong"
             + "".join(f"; {each}" for each in found.exchanged),
             EXIT_NOT_USABLE,
+            exchanged=found.exchanged,
         )
     if e.high:
         return None
     names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
     removed = counted(count, "observation")
     text = "; ".join([f"after removal of {removed}: {names}", *found.exchanged])
-    return _Line("usable-after-removal", text, praise="Usable")
+    return _Line("usable-after-removal", text, praise="Usable", exchanged=found.exchanged)
 
 
 def _set_aside(e: Evidence) -> _Line | None:

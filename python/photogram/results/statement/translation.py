@@ -58,7 +58,7 @@ def parameter(texts: Texts, name: str) -> str:
     # `rotation x` precedes `x`, unless only the latter leaves a name of the block.
     ways = [(" ".join(words[:cut]), " ".join(words[cut:])) for cut in range(1, len(words))]
     for of, component in sorted(ways, key=lambda way: not texts.is_name(way[0])):
-        if texts.has(f"axis.{component}"):
+        if component in LETTERS or texts.has(f"axis.{component}"):
             return f"{of} {axis(texts, component)}"
     return name
 
