@@ -150,13 +150,13 @@ def test_names_of_observations_are_turned_and_those_of_users_are_not(said, germa
         ("point A on photo B on photo C", "Punkt A on photo B in Bild C"),
         ("X, Y of control point A on photo B", "X, Y von Passpunkt A on photo B"),
         ("control point X, Y of control point P", "Passpunkt X, Y of control point P"),
-        ("control point P, which is held", "Passpunkt P, which is held"),
-        ("control point P, which is held, which is held", "Passpunkt P, which is held, festgehalten"),
+        ("control point R, which is held", "Passpunkt R, which is held"),
+        ("control point R, which is held, which is held", "Passpunkt R, which is held, festgehalten"),
         ("photo 301 (too few known points)", "Bild 301 (too few known points)"),
     ],
 )
 def test_names_are_never_divided(said, german):
-    points = {"A on photo B", "P", "X, Y of control point P", "P, which is held"}
+    points = {"A on photo B", "P", "X, Y of control point P", "R, which is held"}
     names = {"point": points, "photo": {"C", "B on photo C"}, "camera": {"left: wide", "wide"}}
     both = [Texts(language, names=names) for language in ("en", "de")]
     assert [translation.named(each, said) for each in both] == [said, german]
