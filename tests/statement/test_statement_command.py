@@ -215,3 +215,47 @@ def test_settings_beside_a_result_that_are_of_another_block_are_told_and_not_tak
     assert done.exit_code == 0, done.output
     assert "of another block" in " ".join(done.stderr.split())
     assert json.loads(Path("stated/statement.json").read_text())["client"] is None
+
+
+@pytest.fixture
+def model(run, site):
+    """Return the golden block as a COLMAP model, with the options that read its control and accuracies."""
+    assert run("convert", site, "model", "--to", "colmap").exit_code == 0
+    options = ("--control", site / "control.csv", "--sd", "images=0.5", "--sd", "control=0.1,0.1,0.2")
+    return ("model", *options, "--unit-variance", "unity")
+
+
+HEAD = ("--client", "Town", "--firm", "Office", "--class-h", "5cm")
+
+
+def test_adjust_states_models_of_other_programs_by_options(run, model):
+    run("adjust", *model, "--statement", *HEAD, "--out", "out", "--no-html")
+    document = json.loads(Path("out/statement/statement.json").read_text())
+    assert (document["client"], document["firm"]) == ("Town", "Office")
+    assert document["asprs"]["class_h_m"] == 0.05
+    run("statement", *model, *HEAD, "--out", "alone")
+    alone = json.loads(Path("alone/statement.json").read_text())
+    assert alone["figures"] == document["figures"]
+    assert alone["sentences"] == document["sentences"]
+
+
+def test_options_of_a_statement_require_one(run, site):
+    refused = run("adjust", site, "--client", "Town")
+    assert refused.exit_code == 2
+    assert "--client" in refused.stderr
+    assert not Path("site-adjusted").exists()
+
+
+def test_a_wrong_option_of_a_statement_is_refused_before_the_adjustment(run, site):
+    refused = run("adjust", site, "--statement", "--class-h", "5")
+    assert refused.exit_code == 1
+    assert not Path("site-adjusted").exists()
+
+
+@pytest.mark.parametrize("option", [("--control", "site/control.csv"), ("--loss", "huber"), ("--keep-all",)])
+def test_a_saved_result_refuses_options_of_reading_and_adjustment(run, site, option):
+    run("adjust", site, "--out", "out", "--parquet", "data", "--no-html")
+    refused = run("statement", "data", *option)
+    assert refused.exit_code == 2
+    assert "PATH" in refused.stderr
+    assert not Path("data-statement").exists()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from photogram.cli.choices import Choices
+from photogram.cli.choices import Choices, KeepAll
 from photogram.cli.console import ON_TOP, print_remark, print_sections
 from photogram.cli.documents import Documents, Pictures, check_maps
 from photogram.cli.in_parts import DIVIDING, Parts, adjusted_on_disk, print_plan
@@ -35,7 +35,7 @@ from photogram.cli.projects import (
     project_path,
     read_project,
 )
-from photogram.cli.statement_output import stated, statement_files
+from photogram.cli.statement_output import OfHead, stated, statement_files
 from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
@@ -64,16 +64,12 @@ def adjust(
     added: Additions,
     choices: Choices,
     snooping: Snooping,
-    keep_all: Annotated[
-        bool,
-        typer.Option(
-            "--keep-all", help="Begin with all images, those too that first values would set aside."
-        ),
-    ] = False,
+    keep_all: KeepAll = False,
     statement: Annotated[
         bool,
         typer.Option("--statement", help="Also write an accuracy statement, as the project asks for one."),
     ] = False,
+    wanted: OfHead,
     divided: Parts,
     ordering: Ordering = "auto",
     threads: Threads = None,
@@ -89,6 +85,8 @@ def adjust(
     path = project_path(job, path)
     target = out or (Path("example-adjusted") if example else default_out(path, "-adjusted"))
     documents.place(target)  # refused before anything is read
+    if not statement:
+        wanted.check_alone()
     with job:
         pictures = documents.pictures(job, target)
         division = divided.division
@@ -97,6 +95,7 @@ def adjust(
         project = read_project(job, path, added)
         check_maps(documents.map)  # now that all inputs are known, which it must not be
         project = choices.of(project)
+        asked = wanted.asked(project, added, project.block.linear_unit) if statement else None
         sections = described(project)
         if not quiet:
             print_sections(sections, "`photogram info`")
@@ -128,7 +127,7 @@ def adjust(
             result = cast("Result", removed.result)
         else:
             removed, result = None, run(started or block)
-        own = _statement(job, project, result, documents.crs, strict) if statement else None
+        own = None if asked is None else _statement(job, project, result, asked, documents.crs, strict)
         _finish(job, project, result, removed, target, documents, pictures, sections, own, strict=strict)
 
 
@@ -190,7 +189,9 @@ def _finish(
     )
 
 
-def _statement(job: Job, project: Project, result: Result, crs: str | None, strict: bool) -> Statement | None:
+def _statement(
+    job: Job, project: Project, result: Result, asked: dict[str, Any], crs: str | None, strict: bool
+) -> Statement | None:
     """Return the accuracy statement of a result; None where the adjustment has not converged."""
     if not result.converged:
         return None
@@ -198,7 +199,7 @@ def _statement(job: Job, project: Project, result: Result, crs: str | None, stri
         return stated(
             job,
             result,
-            project.statement,
+            asked,
             command="adjust",
             crs=crs,
             strict=strict,
@@ -335,12 +336,21 @@ def adjusted_block(
 
 
 def result_at(
-    job: Job, path: Path, added: Additions, threads: int | None, *, fitted: bool = True
+    job: Job,
+    path: Path,
+    added: Additions,
+    threads: int | None,
+    *,
+    choices: Choices = Choices(),  # noqa: B008  # frozen
+    keep_all: bool = False,
+    fitted: bool = True,
 ) -> tuple[Result, Project | None]:
     """Return the result that lies at a path, or that of the project there, which is adjusted.
 
     Parameters
     ----------
+    choices, keep_all
+        How a project is adjusted.
     fitted
         Whether features that a project declares are fitted.
 
@@ -352,15 +362,19 @@ def result_at(
     from photogram.formats.results import is_result
 
     if is_result(path):
+        if replace(added, sd=None) != NOTHING or choices != Choices() or keep_all:
+            raise typer.BadParameter(
+                "is a saved result: options of reading and adjustment require a project", param_hint="PATH"
+            )
         job.reads(path)
         result = read_result(path)
         if not isinstance(result, Result):
             raise typer.BadParameter("is the result of a collection, not of a block", param_hint="PATH")
         return result, None
-    project = read_project(job, path, added)
-    block, started = started_block(project, keep_all=False)
+    project = choices.of(read_project(job, path, added))
+    block, started = started_block(project, keep_all=keep_all)
     whole = project if fitted else project.replace(features={})
-    return adjusted_block(job, whole, started or block, threads=threads), project
+    return adjusted_block(job, whole, started or block, choices=choices, threads=threads), project
 
 
 def _call(

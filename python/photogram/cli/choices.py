@@ -17,6 +17,11 @@ if TYPE_CHECKING:
 LossName = Literal["none", "huber", "cauchy"]
 """What is minimised."""
 
+KeepAll = Annotated[
+    bool,
+    typer.Option("--keep-all", help="Begin with all images, those too that first values would set aside."),
+]
+
 
 @dataclass(frozen=True)
 class Choices:

@@ -3,100 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-import typer
+from typing import TYPE_CHECKING, Annotated
 
 from photogram.cli.adjust import result_at
+from photogram.cli.choices import Choices, KeepAll
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import Crs
-from photogram.cli.job import InputFile, Job, OutputFolder, with_job
+from photogram.cli.job import Job, OutputFolder, with_job
 from photogram.cli.options import Quiet, Strict, Threads, default_out, out_option
 from photogram.cli.projects import Additions, Example, ProjectPath
-from photogram.cli.statement_output import stated, statement_files
-from photogram.lazy_dataclasses import dataclass
+from photogram.cli.statement_output import Wanted, stated, statement_files
 
 if TYPE_CHECKING:
     from photogram import Result
     from photogram.formats import Project
     from photogram.results.statement.statement import Statement
     from photogram.show.sections import Section
-
-
-def _text(name: str, what: str, metavar: str = "TEXT") -> Any:
-    return typer.Option(f"--{name}", metavar=metavar, help=what)
-
-
-Word = str | None
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is asked of a statement, with the options that say it; a project may say it too."""
-
-    standard: Annotated[
-        Word, _text("standard", "plain, asprs-2023, nssda, vdi-2634, iso-19157.", "NAME,..")
-    ] = None
-    class_h: Annotated[Word, _text("class-h", "Horizontal accuracy class: 5cm.", "LENGTH")] = None
-    class_v: Annotated[Word, _text("class-v", "Vertical accuracy class: 10cm.", "LENGTH")] = None
-    class_3d: Annotated[Word, _text("class-3d", "Three-dimensional accuracy class.", "LENGTH")] = None
-    area: Annotated[
-        Word, _text("area", "Area of the product: 12.5km2. Default: hull of the adjusted points.", "AREA")
-    ] = None
-    without: Annotated[
-        list[str] | None,
-        _text("without", "Give figures without a check point beside, with the reason.", "POINT=REASON"),
-    ] = None
-    independent: Annotated[
-        Literal["yes", "same-base", "no"] | None,
-        typer.Option(help="Declare whether check points are independent of the block."),
-    ] = None
-    language: Annotated[Literal["en", "de"] | None, typer.Option(help="Of the page. Default: en.")] = None
-    text: Annotated[InputFile, typer.Option(metavar="FILE", help="Sentences of a firm: TOML, by key.")] = None
-    budget: Annotated[
-        list[str] | None,
-        _text("budget", "Take a quantity apart: 'point C08 z', 'distance C01 C30' ..", "QUANTITY"),
-    ] = None
-    coverage: Annotated[
-        float | None,
-        typer.Option(
-            metavar="P", min=0.01, max=0.999999, help="Probability of expanded uncertainties. Default: 0.95."
-        ),
-    ] = None
-    project: Annotated[Word, _text("project", "Project, for the head of the page.")] = None
-    client: Annotated[Word, _text("client", "Client.")] = None
-    firm: Annotated[Word, _text("firm", "Firm.")] = None
-    surveyor: Annotated[Word, _text("surveyor", "Who signs.")] = None
-    date: Annotated[Word, _text("date", "Date of the statement (2026-11-25). Default: today.")] = None
-
-    def options(self, unit: str) -> dict[str, Any]:
-        """Return what :meth:`photogram.Result.statement` takes of it; `unit` is that of the block."""
-        from photogram.formats.plain.statement_settings import read_sentences
-        from photogram.results.statement.request import length_of
-
-        sizes = {"h": self.class_h, "v": self.class_v, "3d": self.class_3d}
-        classes = {name: length_of(size, unit) for name, size in sizes.items() if size is not None}
-        found: dict[str, Any] = {
-            "standards": self.standard
-            and tuple(each.strip() for each in self.standard.split(",") if each.strip()),
-            "classes": classes or None,
-            "area": None if self.area is None else length_of(self.area, unit, area=True),
-            "without": dict(map(_reason, self.without)) if self.without else None,
-            "independent": self.independent,
-            "language": self.language,
-            "text": None if self.text is None else read_sentences(self.text),
-            "budgets": tuple(self.budget) if self.budget else None,
-            "coverage": self.coverage,
-        }
-        found |= {name: getattr(self, name) for name in ("project", "client", "firm", "surveyor", "date")}
-        return {name: value for name, value in found.items() if value is not None}
-
-
-def _reason(given: str) -> tuple[str, str]:
-    point, equals, reason = given.partition("=")
-    if not (equals and point.strip() and reason.strip()):
-        raise typer.BadParameter(f'{given!r} is not POINT="reason"', param_hint="--without")
-    return point.strip(), reason.strip()
 
 
 @with_job
@@ -111,6 +33,8 @@ def statement(
     wanted: Wanted,
     crs: Crs = None,
     added: Additions,
+    choices: Choices,
+    keep_all: KeepAll = False,
     threads: Threads = None,
     strict: Strict = False,
     quiet: Quiet = False,
@@ -125,18 +49,10 @@ def statement(
     source = job.packaged("survey") if path is None else path
     target = out or (Path("example-statement") if example else default_out(source, "-statement"))
     with job:
-        from photogram.formats.supplements import deviations
-
-        result, project = result_at(job, source, added, threads)
+        result, project = result_at(job, source, added, threads, choices=choices, keep_all=keep_all)
         project = project or _project_beside(job, source, result)
-        declared = {} if project is None else project.statement
+        asked = wanted.asked(project, added, result.block.linear_unit)
         assumed = () if project is None else project.lacks
-        own = wanted.options(result.block.linear_unit)
-        classes = {**declared.get("classes", {}), **own.get("classes", {})}
-        asked = {**declared, **own, "classes": classes}
-        sd = deviations(added.sd or []).get("check")
-        if sd is not None:
-            asked["sd"] = sd
         with job.status("stating"):
             found = stated(job, result, asked, crs=crs, strict=strict, assumed=assumed)
             files = statement_files(job, found, target)
