@@ -10,10 +10,11 @@ import pytest
 from photogram import InputError, adjust, formats
 from photogram.formats.adjusted import excel_file, table_files
 from photogram.io import json
+from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES
 from photogram.show.cells import page_table
 from photogram.show.lines import fact_lines, field, marks, table_lines
-from photogram.show.page import Cell, Fact
+from photogram.show.page import Cell, Fact, probability_written
 from photogram.show.quantity import Axis, Quantity, component, of_each, records, units
 
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
@@ -125,3 +126,12 @@ def test_columns_are_wider_than_the_longest_name():
     above = next(line for line in lines if line.startswith("point") and line.endswith("kind"))
     first = lines[lines.index(above) + 2]
     assert above.index("  kind") == first.index("  pass")
+
+
+@pytest.mark.parametrize(
+    ("p", "text"), [(1.0, "1"), (0.0312, "0.031"), (1.24e-61, "1.2e-61"), (0.0, "< 1e-99")]
+)
+def test_probabilities_are_written_by_one_rule(p, text):
+    assert probability_written(p) == text
+    assert Texts("en").probability(p) == text
+    assert Texts("de").probability(p) == text.replace(".", ",")

@@ -21,7 +21,18 @@ from photogram.show.angles import ARCSEC
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.methods import page_of
-from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Section, Table, significant
+from photogram.show.page import (
+    Drawing,
+    Fact,
+    Facts,
+    Layers,
+    Page,
+    Part,
+    Section,
+    Table,
+    probability_written,
+    significant,
+)
 
 UM = "µm"
 
@@ -104,7 +115,7 @@ def _polynomials(calibration: Calibration) -> list[Part]:
     if nonlinear is None or test is None:
         return []
     first, second = test.degrees_of_freedom
-    p = "" if test.probability is None else f", p = {significant(test.probability, 3)}"
+    p = "" if test.probability is None else f", p = {probability_written(test.probability)}"
     note = f"All terms together: F = {test.ratio:.2f} with {first} and {second} degrees of freedom{p}."
     return [
         page_table("Terms and their tests", terms(test.terms), note),

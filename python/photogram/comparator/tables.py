@@ -89,7 +89,7 @@ def terms(found: Sequence[TermTest]) -> list[Quantity]:
         of_each(found, "coefficient_um", UM, "deviation", head="Coefficient", decimals=3),
         of_each(found, "sd_um", UM, "deviation", head="sd", decimals=3),
         of_each(found, "ratio", head="t", decimals=2),
-        of_each(found, "probability", head="p", decimals=4),
+        of_each(found, "probability", head="p", figures=2),
     ]
 
 

@@ -13,6 +13,7 @@ from photogram.results.calibration import Calibration, ParameterTest, calibratio
 from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
 from photogram.results.result import Result
 from photogram.show.lines import padded
+from photogram.show.page import probability_written
 from photogram.show.quantity import members
 from photogram.show.sections import Section
 
@@ -76,7 +77,7 @@ def _parameter_lines(result: Result, found: Calibration) -> list[str]:
             f"{each.sd:>15.3g}",
             f"{each.change:>15.4g}",
             f"{each.test_value:>15.2f}",
-            f"{each.probability:>15.4f}",
+            f"{probability_written(each.probability):>15}",
             f"{each.multiple_correlation:>15.5f}",
             f"{each.redundancy:>15.3f}" if 0 < each.given_sd < math.inf else f"{'free':>15}",
             f"{each.gain:>15.4g}",
@@ -104,7 +105,7 @@ def _group_lines(found: Calibration) -> list[str]:
     head, *names = padded(titles, 31)
     lines = ["", f"{head}{'F':>15}{'probability':>15}"]
     return lines + [
-        f"{name}{each.test_value:>15.2f}{each.probability:>15.4f}  {each.outcome}"
+        f"{name}{each.test_value:>15.2f}{probability_written(each.probability):>15}  {each.outcome}"
         for name, each in zip(names, found.groups, strict=True)
     ]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.messages import listed
 from photogram.results.features import Feature, Features, Quantity, directions
-from photogram.show.page import decimals_of, fixed
+from photogram.show.page import decimals_of, fixed, probability_written
 from photogram.show.quantity import members
 from photogram.show.sections import Section
 
@@ -24,8 +24,8 @@ def features_sections(features: Features | None) -> list[Section]:
     for each in features:
         lines += [f"{each.name}: {through(each)}", *(_line(each, own) for own in each.quantities)]
         if each.form:
-            p = f"p = {each.probability:.2g}" if (each.probability or 0.0) > 1e-99 else "p < 1e-99"
-            figures = f"T = {each.statistic:.4g} of {each.freedom}, {p}"
+            p = probability_written(each.probability or 0.0)
+            figures = f"T = {each.statistic:.4g} of {each.freedom}, p {'' if p[0] == '<' else '= '}{p}"
             lines += [f"  form: {each.form} ({figures})"]
     return [("Features", [*lines, *(f"{each[:1].upper()}{each[1:]}." for each in features.remarks)])]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from photogram.show.page import Cell, Column, Judgement, Remarks, Section, Table, Tone
+from photogram.show.page import Cell, Column, Judgement, Remarks, Section, Table, Tone, probability_written
 
 if TYPE_CHECKING:
     from photogram.statistics.verdict import Verdict
@@ -17,9 +17,6 @@ MARKS: dict[Tone, str] = {
     "bad": "Not to be used as it is",
 }
 """What stands above a verdict: colours alone say nothing."""
-
-LEAST = 1e-99
-"""Smaller probabilities are not told apart."""
 
 
 def judged(verdict: Verdict, on: str = "") -> Judgement:
@@ -49,7 +46,7 @@ def verdict_table(verdict: Verdict) -> Table:
             (Column("Value"), lambda test: test.value),
             (Column("At least"), lambda test: test.limits[0]),
             (Column("At most"), lambda test: test.limits[1]),
-            (Column("p", figures=2), lambda test: Cell("< 1e-99", sorts=0.0) if test.p < LEAST else test.p),
+            (Column("p", figures=2), lambda test: Cell(probability_written(test.p), sorts=test.p)),
             (Column("Level", figures=2), lambda test: test.level),
             (Column("Tests that share it", decimals=0), lambda test: test.tests),
             (

@@ -26,6 +26,8 @@ Tone = Literal["", "good", "look", "bad"]
 
 MOST_DECIMALS = 12
 """Of a fixed-point column."""
+LEAST_PROBABILITY = 1e-99
+"""Smaller probabilities are not told apart."""
 
 
 @dataclass(frozen=True)
@@ -315,6 +317,11 @@ def significant(value: float, figures: int = 4) -> str:
         decimals = max(figures - 1 - math.floor(math.log10(size)), 0)
         return f"{value:.{decimals}f}"
     return f"{value:.{figures - 1}e}"
+
+
+def probability_written(value: float) -> str:
+    """Return a probability with two figures, with an exponent if it is small; `< 1e-99` below that."""
+    return f"{value:.2g}" if not value < LEAST_PROBABILITY else f"< {LEAST_PROBABILITY:g}"
 
 
 def decimals_of(

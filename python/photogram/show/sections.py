@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from photogram import _photocore
 from photogram.messages import Message
+from photogram.show.page import probability_written
 from photogram.statistics.evidence import Test
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
@@ -48,7 +49,7 @@ def _test_lines(test: Test) -> list[str]:
         limits = f"to {high:.4g}"
     else:
         limits = f"{low:.4g} to {high:.4g}"
-    p = f"{test.p:.2g}" if test.p > 1e-99 else "< 1e-99"
+    p = probability_written(test.p)
     figures = (
         f"{f'{test.statistic} = {test.value:.4g}':>14}{limits:>20}{p:>10}{test.level:>10.2g}{test.tests:>8}"
         f"{'' if test.accepted else '  rejected'}"

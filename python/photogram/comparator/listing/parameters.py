@@ -16,6 +16,7 @@ from photogram.comparator.tables import terms
 from photogram.comparator.variance import AxisSigma, CaseVarianceTest, PolynomialTest
 from photogram.show.angles import ARCSEC
 from photogram.show.lines import field, table_lines
+from photogram.show.page import probability_written
 
 NAMES = ("SCALE X", "SCALE Y", "ALPHA")
 LETTERS = "ABCDEFGHJ"
@@ -246,7 +247,7 @@ def _polynomial(test: PolynomialTest) -> list[str]:
     axis, term, _, coefficient, sd, ratio, p = terms(test.terms)
     row = [*field(axis, 6, head="AXIS", gap="  "), *field(term, 6, head="TERM")]
     row += [*field(coefficient, 12, ".3f", "COEFFICIENT"), *field(sd, 10, ".3f", "SIGMA")]
-    row += [*field(ratio, 10, ".2f", "T"), *field(p, 14, ".4f", "PROBABILITY")]
+    row += [*field(ratio, 10, ".2f", "T"), *field(p, 14, ".2g", "PROBABILITY")]
     return [
         f"ALL TERMS TOGETHER: F = {test.ratio:.2f} WITH {first} AND {second} DEGREES OF FREEDOM,"
         f" PROBABILITY {_probability(test.probability)}",
@@ -270,7 +271,7 @@ def _cases(test: CaseVarianceTest) -> list[str]:
 
 
 def _probability(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4f}"
+    return "-" if value is None else probability_written(value)
 
 
 def joint_page(calibration: Calibration, joint: JointFit) -> list[str]:
@@ -307,7 +308,7 @@ def _plate(plate: int, own: JointPlate) -> list[str]:
         verdict = "NOT " if own.test.rejected_high or own.test.rejected_low else ""
         lines.append(
             f"    TEST OF ITS STANDARD DEVIATION: VARIANCE RATIO FROM {low:.3f} TO {high:.3f} (95 PERCENT),"
-            f" PROBABILITY {own.test.probability:.4f}: {verdict}ACCEPTED"
+            f" PROBABILITY {_probability(own.test.probability)}: {verdict}ACCEPTED"
         )
     return lines
 

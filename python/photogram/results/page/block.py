@@ -207,7 +207,7 @@ def _parameters(found: Calibration, law: str) -> Table:
             (Column("sd adjusted", figures=3), lambda each: each.sd),
             (Column("Change"), lambda each: written(each, each.change)),
             (Column("t", law, decimals=2), lambda each: each.test_value),
-            (Column("p", decimals=4), lambda each: each.probability),
+            (Column("p", figures=2), lambda each: each.probability),
             (Column("R", "with all others", decimals=4), lambda each: each.multiple_correlation),
             (
                 Column("Outcome", text=True),

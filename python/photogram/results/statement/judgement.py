@@ -92,7 +92,7 @@ def judged(found: Grounds, *, assumed: Sequence[str] = (), strict: bool = False)
     doubtful = against.strictly or _doubtful(of_all)
     remarks = _remarks(found)
     remarks += [
-        texts("control.wrong", point=each.point, p=texts.significant(each.p, 2))
+        texts("control.wrong", point=each.point, p=texts.probability(each.p))
         for each in against.control[:NAMED]
     ]
     named = texts.listed([each.point for each in against.control], NAMED)
@@ -283,7 +283,7 @@ def _honest(found: Grounds) -> Said:
 def _surface(texts: Texts, found: Surface | None) -> Said:
     if found is None:
         return [texts.said("surface.few")]
-    p = texts.significant(found.p, 2)
+    p = texts.probability(found.p)
     if not found.rejected:
         return [texts.said("surface.none", p=p)]
     said = [texts.said("surface.found", p=p)]
@@ -307,7 +307,7 @@ def _points(found: Grounds, tests: PointTests) -> Said:
     """Return which single points disagree, and which were set beside."""
     texts, names, without = found.texts, found.compared.names, found.asked.without
     said = [
-        texts.said("point.wrong", point=names[row], p=texts.significant(float(tests.least[row]), 2))
+        texts.said("point.wrong", point=names[row], p=texts.probability(float(tests.least[row])))
         for row in np.flatnonzero(tests.wrong).tolist()[:NAMED]
     ]
     if without:

@@ -161,5 +161,4 @@ class Written:
         """Return a probability; one below its level is to be looked at."""
         if not math.isfinite(value):
             return Cell("")
-        text = self._texts.significant(value, 2) if value >= 1e-4 else f"< {self._texts.number(1e-4, 4)}"
-        return Cell(text, tone="look" if value < level else "", sorts=value)
+        return Cell(self._texts.probability(value), tone="look" if value < level else "", sorts=value)

@@ -13,7 +13,7 @@ from typing import Any
 
 from photogram.errors import InputError
 from photogram.messages import MOST_NAMES, nearest
-from photogram.show.page import fixed
+from photogram.show.page import fixed, probability_written
 
 LANGUAGES = ("en", "de")
 NOTHING = "–"
@@ -154,6 +154,10 @@ class Texts:
         if not math.isfinite(value) or value == 0:
             return self.number(value, 0)
         return self.number(value, max(0, figures - 1 - math.floor(math.log10(abs(value)))))
+
+    def probability(self, value: float) -> str:
+        """Return a probability."""
+        return self.numeral(probability_written(value))
 
     def numeral(self, written: str) -> str:
         """Return a number that is written with a point as the language writes it."""
