@@ -9,10 +9,14 @@ from test_plain_project import EXAMPLE, change, written
 
 from photogram import InputError, adjust, formats
 from photogram.formats import Frame
+from photogram.formats.supplements import with_control
+from photogram.io.delimited import read_columns
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")
+places = pytest.importorskip("photogram.formats.crs_results")
 
+CONTROL = ["north-1", "north-2", "south-1", "south-2"]
 FRAME = Frame("topocentric", "EPSG:4979", (47.38, 8.54, 450.0))
 PIPELINE = (
     "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=cart +ellps=WGS84"
@@ -148,3 +152,63 @@ def test_one_height_of_the_geoid_may_stand_behind_a_system():
     np.testing.assert_allclose(back, above_sea, rtol=0, atol=1e-7)
     with pytest.raises(InputError, match="no coordinate reference system"):
         crs.geocentric("EPSG:32632+geoid=x", above_sea)
+
+
+@pytest.fixture
+def utm(tmp_path):
+    """Return the example without its control, and its control in a projected system with weights."""
+    place = shutil.copytree(EXAMPLE, tmp_path / "project")
+    change(place / "project.toml", "[frame]", '[frame]\nkind = "topocentric"\norigin = [47.38, 8.54, 450.0]')
+    rows = [line.split(",") for line in (place / "control.csv").read_text().splitlines() if line[0] != "#"]
+    values = np.array([row[1:4] for row in rows[1:]], dtype=float)
+    places, _ = crs.from_frame("EPSG:32632", values, np.zeros((len(values), 3, 3)), FRAME)
+    lines = [
+        ",".join([row[0], *map(str, xyz), "0.01,0.01,0.02", row[4]])
+        for row, xyz in zip(rows[1:], places.tolist(), strict=True)
+    ]
+    header = "point,x,y,z,sd_x,sd_y,sd_z,use"
+    lines.append("unseen,465185.8,5247414.9,443.2,0.01,0.01,0.02,control")
+    (tmp_path / "utm.csv").write_text("\n".join([header, *lines, ""]))
+    (place / "control.csv").unlink()
+    return place, tmp_path / "utm.csv"
+
+
+def test_weighted_control_of_another_system_is_control(utm):
+    place, table = utm
+    (place / "control.csv").write_bytes(table.read_bytes())
+    change(place / "project.toml", "[adjust]", '[control]\ncrs = "EPSG:32632"\n[adjust]')
+    project = formats.read(place)
+    assert project.control_crs == "EPSG:32632"
+    result = adjust(project.block)
+    kinds = dict(zip(result.block.point_ids, result.point_kinds.tolist(), strict=True))
+    assert sorted(name for name, kind in kinds.items() if kind == "control") == [*CONTROL, "unseen"]
+    assert kinds["middle"] == "check"
+    rows, differences = places.placed(result, project.control_crs).control_differences()
+    assert sorted(result.block.point_ids[row] for row in rows.tolist()) == CONTROL
+    own = result.kinds["control"].residuals[:4]
+    np.testing.assert_allclose(np.linalg.norm(differences, axis=1), np.linalg.norm(own, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(differences[:, 2], -own[:, 2], atol=1e-4)
+    free = formats.read(EXAMPLE).replace(frame=FRAME, lacks=("no control (--control FILE)",))
+    assert with_control(free, table, {}, "EPSG:32632").lacks == ()
+
+
+def test_a_command_counts_weighted_control_of_another_system(utm, tmp_path, run):
+    place, table = utm
+    outcome = run(
+        "adjust", place, "--control", table, "--control-crs", "EPSG:32632", "--out", tmp_path / "out"
+    )
+    assert outcome.exit_code == 0
+    assert "control: 4 points held, 1 check point" in outcome.stdout
+    assert "Lacking" not in outcome.stdout
+    differences = read_columns(tmp_path / "out" / "in_crs" / "control.csv", known=(), numbers=())
+    assert sorted(differences.texts("point")) == CONTROL
+    for name in ("report.txt", "report.html"):
+        assert "Control and check points in EPSG:32632" in (tmp_path / "out" / name).read_text()
+
+
+def test_control_without_images_does_not_count(utm, run):
+    place, table = utm
+    (place / "control.csv").write_bytes(table.read_bytes())
+    change(place / "project.toml", "[adjust]", '[control]\ncrs = "EPSG:32632"\n[adjust]')
+    outcome = run("info", place)
+    assert "control: 4 points held, 1 check point; without image observations: unseen" in outcome.stdout

@@ -164,8 +164,8 @@ def _finish(
     from photogram.show.methods import page_of
 
     told = removed or result
-    in_crs, more = _in_system(result, documents.crs)
-    files = _files(project, result, told.report(), sections) | in_crs
+    in_crs, more, lines = _in_system(result, documents.crs, project.control_crs)
+    files = _files(project, result, told.report(), [*lines, *sections]) | in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
     taken = [] if removed is None else removed.sections()[ON_TOP:]
@@ -207,14 +207,27 @@ def _statement(
         )
 
 
-def _in_system(result: Result, crs: str | None) -> tuple[dict[str, bytes], list[Chapter]]:
-    """Return the tables of a result in another system, and a section of the page, where one is asked for."""
-    if crs is None:
-        return {}, []
-    from photogram.formats.crs_results import placed, placed_files, placed_section
+def _in_system(
+    result: Result, crs: str | None, of_control: str
+) -> tuple[dict[str, bytes], list[Chapter], list[Section]]:
+    """Return the tables of a result in another system, and sections of the page and of the report.
 
-    found = placed(result, crs)
-    return {f"in_crs/{name}": each for name, each in placed_files(found).items()}, [placed_section(found)]
+    The system is the one that is asked for, or that of the control.
+    """
+    if not (crs or of_control):
+        return {}, [], []
+    from photogram import InputError
+    from photogram.formats.crs_results import control_lines, placed, placed_files, placed_section
+
+    try:
+        found = placed(result, crs or of_control)
+    except InputError as error:
+        if crs:
+            raise
+        print_remark(f"no results in {of_control}: {error}")
+        return {}, [], []
+    files = {f"in_crs/{name}": each for name, each in placed_files(found).items()}
+    return files, [placed_section(found)], [control_lines(found)]
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:

@@ -13,6 +13,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted, listed
 
 if TYPE_CHECKING:
+    from photogram import Block
     from photogram.arguments.types import Indices
     from photogram.formats import Project
     from photogram.show.sections import Section
@@ -235,14 +236,13 @@ def described(project: Project) -> list[Section]:
 
     block = project.block
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
-    held = int(np.count_nonzero(np.isfinite(block.point_sd).any(axis=1)))
     posed = int(np.count_nonzero(np.isfinite(block.photo_positions).all(axis=1)))
     size = [
         f"{len(block.photo_ids)} photos, {posed} with a position; {len(block.image_xy)} images of"
         f" {np.count_nonzero(rays)} points",
         "rays of points: "
         + ", ".join(f"{count} with {k}{' or more' if k == _MANY else ''}" for k, count in _ray_counts(rays)),
-        f"control: {counted(held, 'point')} held, {counted(len(project.checks), 'check point')}",
+        _control_line(block, rays),
     ]
     kinds: dict[str, int] = {}
     for each in block.observations:
@@ -286,6 +286,22 @@ def described(project: Project) -> list[Section]:
         )
         if each[1]
     ]
+
+
+def _control_line(block: Block, rays: Indices) -> str:
+    """Count control and check points that take part, and name the others."""
+    import numpy as np
+
+    from photogram.network.observations import Control
+    from photogram.results.check_points import point_kinds
+
+    others = {name for each in block.observations if not isinstance(each, Control) for name in each.points}
+    measured = (rays > 0) | np.isin(block.point_ids, list(others))
+    kinds = point_kinds(block)
+    control, checks = (int(np.count_nonzero(measured & (kinds == kind))) for kind in ("control", "check"))
+    idle = [block.point_ids[row] for row in np.flatnonzero(~measured & (kinds != "pass")).tolist()]
+    rest = f"; without image observations: {listed(idle)}" if idle else ""
+    return f"control: {counted(control, 'point')} held, {counted(checks, 'check point')}{rest}"
 
 
 _MANY = 10

@@ -18,11 +18,15 @@ from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid, lengths_of_units
+from photogram.network.observations import Control
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
+from photogram.show.lines import field, table_lines
 from photogram.show.page import Column, Row, Section, Table, decimals_of
+from photogram.show.quantity import Axis, Quantity
+from photogram.show.sections import Section as Text
 
-__all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
+__all__ = ["Placed", "check_place", "control_lines", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
@@ -95,12 +99,17 @@ class Placed:
     def control_differences(self) -> tuple[Indices, Floats]:
         """Return rows among all points, and (c, 3) differences of control, adjusted minus given: metres.
 
-        They are along east, north and up; components that are not held are 0 before they are turned.
+        They are along east, north and up; components that are not held are 0 before they are turned. Control
+        that is observed with a covariance matrix is behind the other control.
         """
         control = self.result.control
+        names, observed = _observed_differences(self.result)
+        ids = {name: row for row, name in enumerate(self.result.block.point_ids)} if names else {}
+        rows = np.append(control.rows, np.array([ids[name] for name in names], dtype=np.int64))
+        differences = np.vstack([_metric(self.result, control.rows, control.differences), observed])
         places = {row: k for k, row in enumerate(self.rows.tolist())}
-        own = self.point_turns[[places[row] for row in control.rows.tolist()]]
-        return control.rows, _turned(own, _metric(self.result, control.rows, control.differences))
+        own = self.point_turns[[places[row] for row in rows.tolist()]]
+        return rows, _turned(own, differences)
 
     def differences(self) -> tuple[Indices, Floats]:
         """Return rows among all points, and (c, 3) adjusted minus given of check points, likewise."""
@@ -263,6 +272,16 @@ def _metric(result: Result, rows: Indices, differences: Floats) -> Floats:
     return np.where(np.isnan(differences), 0.0, differences * lengths)
 
 
+def _observed_differences(result: Result) -> tuple[list[str], Floats]:
+    """Return names and (c, 3) adjusted minus observed positions of control with a covariance matrix."""
+    kind = result.kinds.get(Control.KIND)
+    if kind is None:
+        return [], np.zeros((0, 3))
+    used = np.isfinite(kind.residuals).all(axis=1)
+    observations = (result.block.observations[row] for row in kind.rows[used].tolist())
+    return [each.points[0] for each in observations], -kind.residuals[used]
+
+
 def _turned(turns: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.einsum("nij,nj->ni", turns, vectors))
 
@@ -270,7 +289,8 @@ def _turned(turns: Floats, vectors: Floats) -> Floats:
 def placed_section(found: Placed) -> Section:
     """Return adjusted control and check points in the system of a client, with standard deviations.
 
-    Standard deviations are along east, north and up of the system, in metres.
+    Standard deviations and differences from given positions are along east, north and up of the system, in
+    metres.
     """
     names, kinds = found.result.block.point_ids, found.result.point_kinds
     own = [k for k, row in enumerate(found.rows.tolist()) if kinds[row] != "pass"]
@@ -284,13 +304,44 @@ def placed_section(found: Placed) -> Section:
             Column(name.capitalize(), unit, 8 if unit == "deg" else decimals)
             for name, unit in zip(found.names, found.units, strict=True)
         ),
-        *(Column(f"sd {axis}", "m", decimals) for axis in ("east", "north", "up")),
+        *(Column(f"sd {axis}", "m", decimals) for axis in _LOCAL),
+        *(Column(f"d {axis}", "m", decimals) for axis in _LOCAL),
     ]
+    differences = _listed_differences(found)
     rows: list[Row] = []
     for k in own[:MOST]:
         row = int(found.rows[k])
-        rows.append([names[row], str(kinds[row]), *found.points[k].tolist(), *sd[k].tolist()])
+        rows.append(
+            [names[row], str(kinds[row]), *found.points[k].tolist(), *sd[k].tolist(), *differences[row]]
+        )
     left = len(own) - len(rows)
-    note = "Tables of all photos and points are in `in_crs`" + (f"; {left} more there." if left else ".")
+    note = "d: adjusted minus given. Tables of all photos and points are in `in_crs`" + (
+        f"; {left} more there." if left else "."
+    )
     title = f"Control and check points in {found.crs}"
     return Section("in-crs", title, [Table(title, columns, rows, note)] if rows else [])
+
+
+def _listed_differences(found: Placed) -> dict[int, list[float]]:
+    """Return adjusted minus given of control and check points, by their rows among all points."""
+    pairs = (found.differences(), found.control_differences())
+    return {row: own for rows, d in pairs for row, own in zip(rows.tolist(), d.tolist(), strict=True)}
+
+
+def control_lines(found: Placed) -> Text:
+    """Return title and lines of control and check points in a report: adjusted minus given, metres."""
+    names, kinds = (
+        np.array(each, dtype=object) for each in (found.result.block.point_ids, found.result.point_kinds)
+    )
+    differences = _listed_differences(found)
+    rows = sorted(differences, key=lambda row: natural_order(names[row]))
+    axes = tuple(Axis.of(name, "m") for name in _LOCAL)
+    d = Quantity(np.reshape([differences[row] for row in rows], (-1, 3)), axes, "difference")
+    lines = table_lines(
+        [
+            *field(Quantity(names[rows], kind="name"), 10, head="point"),
+            *field(Quantity(kinds[rows], kind="name"), 9, head="kind"),
+            *field(d, 14, ".4f", "d {name} {unit}"),
+        ]
+    )
+    return f"Control and check points in {found.crs}: adjusted minus given", lines

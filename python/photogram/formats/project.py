@@ -134,6 +134,8 @@ class Project(Brief):
         Images of the board that were left out.
     tracks
         Points whose names are numbers of tracks. A list of control points has other names.
+    control_crs
+        Coordinate reference system of the control, if it is not the frame.
     """
 
     block: Block
@@ -154,6 +156,7 @@ class Project(Brief):
     boards: Mapping[str, Board] = field(default_factory=dict)
     unused: Unused = field(default_factory=Unused)
     tracks: frozenset[str] = frozenset()
+    control_crs: str = ""
 
     def __post_init__(self) -> None:
         given = self.block.in_frame(self.frame)

@@ -425,9 +425,12 @@ def with_control(
         ),
         statement=with_cover(project.statement, given.names, given.vegetated.intersection(places)),
         messages=(*messages, *moved.messages[len(project.messages) :]),
+        control_crs=settings.crs.get("control", ""),
         # What is given now is no longer lacking.
         lacks=tuple(
-            each for each in moved.lacks if not ("--control FILE" in each and np.isfinite(deviation).any())
+            each
+            for each in moved.lacks
+            if not ("--control FILE" in each and (full or np.isfinite(deviation).any()))
         ),
     )
     planes = [

@@ -147,10 +147,17 @@ def tested_together(block: Block) -> list[int]:
 
 
 def point_kinds(block: Block) -> NDArray[np.str_]:
-    """Return (n,) `control` with a component held, `check` with some known but none held, else `pass`."""
+    """Return (n,) `control` with an observed component, `check` with known ones alone, else `pass`."""
     held = np.isfinite(block.point_sd).any(axis=1)
+    held[observed_control(block)] = True
     known = np.isfinite(block.point_positions).any(axis=1)
     return np.where(held, "control", np.where(known, "check", "pass"))
+
+
+def observed_control(block: Block) -> list[int]:
+    """Return the points of control that is observed with a covariance matrix of its own."""
+    names = {each.point for each in block.observations if isinstance(each, Control)}
+    return [row for row, name in enumerate(block.point_ids) if name in names] if names else []
 
 
 def _apart(differences: Floats, axes: tuple[Axis, ...], place: tuple[int, ...], sd: Floats) -> str:

@@ -17,6 +17,7 @@ from photogram.network.observations import Observation, Prior, Smoothness
 from photogram.network.structuring import structure
 from photogram.results.axes import image_axes, point_axes
 from photogram.results.calibration_report import calibration_sections, values_written
+from photogram.results.check_points import observed_control
 from photogram.results.courses import POSES, courses_table, notable, notable_courses
 from photogram.results.features_report import features_sections
 from photogram.results.film_report import film_lines
@@ -184,7 +185,9 @@ def size_of(result: Result) -> list[tuple[str, str]]:
     """Return what the block consists of: names and what there is."""
     block = result.block
     kinds = result.point_kinds[result.used_points].tolist()
-    held = np.isfinite(block.point_sd) & result.used_points[:, np.newaxis]
+    held = np.isfinite(block.point_sd)
+    held[observed_control(block)] = True
+    held &= result.used_points[:, np.newaxis]
     counts = zip(point_axes(block), held.sum(axis=0), strict=True)
     return [
         ("photos", f"{len(block.photo_ids)}"),

@@ -372,7 +372,7 @@ class Result(OnFilm, AdjustedNetwork):
 
     @property
     def point_kinds(self) -> NDArray[np.str_]:
-        """(n,) `control` with a component held, `check` with components known but none held, else `pass`."""
+        """(n,) `control` with an observed component, `check` with known ones alone, else `pass`."""
         return point_kinds(self.block)
 
     @property

@@ -166,6 +166,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
         boards=boards,
         unused=_unused(settings, images, cameras, np.asarray(photo_cameras), photos) if boards else Unused(),
         features=settings.features,
+        control_crs=settings.crs.get("control", ""),
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
     )
     _check_features(settings, points.names)
