@@ -10,7 +10,7 @@ from plates import QUICK, case_2_session, noisy
 from photogram import InputError
 from photogram.comparator import Correction, Grid, Options, calibrate, simulate_calibration, to_csv, to_json
 from photogram.comparator.combined_solution import CombinedPolynomial
-from photogram.comparator.outliers import far_pointings, screen
+from photogram.comparator.outliers import far_pointings, pointing_tests, screen
 from photogram.comparator.reduction import Reduction
 
 
@@ -116,6 +116,11 @@ def test_a_pointing_ten_sigma_off_is_named_with_its_record(run, tmp_path):
     result = run("comparator", path, "--grid", tmp_path / "1.csv", "--no-plots")
     assert result.exit_code == 0
     point = session.cases[1].points[37]
+    verdict = calibrate(changed(session, 1, xy_um=xy), QUICK).verdict
+    assert verdict.code == "look-at"
+    (test,) = (test for test in verdict.tests if test.name.startswith("pointings"))
+    assert not test.accepted
+    assert f"limit {test.limits[1]:.2f}" in result.output
     assert f"case 2, point {point}: a pointing is" in result.output
     record = path.read_text().splitlines().index("plate,case,operator,leg,point,x_um,y_um") + 2 + 128 + 37
     listing = (tmp_path / "m-calibrated" / "listing.txt").read_text()
@@ -129,7 +134,7 @@ def test_the_limit_of_pointings_holds_its_level():
     found = 0
     for _ in range(300):
         drawn = random.normal(0, 1.0, case.xy_um.shape)
-        found += bool(far_pointings([replace(case, xy_um=drawn)]))
+        found += bool(far_pointings(pointing_tests([replace(case, xy_um=drawn)])))
     assert 4 <= found <= 28
 
 
@@ -325,5 +330,5 @@ def test_columns_without_names_stay_where_they_are(run, tmp_path):
 
 
 def test_case_2_of_the_report_has_one_point_with_two_pointings_apart():
-    found = far_pointings(case_2_session().cases)
+    found = far_pointings(pointing_tests(case_2_session().cases))
     assert [(far.point, round(abs(far.deviation_um), 1)) for far in found] == [(8, 3.5), (8, 3.5)]

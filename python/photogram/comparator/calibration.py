@@ -31,9 +31,11 @@ from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_joint
 from photogram.comparator.options import Options
 from photogram.comparator.outliers import (
     FarPointing,
+    PointingTests,
     Screening,
     far_pointings,
     plate_remarks,
+    pointing_tests,
     problems,
     screen,
 )
@@ -149,6 +151,8 @@ class Calibration(Judged, Paged, Brief):
         (grid without error, equal weights, no polynomials), in standard deviations.
     screening
         Measured points that do not agree with the adjustment of the others, and the harm they do.
+    pointing_tests
+        Tests of all pointings, case by case.
     far_pointings
         Single pointings that do not agree with the others of their case.
     messages
@@ -168,6 +172,7 @@ class Calibration(Judged, Paged, Brief):
     joint: JointFit | None
     joint_check: float | None
     screening: Screening
+    pointing_tests: tuple[PointingTests, ...]
     far_pointings: tuple[FarPointing, ...]
     messages: list[Message]
 
@@ -262,8 +267,12 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     variance = _variance(session, cases, pointing, linear, nonlinear, averages, options, messages)
     messages += plate_remarks(session, placed)
     joint = _joint(session, placed, linear, pointing, nonlinear is not None, options, messages)
-    screening = screen(placed, nonlinear or linear, session.grids)
-    far = far_pointings(session.cases)
+    pointings = pointing_tests(session.cases)
+    readings = 2 * sum(len(case.points) for case in placed)
+    screening = screen(
+        placed, nonlinear or linear, session.grids, sum(each.ratios.size for each in pointings)
+    )
+    far = far_pointings(pointings, readings)
     return Calibration(
         session=session,
         options=options,
@@ -278,6 +287,7 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         joint=joint,
         joint_check=_joint_check(session, placed, linear) if options.joint else None,
         screening=screening,
+        pointing_tests=tuple(pointings),
         far_pointings=tuple(far),
         messages=[*problems(session, placed, screening, far, joint), *messages],
     )

@@ -55,6 +55,8 @@ class FarPointing:
         From the mean of the point, in the coordinate that is off.
     ratio
         The deviation over its standard deviation, by the other pointings of the case.
+    limit
+        Of the ratio.
     """
 
     case: int
@@ -62,6 +64,7 @@ class FarPointing:
     row: int
     deviation_um: float
     ratio: float
+    limit: float
 
 
 @dataclass(frozen=True)
@@ -126,14 +129,35 @@ class Screening:
         return self.change_um > self.sigma_um
 
 
-def far_pointings(cases: Sequence[Case]) -> list[FarPointing]:
-    """Find pointings that do not agree with the others of their case.
+@dataclass(frozen=True, eq=False)
+class PointingTests:
+    """Tests of the pointings of a case against the others of the case.
+
+    Attributes
+    ----------
+    case
+        The case.
+    deviations
+        (k, 2) from the mean of the point, or of its leg.
+    ratios
+        (k, 2) externally studentized; 0 for single pointings.
+    freedom
+        Degrees of freedom of the standard deviation in x, and of that in y.
+    """
+
+    case: Case
+    deviations: Floats
+    ratios: Floats
+    freedom: int
+
+
+def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
+    """Test pointings against the others of their case.
 
     Each deviates from the mean of its point (of its leg, where legs were measured); deviations in x and in y
     of a case have one standard deviation each.
     """
-    tests = 2 * sum(len(case.points) for case in cases)
-    found = []
+    tests = []
     for case in cases:
         _, group, counts = np.unique(
             np.column_stack([case.points, case.legs]), axis=0, return_inverse=True, return_counts=True
@@ -144,18 +168,28 @@ def far_pointings(cases: Sequence[Case]) -> list[FarPointing]:
         sums = np.column_stack([np.bincount(group, weights=column) for column in offsets.T])
         deviations = offsets - (sums / counts[:, np.newaxis])[group]
         redundancy = (1 - 1 / counts)[group]
-        limit = studentized_limit(freedom, tests)
         ratios = np.zeros_like(deviations)
         repeated = redundancy > 0
         for axis, own in enumerate(deviations.T):
             w = own[repeated] / np.sqrt(redundancy[repeated])
             ratios[repeated, axis] = externally_studentized(w, float(own @ own), freedom)
-        ratios[np.abs(deviations) <= LEAST_UM] = 0.0
-        worst = np.abs(ratios).argmax(axis=1)
+        ratios[(np.abs(deviations) <= LEAST_UM) | np.isnan(ratios)] = 0.0
+        tests.append(PointingTests(case, deviations, ratios, freedom))
+    return tests
+
+
+def far_pointings(tests: Sequence[PointingTests], others: int = 0) -> list[FarPointing]:
+    """Find pointings that do not agree; `others` are tests that share the level with these."""
+    found = []
+    number = sum(each.ratios.size for each in tests) + others
+    for each in tests:
+        limit = studentized_limit(each.freedom, number)
+        worst = np.abs(each.ratios).argmax(axis=1)
         rows = np.arange(len(worst))
-        for row in np.flatnonzero(np.abs(ratios[rows, worst]) > limit).tolist():
-            deviation, ratio = float(deviations[row, worst[row]]), float(ratios[row, worst[row]])
-            found.append(FarPointing(case.number, int(case.points[row]), row, deviation, abs(ratio)))
+        for row in np.flatnonzero(np.abs(each.ratios[rows, worst]) > limit).tolist():
+            deviation, ratio = (float(own[row, worst[row]]) for own in (each.deviations, each.ratios))
+            point = int(each.case.points[row])
+            found.append(FarPointing(each.case.number, point, row, deviation, abs(ratio), limit))
     return found
 
 
@@ -163,8 +197,12 @@ def screen(
     cases: Sequence[PlacedCase],
     stage: CombinedLinear | CombinedPolynomial,
     grids: Mapping[int, Grid],
+    others: int = 0,
 ) -> Screening:
-    """Find measured points that do not agree with the adjustment of the others, in the last stage."""
+    """Find measured points that do not agree with the adjustment of the others, in the last stage.
+
+    `others` are tests that share the level with these.
+    """
     kept = list(cases)
     removed: list[tuple[int, int, float]] = []
     clean, limit = stage, math.inf
@@ -173,7 +211,7 @@ def screen(
         tests, freedom = _ratios(kept, clean)
         first = first or (tuple(tests), freedom)
         ratios = [own.max(axis=1) for own in tests]
-        limit = studentized_limit(freedom, 2 * sum(len(own) for own in ratios))
+        limit = studentized_limit(freedom, 2 * sum(len(own) for own in ratios) + others)
         worst = max(float(own.max()) for own in ratios)
         if not worst > limit:
             break
@@ -370,7 +408,8 @@ def _off_once(outlier: Outlier, limit: float) -> str:
 def _far(pointing: FarPointing) -> str:
     return (
         f"case {pointing.case}, point {pointing.point}: a pointing is {abs(pointing.deviation_um):.1f} um"
-        f" from the mean, {pointing.ratio:.3g} times its standard deviation: a blunder?"
+        f" from the mean, {pointing.ratio:.3g} times its standard deviation (limit"
+        f" {pointing.limit:.2f}): a blunder?"
     )
 
 

@@ -191,9 +191,19 @@ def comparator_findings(calibration: Calibration) -> Findings:
 
     values = np.vstack(screening.ratios).ravel()
     readings = Tested("readings of the grid", values, name, "t", second=max(screening.freedom - 1, 1))
+    tests = calibration.pointing_tests
+    rows = [(each.case, row, axis) for each in tests for row in range(len(each.ratios)) for axis in "xy"]
+
+    def pointing(index: tuple[int, ...]) -> str:
+        case, row, axis = rows[index[0]]
+        return f"{axis} of pointing {row + 1}, point {case.points[row]} of case {case.number}"
+
+    ratios = np.concatenate([each.ratios.ravel() for each in tests])
+    freedom = np.repeat([each.freedom for each in tests], [each.ratios.size for each in tests])
+    pointings = Tested("pointings", ratios, pointing, "t", second=np.maximum(freedom - 1.0, 1.0))
     return Findings(
         status="converged",
-        observations=[readings],
+        observations=[readings, pointings],
         degrees_of_freedom=screening.freedom,
         untested="readings have no standard deviation of their own",
         spoiled=f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"

@@ -18,7 +18,7 @@ from photogram.stellar.blind import ATTITUDE, FIELD, locate
 from photogram.stellar.comparison import stood_still
 from photogram.stellar.lens_choice import LensFit, LensTest, as_lens, compared_lenses, test_scale, test_terms
 from photogram.stellar.lenses import LENSES
-from photogram.stellar.night_result import SIGNIFICANT, CalibratedNight, Night
+from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.night_run import Run, adjusted
 from photogram.stellar.places import Earth
 from photogram.stellar.sky_cameras import SkyCamera
@@ -185,9 +185,13 @@ def _failed(result: CalibratedNight) -> list[Message]:
 def _remarks(result: CalibratedNight) -> list[Message]:
     """Name what the stars hardly determine, and what else they say."""
     texts = [f"correlation of {a} and {b}: {r:+.4f}" for a, b, r in result.correlated()]
-    weak = [f"{name} ({t:.1f} mean errors)" for name, t in result.significance().items() if t < SIGNIFICANT]
+    weak = [
+        f"{test.name} (probability {test.probability:.2g})"
+        for test in result.term_tests
+        if not test.significant
+    ]
     if weak:
-        texts.append(f"distortion terms that are not significant: {', '.join(weak)}")
+        texts.append(f"distortion terms that are not significant: {'; '.join(weak)}")
     scale = result.scale_test
     if scale is not None and result.night.common_scale and scale.needed:
         texts.append(

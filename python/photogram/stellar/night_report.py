@@ -16,7 +16,7 @@ from photogram.show.lines import Field, fact_lines, field, table_lines
 from photogram.show.quantity import Table, chosen, records
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE, LensTest
-from photogram.stellar.night_result import SIGNIFICANT, CalibratedNight
+from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.night_tables import (
     attitudes,
     exposures,
@@ -165,7 +165,7 @@ def _camera(result: CalibratedNight) -> list[str]:
             sd = math.sqrt(prior.covariance[i, i])
             before = _shown(prior.values[i], sd) + f"{sd:16.4G}"
         lines.append(f"{name:<8}{_shown(camera.values[i], errors[i])}{after}{ratio}{before}".rstrip())
-    return [*lines, f"fx, fy, cx, cy in pixels; terms are significant from {SIGNIFICANT} mean errors"]
+    return [*lines, "fx, fy, cx, cy in pixels; the tests of the lens decide which terms are significant"]
 
 
 def _shown(value: float, error: float) -> str:

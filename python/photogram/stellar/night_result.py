@@ -26,8 +26,6 @@ from photogram.stellar.sky_cameras import SkyCamera
 
 CORRELATED = 0.95
 """Correlations above this are named."""
-SIGNIFICANT = 1.96
-"""Distortion terms below this multiple of their mean error are named (5 % of error)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
