@@ -13,9 +13,7 @@ from photogram import Block, Result, adjust, simulate
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 from photogram.giant import Project, read_project, write_project
-from photogram.statistics import normal_limit
-from photogram.statistics.findings import Observations, outliers
-from photogram.statistics.reliability import TESTABLE
+from photogram.show.methods import page_of
 
 NETWORK: dict[str, Any] = {"strips": 2, "photos_per_strip": 5, "points_per_photo": 40, "control_spacing": 2}
 NONE = re.compile(r"Problems\n-+\nnone\n")
@@ -80,29 +78,33 @@ def test_outliers_of_every_kind_are_named():
     lines = [line for line in problems(result) if "beyond" in line]
     assert lines == section(result.report())[1 : 1 + len(lines)]
     assert [line.split(" have ")[0].split(" ", 3)[3] for line in lines] == [
-        "image coordinates", "components of control", "components of stations"
+        "images", "control points", "positions of photos"
     ]  # fmt: skip
-    assert lines[0].endswith(f"is that of y of point {point} on photo {photo}")
-    tested = np.where(result.point_redundancy > TESTABLE, np.abs(result.point_standardized), 0.0)
-    row, axis = np.unravel_index(tested.argmax(), tested.shape)
-    assert row == control
-    assert lines[1].endswith(f"is that of {'XYZ'[axis]} of control point {block.point_ids[control]}")
-    assert lines[2].endswith(f"is that of X of photo {block.photo_ids[7]}")
-    assert f"the largest, {result.point_standardized[control, axis]:.1f}," in lines[1]
+    assert lines[0].endswith(f"is that of image of point {point} on photo {photo}")
+    assert lines[1].endswith(f"is that of control point {block.point_ids[control]}")
+    assert lines[2].endswith(f"is that of position of photo {block.photo_ids[7]}")
+    # The tests are those of the verdict, with their limits.
+    tests = {test.name.split(": ")[0]: test for test in result.verdict.tests}
+    for line in lines:
+        test = tests[line.split(" have ")[0].split(" ", 3)[3]]
+        assert f"{test.statistic} beyond {test.limits[1]:.2f}: the largest, {test.value:.1f}," in line
+        assert not test.accepted
 
 
-def test_the_limit_knows_how_many_are_tested():
-    quiet = np.linspace(-1, 1, 999)
-    values = np.append(quiet, 4.0)
-    groups = [Observations("values", values, lambda index: f"value {index[0]}")]
-    assert outliers(groups, normal_limit, "test values") == []  # the limit of a thousand is 4.06
-    values[-1] = -4.2
-    [message] = outliers(groups, normal_limit, "test values")
-    assert str(message) == (
-        "1 of 1000 values have test values beyond 4.06: the largest, -4.2, is that of value 999"
-    )
-    few = [Observations("values", np.array([np.nan, 3.0]), lambda index: f"value {index[0]}")]
-    assert len(outliers(few, normal_limit, "test values")) == 1
+def test_the_worst_observations_of_every_kind_have_their_numbers():
+    block = simulate(**NETWORK, position_sd=0.05, seed=3).block
+    observed = block.photo_positions_observed.copy()
+    observed[7, 0] += 2.0
+    result = adjust(block.replace(photo_positions_observed=observed))
+    section = next(each for each in page_of(result).sections if each.id == "worst")
+    heads = [column.head for column in section.parts[0].columns]
+    rows = [dict(zip(heads, row, strict=True)) for row in section.parts[0].rows]
+    (row,) = (row for row in rows if row["Observation"] == f"X of photo {block.photo_ids[7]}")
+    assert row["Residual"] == pytest.approx(result.photo_residuals[7, 0])
+    assert row["sd given"] == pytest.approx(0.05)
+    assert row["Unit"] == block.linear_unit
+    assert row["Test value w"].value == pytest.approx(result.photo_standardized[7, 0])
+    assert "Beyond" not in section.parts[0].note
 
 
 def test_good_blocks_seldom_have_outliers():
@@ -122,7 +124,7 @@ def test_collections_name_their_outliers():
     result = adjust_collection(collection.replace(image_xy=xy))
     point, photo = collection.image_points[50], collection.image_photos[50]
     [line] = [line for line in section(result.report()) if "beyond" in line]
-    assert re.search(rf"is that of [xy] of point {point} on photo {photo}$", line)
+    assert re.search(rf"is that of image of point {point} on photo {photo}$", line)
     wrong = adjust_collection(collection.replace(image_sd=collection.image_sd / 20))
     assert section(wrong.report())[0].startswith("the global test fails")
 
@@ -152,8 +154,8 @@ def test_giant_says_that_the_global_test_fails(run, project):
     assert done.output.startswith("Verdict\n  Gross errors likely: 1) ")
     lines = done.output[done.output.index("Problems\n") :].splitlines()
     assert lines[1].strip().startswith("the global test fails")
-    for kind in ("image coordinates", "components of control"):
-        assert any(f" {kind} have standardized residuals beyond" in line for line in lines[2:4]), kind
+    for kind in ("images", "control points"):
+        assert any(f" {kind} have T beyond" in line for line in lines[2:4]), kind
     assert lines[1].strip() in (project.with_name("wrong-adjusted") / "report.txt").read_text()
 
 

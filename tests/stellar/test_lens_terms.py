@@ -80,6 +80,9 @@ def test_effects_are_what_terms_move_in_the_frame(result):
     moved = np.hypot(2 * p1 * u * v + p2 * (square + 2 * u**2), p1 * (square + 2 * v**2) + 2 * p2 * u * v)
     assert tests["p1, p2"].effect == pytest.approx(f * moved.max(), rel=0.1)
     assert tests["p1, p2"].verdict == "needed"
+    (remark,) = (str(each) for each in result.messages if "not significant" in str(each))
+    named = {name for name, test in tests.items() if f"{name} (" in remark}
+    assert named == {name for name, test in tests.items() if not test.significant}
     assert "k3" in report(result).split("Tests of the lens")[1].split("not shown by the data")[0]
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.messages import Message
 from photogram.network.geometry import lengths_of_units
 from photogram.network.knots import Knot
 from photogram.network.observations import Observation, Prior, Smoothness
@@ -33,7 +33,6 @@ from photogram.results.observation_rows import (
     largest_of,
     observed_lines,
     suspect_lines,
-    tested_observations,
 )
 from photogram.results.result import Result
 from photogram.results.tables import check_points, observed_components, redundancy_by_kind, unheld, unknowns
@@ -42,8 +41,7 @@ from photogram.show.lines import Field, blank, field, padded, stacked, table_lin
 from photogram.show.methods import report_of
 from photogram.show.quantity import Axis, Quantity, chosen, labelled
 from photogram.show.sections import Section, composed, headline, problems, problems_or_none, verdict_sections
-from photogram.statistics.findings import outliers
-from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
+from photogram.statistics.limits import externally_studentized
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
@@ -134,18 +132,9 @@ def suspects_section(result: AdjustedNetwork) -> Section:
 def problems_of(result: AdjustedNetwork) -> list[str]:
     """Return what keeps a reader from using the values: a failed test and outliers before other remarks.
 
-    Where standard deviations may be guesses, single residuals are tested against all others.
+    The tests of outliers are those of the verdict.
     """
-    groups, (omega, freedom) = tested_observations(result), result.sum_and_freedom
-    if result.KNOWN:
-        found = outliers(groups, normal_limit, "standardized residuals")
-    else:
-        groups = [
-            replace(each, values=externally_studentized(each.values, omega, freedom)) for each in groups
-        ]
-        limit = partial(studentized_limit, freedom)
-        found = outliers(groups, limit, "externally studentized residuals")
-    messages = [*found, *result.messages]
+    messages = [*map(Message, result.verdict.outliers), *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 
 

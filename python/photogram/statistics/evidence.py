@@ -150,6 +150,19 @@ class Evidence:
         """Tests beyond their limit as the standard deviations are given."""
         return self.beyond()
 
+    def outliers(self) -> list[str]:
+        """Return a sentence for each kind of observations with tests that reject: how many, the worst."""
+        sentences = []
+        for each in self.found.observations:
+            if beyond := each.beyond(self.level):
+                _, place = min(beyond)
+                test, value = _test_at(each, place, self.level, self.number), each.values[place]
+                sentences.append(
+                    f"{len(beyond)} of {self._count(each)} {each.kind} have {each.statistic} beyond"
+                    f" {test.limits[1]:.2f}: the largest, {value:.1f}, is that of {each.name(place)}"
+                )
+        return sentences
+
     @cached_property
     def gross(self) -> list[Beyond]:
         """Tests beyond their limit beside a common factor of all standard deviations.
@@ -375,8 +388,11 @@ def _log10(p: float) -> float:
 def _largest(tested: Tested, level: float, number: int) -> Test | None:
     """Return the test of the kind with the least probability; None where nothing is tested."""
     place = tested.largest()
-    if place is None:
-        return None
+    return None if place is None else _test_at(tested, place, level, number)
+
+
+def _test_at(tested: Tested, place: tuple[int, ...], level: float, number: int) -> Test:
+    """Return the test at a place of a kind."""
     one = tested.at(place)
     dimension, second = float(np.asarray(one.dimension)[0]), float(np.asarray(one.second)[0])
     least = float(one.log_probability()[0])

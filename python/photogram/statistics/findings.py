@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import Message
 from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
 from photogram.statistics.limits import GlobalTest, externally_studentized
 
@@ -346,34 +345,3 @@ class Findings:
     if_usable: Sequence[str] = ()
     if_withheld: Sequence[str] = ()
     level: float = LEVEL
-
-
-def outliers(groups: list[Observations], limit: Callable[[int], float], what: str) -> list[Message]:
-    """Return one remark for each kind of observations that has outliers: how many, and the worst.
-
-    The limit of a test depends on how many observations are tested (Bonferroni): of a block without blunders
-    one in twenty has a residual beyond it.
-
-    Parameters
-    ----------
-    groups
-        The observations that are tested together.
-    limit
-        Of the size of a test value, for a number of tests.
-    what
-        Name of the test value, in the plural.
-    """
-    sizes = [np.nan_to_num(np.abs(group.values), nan=-1.0, posinf=np.inf) for group in groups]
-    allowed = limit(sum(int(np.count_nonzero(size >= 0)) for size in sizes))
-    messages = []
-    for group, size in zip(groups, sizes, strict=True):
-        count = int(np.count_nonzero(size > allowed))
-        if count:
-            worst = tuple(int(index) for index in np.unravel_index(int(size.argmax()), size.shape))
-            messages.append(
-                Message(
-                    f"{count} of {np.count_nonzero(size >= 0)} {group.kind} have {what} beyond"
-                    f" {allowed:.2f}: the largest, {group.values[worst]:.1f}, is that of {group.name(worst)}"
-                )
-            )
-    return messages

@@ -54,6 +54,8 @@ class Verdict:
         What to do next, in sentences.
     tests
         The global test, the largest test value of every kind of observation, tests of patterns.
+    outliers
+        Sentences on the kinds of observations whose tests reject: how many, and the worst.
     removed, rivals, hints
         What snooping took out, what cannot be told apart from it, and accepted hypotheses.
     """
@@ -65,6 +67,7 @@ class Verdict:
     lines: tuple[str, ...]
     next: tuple[str, ...]
     tests: tuple[Test, ...]
+    outliers: tuple[str, ...] = ()
     removed: tuple[Any, ...] = ()
     rivals: tuple[str, ...] = ()
     hints: tuple[str, ...] = ()
@@ -127,6 +130,7 @@ def verdict(found: Findings) -> Verdict:
         ),
         next=next_steps(first.code, found, usable=usable, take_out=_can_be_taken_out(evidence)),
         tests=tuple(evidence.tests()),
+        outliers=tuple(evidence.outliers()),
         removed=tuple(found.snooped.removed) if found.snooped else (),
         rivals=tuple(found.snooped.rivals) if found.snooped else (),
         hints=tuple(found.hints),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.types import Floats
 from photogram.plots.accessor import sketch_of
+from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
 from photogram.results.observation_rows import tested_singly
@@ -30,11 +31,8 @@ from photogram.show.page import (
     Table,
     significant,
 )
-from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal, critical_student
+from photogram.show.quantity import Axis
 from photogram.statistics.findings import Tested
-
-if TYPE_CHECKING:
-    pass
 
 _NOT_CHECKED = 0.01
 
@@ -59,8 +57,7 @@ def network_page(
     `beside` beside the plan; `datum` says what coordinates refer to, `poses` what the poses of photos are
     where that is not plain.
     """
-    pictures, groups = drawings(result), tested_singly(result)
-    worst = _worst_of(groups)
+    pictures, worst = drawings(result), _worst_of(tested_singly(result))
     worst_photos, worst_points = _worst_images(result, worst)
     intro = (
         "The redundancy number of an observation is the share of its error that shows in its own"
@@ -80,7 +77,7 @@ def network_page(
             Section("residuals", "Image residuals", [pictures["residuals"]]),
             Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
             _tests_section(result, pictures["tests"]),
-            _worst_section(result, groups, worst),
+            _worst_section(result, worst),
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
@@ -203,14 +200,14 @@ def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
     return Section("tests", "Tests", parts, intro)
 
 
-def _worst_section(result: AdjustedNetwork, groups: Sequence[Tested], worst: Sequence[Worst]) -> Section:
+def _worst_section(result: AdjustedNetwork, worst: Sequence[Worst]) -> Section:
     """Return the worst observations."""
     intro = (
         "A residual alone says little: an error shows in it only by the share of its redundancy number."
         " The test"
         " value takes both into account. Names of photos and points lead to their rows below."
     )
-    parts = [_worst_table(result, _limit_of(groups), worst)] if worst else []
+    parts = [_worst_table(result, worst)] if worst else []
     return Section("worst", "Worst observations", parts, intro)
 
 
@@ -255,57 +252,73 @@ def _worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list
     return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
 
 
-def _worst_table(result: AdjustedNetwork, limit: float | None, worst: Sequence[Worst]) -> Table:
+def _worst_table(result: AdjustedNetwork, worst: Sequence[Worst]) -> Table:
     """Return the observations whose test values are the largest, of all kinds."""
-    terms = terms_of(result)
+    terms, limit = terms_of(result), _limit(result)
+    numbers = dict(zip((each.kind for each in tested_singly(result)), _numbers(result), strict=True))
     rows: list[list[Cell | str | float | None]] = []
     for size, tested, place in worst:
+        residuals, sd, redundancy, axes = numbers[tested.kind]
+        axis = axes[place[1]]
         beyond = limit is not None and size > limit
-        value = Cell(float(tested.values[place]), tone="look" if beyond else "")
+        names: list[Cell | str | None] = [tested.name(place), None, None]
         if tested.kind == "image coordinates":
-            image, k = place
-            photo, point, axis = (
-                result.given.image_photos[image],
-                result.image_points[image],
-                terms.image_axes[k],
-            )
-            rows.append(
-                [
-                    f"image {axis.name}",
-                    Cell(str(terms.photos[photo]), goes_to=f"photo-{photo}"),
-                    Cell(str(terms.points[point]), goes_to=f"point-{point}"),
-                    float(result.residuals[place]) * axis.factor,
-                    float(result.image_given_sd[place]) * axis.factor,
-                    float(result.redundancy[place]),
-                    value,
-                ]
-            )
-        else:
-            rows.append([tested.name(place), None, None, None, None, None, value])
-    unit = unit_written(terms.image_axes[0].small)
-    statistic = worst[0][1].statistic if worst else "w"
+            photo, point = result.given.image_photos[place[0]], result.image_points[place[0]]
+            names = [
+                f"image {axis.name}",
+                Cell(str(terms.photos[photo]), goes_to=f"photo-{photo}"),
+                Cell(str(terms.points[point]), goes_to=f"point-{point}"),
+            ]
+        rows.append(
+            [
+                *names,
+                float(residuals[place]) * axis.factor,
+                float(sd[place]) * axis.factor,
+                unit_written(axis.small),
+                float(redundancy[place]),
+                Cell(float(tested.values[place]), tone="look" if beyond else ""),
+            ]
+        )
     columns = (
         Column("Observation", text=True),
         Column("Photo", text=True),
         Column("Point", text=True),
-        Column("Residual", unit, decimals=2),
-        Column("sd given", unit, decimals=2),
+        Column("Residual", figures=3),
+        Column("sd given", figures=3),
+        Column("Unit", text=True),
         Column("Redundancy", decimals=3),
-        Column(f"Test value {statistic}", decimals=2),
+        Column(f"Test value {worst[0][1].statistic}", decimals=2),
     )
-    said = "" if limit is None else f" Beyond {limit:.2f} the test of a single observation rejects."
-    others = " Residuals of other kinds stand in their own tables."
-    note = f"The {len(rows)} of the largest test values.{said}{others}"
-    return Table("Worst observations", columns, rows, note)
+    said = (
+        "The verdict tests groups of observations: the section Tests has their limits."
+        if limit is None
+        else f"Beyond {limit:.2f} the test of a single observation rejects."
+    )
+    return Table("Worst observations", columns, rows, f"The {len(rows)} of the largest test values. {said}")
 
 
-def _limit_of(groups: Sequence[Tested]) -> float | None:
-    """Return what a test value of a single observation may be at most, 5 percent for all together."""
-    number = sum(int(np.count_nonzero(~np.isnan(each.values))) for each in groups)
-    if not number:
-        return None
-    level, second = bonferroni(LEVEL, number), float(np.asarray(groups[0].second))
-    return critical_normal(level) if np.isinf(second) else critical_student(level, second)
+def _numbers(result: AdjustedNetwork) -> list[tuple[Floats, Floats, Floats, tuple[Axis, ...]]]:
+    """Return residuals, standard deviations, redundancy numbers and components of every kind."""
+    terms = terms_of(result)
+    return [
+        (result.residuals, result.image_given_sd, result.redundancy, terms.image_axes),
+        (result.point_residuals, result.point_given_sd, result.point_redundancy, terms.point_axes),
+        (result.photo_residuals, result.photo_given_sd, result.photo_redundancy, terms.photo_axes),
+        *(
+            (
+                each.residuals,
+                each.sd,
+                each.redundancy,
+                tuple(map(component_axis, each.components, each.units)),
+            )
+            for each in terms.kinds
+        ),
+    ]
+
+
+def _limit(result: AdjustedNetwork) -> float | None:
+    """Return the limit of single observations in the verdict; None if it tests groups."""
+    return next((test.limits[1] for test in result.verdict.tests if test.statistic in ("w", "t")), None)
 
 
 CAPTIONS = {

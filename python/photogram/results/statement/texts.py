@@ -157,7 +157,7 @@ class Texts:
 
     def probability(self, value: float) -> str:
         """Return a probability."""
-        return self.numeral(probability_written(value))
+        return probability_written(value).replace(".", self._table["number.decimal"])
 
     def numeral(self, written: str) -> str:
         """Return a number that is written with a point as the language writes it."""
