@@ -50,6 +50,32 @@ def written(project, place, file_format="plain"):
     return place
 
 
+# Cameras
+
+
+@pytest.mark.parametrize(
+    ("model", "single", "values"),
+    [
+        ("", "simple_pinhole", ""),
+        ("opencv", "radial", "-0.068,0.041"),
+        ("opencv_fisheye", "radial_fisheye", "-0.068,0.041"),
+        ("division", "simple_division", "-0.068"),
+    ],
+)
+def test_one_unknown_column_f_is_one_unknown(example, model, single, values):
+    names = {"-0.068,0.041": "k1,k2", "-0.068": "k", "": ""}[values]
+    head = ",".join(filter(None, ["camera,model,width,height,f,sd_f,cx,cy", names]))
+    row = ",".join(filter(None, [f"drone,{model},4000,3000,3620.0,inf,2009.3,1491.6", values]))
+    (example / "cameras.csv").write_text(f"{head}\n{row}\n")
+    (camera,) = formats.read(example).block.cameras
+    assert camera.model == single
+    assert [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd] == ["f"]
+    parameters = {name: value for name, value in camera.parameters.items() if name != "f"}
+    double = Camera(model or "pinhole", parameters | {"fx": 3620.0, "fy": 3620.0})
+    directions = np.array([[0.1, -0.2, -1.0], [-0.3, 0.2, -1.0]])
+    np.testing.assert_allclose(camera.project(directions), double.project(directions), atol=1e-9)
+
+
 # Numbers
 
 
