@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from photogram import Camera, adjust, diagnose, simulate
+from photogram import Camera, adjust, diagnose, formats, simulate
 from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
+from photogram.network.wider_models import with_parameters
 from photogram.show.methods import page_of
 
 
@@ -159,6 +160,72 @@ def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_pat
     held = np.flatnonzero(np.isfinite(good.point_sd).all(axis=1))
     positions[held[1]] += [30.0, 0.0, 10.0]
     assert adjust(good.replace(point_positions=positions)).verdict.code == "gross-errors"
+
+
+@pytest.mark.parametrize(
+    ("model", "principal", "advice"),
+    [
+        ("pinhole", ("fx", "fy"), "--self-calibrate f,cx,cy,k1,k2,p1,p2"),
+        ("simple_pinhole", ("f",), "--self-calibrate f,cx,cy,k1,k2"),
+    ],
+)
+@pytest.mark.parametrize("free", [False, True])
+def test_a_pinhole_with_distorted_images_gets_lens_terms(run, tmp_path, model, principal, advice, free):
+    """Its own parameters explain nothing: the advice names terms of a model that contains it."""
+    interior = dict.fromkeys(principal, 3000.0) | {"cx": 2000.0, "cy": 2000.0}
+    lens = Camera("opencv", dict.fromkeys(("fx", "fy"), 3000.0) | {"cx": 2000, "cy": 2000, "k1": -0.02})
+    nominal = Camera(model, interior, dict.fromkeys(interior, np.inf if free else 0.0), name="camera")
+    sizes = {"frame_size": 4000.0, "principal_distance": 3000.0, "image_sd": 0.5, "position_sd": 0.1}
+    block = simulate(
+        strips=3, photos_per_strip=5, cameras=[lens], start_cameras=[nominal], seed=5, **sizes
+    ).block
+    found = adjust(block)
+    assert found.verdict.code == "model"
+    assert f"{advice} estimates it" in found.verdict.headline
+    assert any(advice in each for each in found.verdict.next)
+    looked = diagnose(block)
+    assert [each.kind for each in looked.grave] == ["lens"]
+    assert f"{advice} estimates it" in looked.grave[0].text
+    assert looked.grave[0].values["times_smaller"] > 3
+    project = formats.Project(
+        block=block,
+        path=tmp_path,
+        title="",
+        sizes=(None,),
+        pixel_mm=(None,),
+        starts=np.full(block.point_positions.shape, np.nan),
+    )
+    for name, content in formats.to_files(project, "plain").items():
+        (tmp_path / "block" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "block" / name).write_bytes(content)
+    done = run("adjust", "block", *advice.split(), "--json", "result.json", "-q")
+    assert done.exit_code in (0, 4), done.output
+    document = json.loads(Path("result.json").read_bytes())
+    assert document["verdict"]["code"] != "model"
+    [camera] = document["cameras"]
+    [k1] = [each for each in camera["parameters"] if each["name"] == "k1"]
+    assert abs(k1["value"] + 0.02) < 5 * k1["sd"]
+
+
+def test_a_camera_without_distortion_keeps_its_images_in_a_wider_model():
+    directions = np.array([[0.1, 0.2, -1.0], [-0.3, 0.1, -2.0], [0.0, 0.0, -1.0]])
+    interior = {"f": 900.0, "cx": 500.0, "cy": 400.0}
+    for model, parameters, words in (
+        ("perspective", {"c": -150.0}, ["k1"]),
+        ("simple_pinhole", interior, ["k1"]),
+        ("simple_pinhole", interior, ["p1"]),
+        ("simple_radial", interior | {"k": 0.02}, ["k2"]),
+        ("simple_fisheye", interior, ["k1"]),
+        ("opencv", {"fx": 900.0, "fy": 905.0, "cx": 500.0, "cy": 400.0, "k1": 0.01, "p1": 1e-4}, ["k3"]),
+    ):
+        camera = Camera(model, parameters, dict.fromkeys(parameters, 0.5))
+        wider = with_parameters(camera, words)
+        assert wider.model != model
+        assert words[0] in [name.lower() for name in wider.names]
+        np.testing.assert_allclose(wider.project(directions), camera.project(directions), rtol=1e-12)
+        assert (wider.deviations > 0).sum() >= len(parameters)
+    kept = Camera("simple_pinhole", interior, covariance=(["f"], [[0.25]]))
+    assert with_parameters(kept, ["k1"]) is kept
 
 
 def test_snooping_ends_by_the_verdict_that_it_prints(run, project):

@@ -62,7 +62,8 @@ class Choices:
     self_calibrate: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME,NAME", help="Parameters of cameras that are unknown (f,cx,cy,k1 ...), or `all`."
+            metavar="NAME,NAME",
+            help="Free camera parameters (f,cx,cy,k1,k2: pinholes get lens terms), or `all` of the model.",
         ),
     ] = None
 

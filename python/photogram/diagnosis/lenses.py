@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from photogram.diagnosis.adjusting import Adjuster, put_right
 from photogram.diagnosis.findings import Finding
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.results.fixed_tests import usual_parameters
+from photogram.network.wider_models import calibrated, calibration_words, freed
 from photogram.results.result import Result
 from photogram.show.methods import findings_of
 from photogram.statistics.evidence import Evidence
@@ -54,29 +54,21 @@ def lenses_estimated(block: Block, findings: list[Finding], adjusted: Adjuster) 
 
     Good observations look gross where the lens is wrong, those of the positions of photos and control first.
     """
-    names = [usual_parameters(camera) for camera in block.cameras]
-    first = adjusted.converged(block) if any(names) else None
+    can_be = any(calibration_words(camera) for camera in block.cameras)
+    first = adjusted.converged(block) if can_be else None
     if first is None or first.global_test is None or not first.global_test.problem():
         return block
     found = findings_of(first)
     if not Evidence(found).lens:
         return block
-    cameras = [_freed(camera, own) for camera, own in zip(block.cameras, names, strict=True)]
-    freed = adjusted.converged(block.replace(cameras=cameras))
-    if freed is None or freed.global_test is None:
+    result = adjusted.converged(block.replace(cameras=[calibrated(camera) for camera in block.cameras]))
+    if result is None or result.global_test is None:
         return block
-    times = first.global_test.factor / freed.global_test.factor
+    times = first.global_test.factor / result.global_test.factor
     largest = max((each for each in found.systematic if each.large), key=lambda each: each.fall)
     text = f"{largest.sentence}; {found.calibrate} estimates it: residuals would be {times:.3g} times smaller"
     findings.append(Finding("lens", "grave", text, values={"times_smaller": times}))
-    return block.replace(cameras=[each.restarted() for each in freed.cameras])
-
-
-def _freed(camera: Camera, names: Iterable[str]) -> Camera:
-    """Return a camera of which some parameters are unknown, the others as well known as they are."""
-    known = zip(camera.names, camera.deviations.tolist(), strict=True)
-    sd = {name: value for name, value in known if value} | dict.fromkeys(names, math.inf)
-    return replace(camera, sd=sd, covariance=None)
+    return block.replace(cameras=[each.restarted() for each in result.cameras])
 
 
 def _given_terms(camera: Camera) -> dict[str, int]:
@@ -133,7 +125,7 @@ def _free_ratio(block: Block, adjusted: Adjuster) -> float:
     name = min(terms, key=lambda each: terms[each])
     cameras = list(block.cameras)
     without = {**camera.parameters, **dict.fromkeys(terms, 0.0)}
-    cameras[row] = replace(_freed(camera, [name]), parameters=without)
+    cameras[row] = replace(freed(camera, [name.lower()]), parameters=without)
     result = adjusted.converged(block.replace(cameras=cameras))
     if result is None:
         return 0.0
@@ -157,13 +149,13 @@ def half_pixel(result: Result, adjusted: Adjuster) -> list[Finding]:
         if "w" in camera.names:
             continue
         cameras = list(block.cameras)
-        cameras[row] = _freed(camera, ["cx", "cy"])
-        freed = adjusted.converged(block.replace(cameras=cameras))
-        if freed is None:
+        cameras[row] = freed(camera, ["cx", "cy"])
+        found = adjusted.converged(block.replace(cameras=cameras))
+        if found is None:
             continue
         places = [camera.names.index(name) for name in ("cx", "cy")]
-        changes = freed.cameras[row].values[places] - camera.values[places]
-        deviations = freed.cameras[row].sd[places]
+        changes = found.cameras[row].values[places] - camera.values[places]
+        deviations = found.cameras[row].sd[places]
         if (np.abs(np.abs(changes) - HALF) < NEARLY).all() and (
             np.abs(changes) > SIGNIFICANT * deviations
         ).all():

@@ -28,6 +28,7 @@ from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
+from photogram.network.wider_models import freed, matching_word, with_parameters
 from photogram.results.result import Result
 
 if TYPE_CHECKING:
@@ -147,7 +148,10 @@ def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
 
 
 def self_calibrated(project: Project, names: Sequence[str]) -> Project:
-    """Return a project whose cameras have unknown parameters: those named, or all for `all`.
+    """Return a project whose cameras have free parameters: those named, or those of their models for `all`.
+
+    A camera whose model lacks a named parameter gets the narrowest model with it that contains its own: k1 of
+    a pinhole.
 
     Raises
     ------
@@ -159,22 +163,24 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
     if not project.block.cameras:
         raise InputError("the block has principal distances and no cameras that could be calibrated")
     wanted = {name.lower() for name in names}
-    cameras, used = [], set()
+    cameras, used, messages = [], set(), []
     for camera in project.block.cameras:
-        free = {
-            name: np.inf
-            for name in camera.names
-            if name not in camera.constants and ("all" in wanted or _named(name, wanted))
-        }
-        used |= {_named(name, wanted) for name in free}
-        held = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-        cameras.append(
-            camera.replace(sd={k: v for k, v in {**held, **free}.items() if k not in camera.constants})
-        )
+        model = with_parameters(camera, wanted)
+        free = set(model.names) - model.constants
+        cameras.append(freed(model, {name.lower() for name in free} if "all" in wanted else wanted))
+        used |= {matching_word(name, wanted) for name in free}
+        if model.model != camera.model:
+            messages.append(
+                Message(
+                    f"{camera.title}: the model {model.model} replaces {camera.model}, which lacks lens terms"
+                )
+            )
     if missing := sorted(wanted - used - {"all"}):
         known = listed(sorted({name for each in project.block.cameras for name in each.names}), 40)
         raise InputError(f"no camera has the parameter {missing[0]}; there are {known}")
-    return project.replace(block=project.block.replace(cameras=cameras))
+    return project.replace(
+        block=project.block.replace(cameras=cameras), messages=(*project.messages, *messages)
+    )
 
 
 def held_points(project: Project, wanted: Sequence[str]) -> Project:
@@ -213,14 +219,6 @@ def held_points(project: Project, wanted: Sequence[str]) -> Project:
             )
         places[row, columns], sd[row, columns] = known[row, columns], 0.0
     return project.replace(block=block.replace(point_positions=places, point_sd=sd))
-
-
-def _named(name: str, wanted: set[str]) -> str:
-    """Return by which of the words a parameter is wanted: f is that of both axes; nothing for none."""
-    own = name.lower()
-    if own in wanted:
-        return own
-    return "f" if own in ("fx", "fy") and "f" in wanted else ""
 
 
 def with_images(project: Project, path: Path, pixel_origin: str | None) -> Project:

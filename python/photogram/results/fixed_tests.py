@@ -16,10 +16,10 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
 from photogram.network.directions import seen_without_lenses
 from photogram.network.motion import focal_images
 from photogram.network.rays import Rays
+from photogram.network.wider_models import calibration_words
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
@@ -208,10 +208,6 @@ def _turn(axis: int, angle: float) -> Floats:
     return np.eye(3) + generator
 
 
-_USUAL = ("f", "fx", "fy", "c", "cx", "cy", "xp", "yp", "k", "k1", "k2", "p1", "p2", "a1", "a2")
-"""Principal distance and point, two radial and two tangential terms, under the names of all models."""
-
-
 def fall_by_lens(result: Result, images: Bools) -> float:
     """Return by how much the weighted sum of squares would fall with a lens of their own for (m,) `images`.
 
@@ -249,21 +245,9 @@ def lens_partials(result: Result, own: Bools) -> Floats:
     return columns
 
 
-def usual_parameters(camera: Camera) -> list[str]:
-    """Return the parameters of a camera that are held and commonly are not known."""
-    held = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-    return [
-        name
-        for name in camera.names
-        if name.lower() in _USUAL and held[name] == 0 and name not in camera.constants
-    ]
-
-
 def how_to_calibrate(block: Block) -> str:
     """Return the option that estimates the cameras of a block, as words; nothing where nothing is left."""
-    if not any(len(camera.names) > 1 for camera in block.cameras):
+    if not block.cameras:
         return "a camera with distortion in place of the principal distance, and --self-calibrate all"
-    names = dict.fromkeys(
-        "f" if name in ("fx", "fy") else name for camera in block.cameras for name in usual_parameters(camera)
-    )
+    names = dict.fromkeys(name for camera in block.cameras for name in calibration_words(camera))
     return f"--self-calibrate {','.join(names)}" if names else ""

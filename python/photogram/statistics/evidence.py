@@ -218,14 +218,27 @@ class Evidence:
         Then no gross error is seen, but what a wrong lens does to good observations. Huge errors of a few
         bend all residuals, and what they leave looks like a lens, too.
         """
-        fall = max(
-            (each.fall for each in self.found.systematic if each.significant and each.large), default=0
-        )
+        fall, single = self._falls
         if not fall or not self.high or self.test is None or self.found.exchanged:
             return False
-        single = max((_as_fall(each, place) for _, each, place in self.gross), default=0.0)
         too_much = self.test.weighted_sum_of_squares - self.test.degrees_of_freedom
         return fall > EXPLAINED * too_much and single < SINGLE * too_much
+
+    @property
+    def lens_first(self) -> bool:
+        """Whether a lens explains more of what is too much than any single observation."""
+        fall, single = self._falls
+        return fall > single and not self.found.exchanged
+
+    @cached_property
+    def _falls(self) -> tuple[float, float]:
+        """By how much the weighted sum of squares would fall with a lens, and without one observation."""
+        return (
+            max(
+                (each.fall for each in self.found.systematic if each.significant and each.large), default=0.0
+            ),
+            max((_as_fall(each, place) for _, each, place in self.gross), default=0.0),
+        )
 
     @cached_property
     def factor(self) -> float:

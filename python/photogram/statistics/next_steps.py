@@ -23,6 +23,7 @@ _NEXT = {
     "gross-errors": (
         "Look at the observations that are named: the first of them is the most likely, those after it"
         " often only follow from it.",
+        "{lens}",
         "{take_out}",
     ),
     "usable-after-removal": (
@@ -92,7 +93,7 @@ _NEXT = {
 """What follows from the condition that gave the headline, in the words of a program."""
 
 
-def next_steps(code: str, found: Findings, *, usable: bool, take_out: bool) -> tuple[str, ...]:
+def next_steps(code: str, found: Findings, *, usable: bool, take_out: bool, lens: bool) -> tuple[str, ...]:
     """Return what to do next, in sentences.
 
     Parameters
@@ -105,12 +106,15 @@ def next_steps(code: str, found: Findings, *, usable: bool, take_out: bool) -> t
         Whether nothing forbids the use.
     take_out
         Whether what was found can be taken out: neither held, nor what is left after that was done.
+    lens
+        Whether lens terms explain more of the residuals than any single observation.
     """
     words = {
         "scaled": "The covariances are scaled by the unit variance already." if found.scaled else "",
         "check": found.check,
         "take_out": found.take_out if take_out else "",
         "calibrate": _calibrated(found.calibrate),
+        "lens": _calibrated(found.calibrate) if lens else "",
         "iterate": found.iterate,
     }
     sentences = [each.format(**words) for each in _NEXT.get(code, ())]

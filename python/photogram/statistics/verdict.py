@@ -128,7 +128,9 @@ def verdict(found: Findings) -> Verdict:
             *(found.snooped.kept if found.snooped else ()),
             *_exchanged(found, fitting),
         ),
-        next=next_steps(first.code, found, usable=usable, take_out=_can_be_taken_out(evidence)),
+        next=next_steps(
+            first.code, found, usable=usable, take_out=_can_be_taken_out(evidence), lens=evidence.lens_first
+        ),
         tests=tuple(evidence.tests()),
         outliers=tuple(evidence.outliers()),
         removed=tuple(found.snooped.removed) if found.snooped else (),
@@ -298,8 +300,9 @@ def _model(e: Evidence) -> _Line | None:
     if not wrong:
         return None
     text = f"The model is likely wrong: {'; '.join(wrong)}"
-    if e.lens and e.found.calibrate and not e.found.spoiled:
-        text += f". {e.found.calibrate} estimates it; observations are not to be taken out before"
+    if e.lens_first and e.found.calibrate and not e.found.spoiled:
+        text += f". {e.found.calibrate} estimates it"
+        text += "; observations are not to be taken out before" if e.lens else ""
     return _Line("model", text, EXIT_NOT_USABLE)
 
 
