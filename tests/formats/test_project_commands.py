@@ -181,6 +181,40 @@ def test_a_datum_on_three_points_is_held_as_asked_for(run, tmp_path):
         assert said in refused.stderr
 
 
+@pytest.mark.parametrize("wanted", ["six", "three"])
+def test_nominal_coordinates_orient_photos_without_poses(run, tmp_path, wanted):
+    """3-2-1 over six points, one run: only the named coordinates are fixed, at their nominal values."""
+    run("new", "own", "--kind", "metrology")
+    assert run("adjust", "own", "--out", "free", "-q", "--no-html").exit_code == 0
+    free = pd.read_csv(tmp_path / "free" / "points.csv", comment="#").set_index("point")
+    turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    places = free[["X", "Y", "Z"]].to_numpy() @ turn.T + [5.0, -3.0, 2.0]
+    rows = [list(free.index).index(name) for name in ("hole-1", "c03", "c13", "c23", "c33", "c43")]
+    nominal = np.round(places[rows] + np.random.default_rng(1).normal(0, 5e-4, (6, 3)), 4)
+    table = pd.DataFrame(nominal, columns=["x", "y", "z"], index=free.index[rows])
+    table.assign(use="check", sd=0.001).to_csv(tmp_path / "nominal.csv")
+    held = {
+        "six": {"hole-1": "Z", "c03": "Z", "c13": "Z", "c23": "Y", "c33": "Y", "c43": "X"},
+        "three": {"c03": "XYZ", "c23": "YZ", "c43": "Z"},
+    }[wanted]
+    hold = ",".join(f"{name}={axes}" for name, axes in held.items())
+    for more, out in (((), "one"), (("--snoop",), "snooped")):
+        words = ("adjust", "own", "--control", "nominal.csv", "--hold", hold, "--out", out, "-q", *more)
+        done = run(*words)
+        assert done.exit_code in (0, 4), done.output
+        found = pd.read_csv(tmp_path / out / "points.csv", comment="#").set_index("point")
+        for name, axes in held.items():
+            for axis in "XYZ":
+                assert (found.loc[name, f"sd_{axis}"] == 0) == (axis in axes)
+                if axis in axes:
+                    assert found.loc[name, axis] == table.loc[name, axis.lower()]
+        assert np.abs(found[["X", "Y", "Z"]].to_numpy() - places).max() < 0.1
+        bars = [found.loc[f"bar-1-{end}", ["X", "Y", "Z"]].to_numpy(dtype=float) for end in "ab"]
+        assert np.linalg.norm(bars[0] - bars[1]) == pytest.approx(0.800245, abs=2e-5)
+    refused = run("adjust", "own", "--control", "nominal.csv", "--hold", hold, "--datum", "inner")
+    assert refused.exit_code == 2
+
+
 def test_cards_for_intersection_only_are_told_of_photos_that_move(tmp_path):
     sample = Path(photogram.__file__).parent / "examples" / "galveston"
     for each in sample.iterdir():

@@ -25,6 +25,7 @@ from photogram.network.film_reduction import as_seen, is_scanned
 from photogram.network.geometry import Cartesian
 from photogram.network.motion import at_rest, timed_photos
 from photogram.network.observations import Distance
+from photogram.network.similarity import similarity
 from photogram.network.subset import kept_images, of_photos
 from photogram.show.summary import Brief
 
@@ -152,7 +153,12 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     axes = Cartesian(block.spheroid)
     known = Known.of(block, axes)
     directions = image_directions(block)
-    positions, attitudes, how, points, aside, first, misfit = _found(block, known, directions)
+    row = _found(block, known, directions)
+    nominal = (
+        None if any(why[0] in SOURCES for why in row[2]) else _on_nominal(block, known, directions, axes)
+    )
+    row, orienting = (row, []) if nominal is None else nominal
+    positions, attitudes, how, points, aside, first, misfit = row
     names = block.photo_ids
     missing = {photo: _reason(*why) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES}
     sources = {photo: why[0] for photo, why in zip(names, how, strict=True) if why[0] in SOURCES}
@@ -177,6 +183,7 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
         first_photo=None if first is None else names[first],
         messages=[
             *mirrored,
+            *orienting,
             *_messages(block, sources, missing, aside, None if first is None else names[first], kept=kept),
         ],
     )
@@ -250,6 +257,38 @@ def _found(block: Block, known: Known, directions: Floats) -> _photocore.FoundRo
         direction_deviations(block),
         threads=0,
     )
+
+
+def _on_nominal(
+    block: Block, known: Known, directions: Floats, axes: Cartesian
+) -> tuple[_photocore.FoundRow, list[Message]] | None:
+    """Return photos that are oriented relative to each other and carried onto nominal coordinates of points.
+
+    None if no point has some fixed or weighted coordinates and others free, if fewer than three points with
+    coordinates have a place in the model, or all of these are on a line.
+    """
+    held = np.isfinite(block.point_sd)
+    if not (held.any(axis=1) & ~held.all(axis=1)).any():
+        return None
+    free = replace(
+        known,
+        points=np.full_like(known.points, np.nan),
+        point_sd=np.full_like(known.point_sd, np.inf),
+    )
+    positions, attitudes, how, points, aside, first, misfit = _found(block, free, directions)
+    given = axes.positions(block.point_positions)
+    rows = np.flatnonzero(np.isfinite(given).all(axis=1) & np.isfinite(points).all(axis=1))
+    if first is None or len(rows) < IN_COMMON:
+        return None
+    scale, turn, shift, residual = similarity(points[rows], given[rows])
+    if not np.isfinite(residual):
+        return None
+    names = listed([block.point_ids[row] for row in rows.tolist()])
+    said = Message(
+        f"the photos are oriented by nominal coordinates of {counted(len(rows), 'point')}: {names}"
+    )
+    carried = scale * positions @ turn.T + shift, turn @ attitudes, how, scale * points @ turn.T + shift
+    return (*carried, aside, None, misfit), [said]
 
 
 def _mirrored(block: Block, known: Known, directions: Floats, started: int, aside: Bools) -> list[Message]:

@@ -100,9 +100,12 @@ class Choices:
         project = self_calibrated(project, wanted)
         project = held_points(project, [each.strip() for each in self.hold.split(",")] if self.hold else [])
         options = project.options
+        if self.hold and self.datum in ("inner", "minimum"):
+            raise typer.BadParameter("cannot be combined with --hold", param_hint="--datum")
         return project.replace(
             options=replace(
                 options,
+                datum=None if self.hold else options.datum,
                 unit_variance=self.unit_variance or options.unit_variance,
                 max_iterations=self.iterations or options.max_iterations,
             )
