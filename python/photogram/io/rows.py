@@ -10,8 +10,9 @@ from __future__ import annotations
 import csv
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number, whole_number
@@ -134,6 +135,14 @@ class Table:
             raise head.error(f"the column {quoted(twice[0])} is there twice")
         return cls(path, head, columns, tuple(body), tuple(comments), ragged, delimiter)
 
+    def renamed(self, aliases: Mapping[str, Collection[str]]) -> Table:
+        """Return the table with columns named by the first of their aliases (small letters) that is there."""
+        names, lowered = list(self.columns), [name.casefold() for name in self.columns]
+        for column, others in aliases.items():
+            if column not in names and (own := next((each for each in others if each in lowered), None)):
+                names[lowered.index(own)] = column
+        return replace(self, columns=tuple(names))
+
     def require(self, *columns: str) -> None:
         """Refuse a table without these columns.
 
@@ -180,7 +189,9 @@ def cells(place: Place, delimiter: str = ",") -> list[str]:
         raise place.error(f"cannot be split into cells: {error}") from None
 
 
-def read_rows(path: Path, needed: Collection[str]) -> list[Row]:
+def read_rows(
+    path: Path, needed: Collection[str], aliases: Mapping[str, Collection[str]] = MappingProxyType({})
+) -> list[Row]:
     """Read a ragged table without comments.
 
     Parameters
@@ -189,12 +200,14 @@ def read_rows(path: Path, needed: Collection[str]) -> list[Row]:
         The file.
     needed
         Columns that must be there.
+    aliases
+        Headings of other programs, in small letters, of columns that are not there by their own names.
 
     Raises
     ------
     InputError
         As :meth:`Table.read`, :meth:`Table.require` and :meth:`Table.rows`.
     """
-    table = Table.read(path, ragged=True)
+    table = Table.read(path, ragged=True).renamed(aliases)
     table.require(*needed)
     return list(table.rows())

@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.stellar.places import Earth, equatorial_axes, sidereal_time, to_date
+from photogram.stellar.places import Earth, station_attitude
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 
@@ -140,9 +139,7 @@ def _located(
         if solved.parity_flip:
             mirrored = True
             continue
-        place = earth.site_of_date(site)
-        local = equatorial_axes(place.latitude, sidereal_time(place, exposure.utc, earth.dut1))
-        matrix = np.asarray(solved.rotation_matrix_icrs_to_camera, float) @ to_date(exposure.utc).T @ local
-        attitude = _photocore.pointing_of_matrix(np.ascontiguousarray(matrix))
+        matrix = np.asarray(solved.rotation_matrix_icrs_to_camera, float)
+        attitude = station_attitude(matrix, site, exposure.utc, earth)
         return Located(attitude, math.radians(solved.fov_deg))
     return replace(_NOWHERE, mirrored=mirrored)

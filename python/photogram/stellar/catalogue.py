@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Self
@@ -17,6 +18,17 @@ from photogram.show.angles import ARCSEC
 _MAS = 1e-3 * ARCSEC
 _ERRORS = ("ra_error_mas", "dec_error_mas", "pm_ra_error_mas", "pm_dec_error_mas")
 _COLUMNS = ("id", "ra_deg", "dec_deg", "pm_ra_mas", "pm_dec_mas", "parallax_mas", "magnitude")
+_ALIASES = {
+    "id": ("hip", "source_id", "name", "number"),
+    "ra_deg": ("ra", "ra_icrs", "raj2000", "alpha_j2000"),
+    "dec_deg": ("dec", "de_icrs", "dej2000", "delta_j2000"),
+    "pm_ra_mas": ("pmra",),
+    "pm_dec_mas": ("pmdec", "pmde"),
+    "parallax_mas": ("parallax", "plx"),
+    "magnitude": ("mag", "vmag", "hpmag", "phot_g_mean_mag", "mag_auto"),
+}
+"""Headings of SExtractor, VizieR and Gaia, degrees and milliseconds of arc."""
+_PREFIX = re.compile(r"hip(?=\d)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +97,8 @@ class Catalogue:
     def read(cls, path: Path, epoch: float = 2000.0) -> Self:
         """Read a CSV file: id, ra_deg, dec_deg, pm_ra_mas, pm_dec_mas, parallax_mas, magnitude.
 
+        Proper motions and parallaxes are 0 if their columns are missing. Headings of SExtractor, VizieR and
+        Gaia (ALPHA_J2000, RAJ2000, pmRA) are accepted.
         Columns ra_error_mas, dec_error_mas, pm_ra_error_mas, pm_dec_error_mas may be there, too.
 
         Raises
@@ -93,7 +107,7 @@ class Catalogue:
             The file cannot be read, a column is missing, a value is not a number, a declination is beyond the
             pole, or a star is listed twice; with the record.
         """
-        rows = read_rows(path, _COLUMNS)
+        rows = read_rows(path, ("id", "ra_deg", "dec_deg", "magnitude"), _ALIASES)
         first: dict[str, Row] = {}
         for row in rows:
             name = row.cells.get("id", "")
@@ -101,7 +115,7 @@ class Catalogue:
                 raise row.place.error(f"star {name} is listed twice")
             if not abs(row.required("dec_deg")) <= 90:
                 raise row.place.error("dec_deg is not between -90 and 90")
-        values = [[row.required(name) for name in _COLUMNS[1:]] for row in rows]
+        values = [[row.required(name) if name in row.cells else 0.0 for name in _COLUMNS[1:]] for row in rows]
         table = np.array(values, float).reshape(-1, 6)
         return cls(
             tuple(row.cells.get("id", "") for row in rows),
@@ -146,6 +160,11 @@ class Catalogue:
             epoch=self.epoch,
             errors=None if self.errors is None else self.errors[chosen],
         )
+
+
+def star_key(name: str) -> str:
+    """Return a name of a star without blanks, case and the prefix HIP: HIP 45860 is 45860."""
+    return _PREFIX.sub("", "".join(name.split()).casefold())
 
 
 @cache

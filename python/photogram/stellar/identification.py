@@ -24,6 +24,8 @@ __all__ = ["Found", "identify", "identify_again"]
 _GRID = (24, 16)
 """Places of the frame that are looked through."""
 _LEAST = 0.02
+_STILL = Earth()
+STARS_OF_AN_ATTITUDE = 2
 
 
 def local_directions(standard: Floats) -> Floats:
@@ -56,6 +58,29 @@ def turned_to(rays: Floats, directions: Floats) -> Floats:
     return _photocore.pointing_of_matrix(np.ascontiguousarray(matrix))
 
 
+def has_named_stars(exposure: Exposure) -> bool:
+    """Whether the images of an exposure name enough stars for its attitude."""
+    return exposure.stars is not None and int((exposure.stars >= 0).sum()) >= STARS_OF_AN_ATTITUDE
+
+
+def attitude_of_stars(
+    exposure: Exposure, camera: SkyCamera, site: Site, catalogue: Catalogue, earth: Earth = _STILL
+) -> tuple[Floats, float]:
+    """Return alpha, omega, kappa of an exposure with named stars, and the sum of squared misfits.
+
+    Misfits are between unit directions of images under the camera and of their stars.
+    """
+    stars = exposure.stars
+    assert stars is not None
+    has = np.flatnonzero(stars >= 0)
+    place = earth.site_of_date(site)
+    places = apparent_places(catalogue.take(stars[has]), exposure.utc, place.effects)
+    time = sidereal_time(place, exposure.utc, earth.dut1)
+    rays, seen = camera.rays(exposure.xy[has]), local_directions(place.standard_coordinates(places, time))
+    attitude = turned_to(rays, seen)
+    return attitude, float(np.nansum((rays - seen @ _photocore.pointing_matrix(attitude).T) ** 2))
+
+
 def sky_share(camera: SkyCamera, attitude: Floats, frame: tuple[float, float]) -> float:
     """Return what of a frame (width, height) shows the sky: not the ground, nor what no ray reaches."""
     x, y = ((np.arange(count) + 0.5) / count * size for count, size in zip(_GRID, frame, strict=True))
@@ -65,7 +90,6 @@ def sky_share(camera: SkyCamera, attitude: Floats, frame: tuple[float, float]) -
         return max(float(np.mean(zenith > 0)), _LEAST)
 
 
-_STILL = Earth()
 _FOR_ATTITUDE = 3
 """Stars that a first attitude is computed from at least."""
 

@@ -16,6 +16,7 @@ from photogram.show.angles import ARCSEC
 from photogram.statistics.verdict import LARGEST_FACTOR
 from photogram.stellar.blind import ATTITUDE, FIELD, locate
 from photogram.stellar.comparison import stood_still
+from photogram.stellar.identification import attitude_of_stars, has_named_stars
 from photogram.stellar.lens_choice import LensFit, LensTest, as_lens, compared_lenses, test_scale, test_terms
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.night_result import CalibratedNight, Night
@@ -24,6 +25,9 @@ from photogram.stellar.places import Earth
 from photogram.stellar.sky_cameras import SkyCamera
 
 __all__ = ["CalibratedNight", "Night", "calibrate_night"]
+
+_FIELDS = 200
+"""Fields of view that are tried for exposures whose images name their stars."""
 
 
 def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight:
@@ -45,6 +49,7 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
     lenses: list[LensFit] = []
     if night.blind is not None:
         still = _located(still, night.blind)
+    still = _directed(still)
     if night.lenses:
         lenses, still = _with_best_lens(still, threads)
     run = _run(still, threads)
@@ -76,12 +81,14 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
 def _located(night: Night, fields: tuple[float, float]) -> Night:
     """Return the night with the attitudes and the field of view that are found in the whole sky."""
     unknown = [index for index, exposure in enumerate(night.exposures) if exposure.stars is None]
-    found = locate(
-        [night.exposures[index] for index in unknown], night.site, night.frame, fields, night.earth
+    found = (
+        locate([night.exposures[index] for index in unknown], night.site, night.frame, fields, night.earth)
+        if unknown
+        else []
     )
-    seen = [located.field for located in found if located.found]
+    seen = [located.field for located in found if located.found] or _field_of_stars(night, fields)
     if not seen:
-        reasons = sorted({located.reason() for located in found})
+        reasons = sorted({located.reason() for located in found}) or ["images name one star, and need two"]
         raise InputError(f"no exposure is found in the sky: {listed(reasons)}")
     exposures, reasons_of = list(night.exposures), dict(night.nowhere)
     for index, located in zip(unknown, found, strict=True):
@@ -98,6 +105,38 @@ def _located(night: Night, fields: tuple[float, float]) -> Night:
         roll_known=True,
         nowhere=reasons_of,
     )
+
+
+def _field_of_stars(night: Night, fields: tuple[float, float]) -> list[float]:
+    """Return the field of view that fits the exposures whose images name their stars best; none without."""
+    named = [each for each in night.exposures if has_named_stars(each)]
+    if not named:
+        return []
+    tried = np.geomspace(*fields, _FIELDS)
+    misfits = [
+        sum(
+            attitude_of_stars(
+                each, SkyCamera.of_field(*night.frame, field), night.site, night.catalogue, night.earth
+            )[1]
+            for each in named
+        )
+        for field in tried.tolist()
+    ]
+    return [float(tried[int(np.argmin(misfits))])]
+
+
+def _directed(night: Night) -> Night:
+    """Return the night with the directions that named stars give exposures without any."""
+    exposures = [
+        replace(
+            each,
+            attitude=attitude_of_stars(each, night.camera, night.site, night.catalogue, night.earth)[0],
+        )
+        if has_named_stars(each) and np.isnan(each.attitude).any()
+        else each
+        for each in night.exposures
+    ]
+    return replace(night, exposures=exposures)
 
 
 def _run(night: Night, threads: int | None) -> Run:

@@ -10,19 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io.rows import Row, read_rows
+from photogram.io.rows import Row
+from photogram.io.rows import Table as ImageTable
 from photogram.io.toml_tables import Document, Table, read_document
 from photogram.show.angles import ARCSEC
 from photogram.stellar.camera_yaml import read_yaml
-from photogram.stellar.catalogue import Catalogue
+from photogram.stellar.catalogue import Catalogue, star_key
+from photogram.stellar.identification import STARS_OF_AN_ATTITUDE
 from photogram.stellar.lenses import LENSES
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.night_result import Night
 from photogram.stellar.parameters import GRAD
-from photogram.stellar.places import Earth, epoch
-from photogram.stellar.pointing import attitude_of
+from photogram.stellar.places import Earth, epoch, pointing_matrix, station_attitude
+from photogram.stellar.pointing import attitude_of, axis_of
+from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.stellar.tomlfile import effects, pole_arcsec, site
@@ -63,12 +66,20 @@ _TABLES = {
     ),
     "exposures": (
         *("name", "utc", "azimuth_north_deg", "azimuth_deg", "elevation_deg", "roll_deg"),
+        *("ra_deg", "dec_deg", "position_angle_deg"),
         *("alpha", "omega", "kappa"),
     ),
 }
 
 
 _FILES = (("images", "file"), ("catalogue", "file"), ("camera", "start"), ("camera", "prior"))
+_FIRST_PIXELS = {"x_px": 0.5, "xcentroid": 0.0, "x_centroid": 0.0, "x_image": 1.0, "xwin_image": 1.0}
+"""Coordinate of the middle of the first pixel by the heading of the columns of images."""
+_ALIASES = {
+    "magnitude": ("mag", "mag_auto", "mag_best", "mag_iso"),
+    "star": ("hip",),
+}
+"""Headings of photutils and SExtractor."""
 _LARGEST_FRAME = 1e6
 """Pixels."""
 _SHORTEST = 0.1
@@ -127,15 +138,20 @@ def _night(document: Document) -> Night:
     prior = SkyCamera.read(camera.path("prior")) if "prior" in camera else None
     exposures = _Exposures(document.tables("exposures"), images.path("file"), blind is not None)
     catalogue = _catalogue(stars, exposures.named)
+    place = replace(site(document.table("station")), effects=effects(document.optional("places")))
+    motion = Earth(
+        earth.number("dut1_s", 0.0, low=-_LARGEST_DUT1, high=_LARGEST_DUT1),
+        (pole_arcsec(earth, "pole_x_arcsec") * ARCSEC, pole_arcsec(earth, "pole_y_arcsec") * ARCSEC),
+    )
     return Night(
-        site=replace(site(document.table("station")), effects=effects(document.optional("places"))),
+        site=place,
         catalogue=catalogue,
         frame=frame,
         camera=_start(camera, frame, prior) if blind is None else SkyCamera.of_field(*frame, max(blind)),
         lenses=tuple(LENSES) if camera.word("lens", "brown") == AUTO else (),
         common_scale=camera.switch("common_scale", prior is not None and prior.common_scale),
         tripod=camera.switch("tripod", False),
-        exposures=exposures.read(catalogue, frame),
+        exposures=exposures.read(catalogue, frame, place, motion),
         names=exposures.names,
         pixel_sd=images.positive("sd_px", 0.1),
         attitude_error=math.radians(matching.number("attitude_error_deg", 1.0, low=0, high=180)),
@@ -148,10 +164,7 @@ def _night(document: Document) -> Night:
         fixed=camera.words("fixed", ()),
         prior=prior,
         weigh_stars=stars.switch("weigh_stars", False),
-        earth=Earth(
-            earth.number("dut1_s", 0.0, low=-_LARGEST_DUT1, high=_LARGEST_DUT1),
-            (pole_arcsec(earth, "pole_x_arcsec") * ARCSEC, pole_arcsec(earth, "pole_y_arcsec") * ARCSEC),
-        ),
+        earth=motion,
         title=document.optional("labels").word("title", ""),
     )
 
@@ -211,7 +224,8 @@ def _catalogue(table: Table, named: Set[str]) -> Catalogue:
         found = Catalogue.hipparcos()
     faintest = table.number("faintest") if "faintest" in table else math.inf
     ranked = found.brighter(math.inf)
-    wanted = [i for i, name in enumerate(ranked.ids) if ranked.magnitudes[i] <= faintest or name in named]
+    bright = (ranked.magnitudes <= faintest).tolist()
+    wanted = [i for i, name in enumerate(ranked.ids) if bright[i] or star_key(name) in named]
     return ranked.take(np.array(wanted, np.int64))
 
 
@@ -225,49 +239,67 @@ class _Exposures:
         for table, name in zip(tables, self.names, strict=True):
             if self.names.count(name) > 1:
                 raise table.error("name", f"is {name!r}: two exposures have the same name")
-        for row in read_rows(file, ("exposure", "x_px", "y_px")):
-            name = row.cells.get("exposure", "")
+        # A table of one exposure need not name it.
+        single = self.names[0] if len(self.names) == 1 else ""
+        table = ImageTable.read(file, ragged=True)
+        lowered = {name.casefold() for name in table.columns}
+        pairs = {name: f"y{name[1:]}" for name in _FIRST_PIXELS}
+        heading = next((name for name in pairs if {name, pairs[name]} <= lowered), "x_px")
+        self.offset = _FIRST_PIXELS["x_px"] - _FIRST_PIXELS[heading]
+        table = table.renamed({"x_px": [heading], "y_px": [pairs[heading]], **_ALIASES})
+        table.require(*(() if single else ("exposure",)), "x_px", "y_px")
+        for row in table.rows():
+            name = row.cells.get("exposure", "") or single
             if name not in self.rows:
-                raise row.place.error(f"there is no exposure {name}")
+                raise row.place.error(
+                    f"there is no exposure {name}" if name else "the column exposure is blank"
+                )
             self.rows[name].append(row)
 
     @property
     def named(self) -> Set[str]:
         """Stars that images name."""
-        return {row.cells.get("star", "") for rows in self.rows.values() for row in rows} - {""}
+        return {star_key(row.cells.get("star", "")) for rows in self.rows.values() for row in rows} - {""}
 
-    def read(self, catalogue: Catalogue, frame: tuple[float, float]) -> list[Exposure]:
+    def read(
+        self, catalogue: Catalogue, frame: tuple[float, float], site: Site, earth: Earth
+    ) -> list[Exposure]:
         """Return the exposures."""
-        index = {name: i for i, name in enumerate(catalogue.ids)}
-        pairs = zip(self.tables, self.names, strict=True)
-        return [_exposure(table, self.rows[name], index, frame, self.blind) for table, name in pairs]
+        index = {star_key(name): i for i, name in enumerate(catalogue.ids)}
+        index |= {name: i for i, name in enumerate(catalogue.ids)}
+        found = []
+        for table, name in zip(self.tables, self.names, strict=True):
+            utc, rows = _utc(table), _by_magnitude(self.rows[name])
+            stars = None
+            if any(row.cells.get("star") for row in rows):
+                stars = np.array([_star(row, index) for row in rows], np.int64)
+            if self.blind:
+                attitude = np.full(3, np.nan) if stars is not None else np.zeros(3)
+            else:
+                attitude = _attitude(table, utc, stars, site, earth)
+            xy = np.array([_image(row, frame, self.offset) for row in rows]).reshape(-1, 2)
+            found.append(Exposure(utc, xy, attitude, stars))
+        return found
 
 
-def _exposure(
-    table: Table, rows: list[Row], index: dict[str, int], frame: tuple[float, float], blind: bool
-) -> Exposure:
-    """Take the images of an exposure, by magnitude where there is one, else in their order."""
-    magnitudes = [row.number("magnitude") for row in rows]
-    faint = [math.inf if magnitude is None else magnitude for magnitude in magnitudes]
-    rows = [rows[i] for i in sorted(range(len(rows)), key=lambda i: faint[i])]
-    stars = None
-    if any(row.cells.get("star") for row in rows):
-        stars = np.array([_star(row, index) for row in rows], np.int64)
+def _utc(table: Table) -> str:
     utc = table.text("utc")
     try:
         epoch(utc)
     except InputError as error:
         raise table.error("utc", f": {error.message}") from None
-    return Exposure(
-        utc=utc,
-        xy=np.array([_image(row, frame) for row in rows]).reshape(-1, 2),
-        attitude=np.zeros(3) if blind else _attitude(table),
-        stars=stars,
-    )
+    return utc
 
 
-def _image(row: Row, frame: tuple[float, float]) -> tuple[float, float]:
-    xy = row.required("x_px"), row.required("y_px")
+def _by_magnitude(rows: list[Row]) -> list[Row]:
+    """Return images with the brightest first, if they have magnitudes, else in their order."""
+    magnitudes = [row.number("magnitude") for row in rows]
+    faint = [math.inf if magnitude is None else magnitude for magnitude in magnitudes]
+    return [rows[i] for i in sorted(range(len(rows)), key=lambda i: faint[i])]
+
+
+def _image(row: Row, frame: tuple[float, float], offset: float) -> tuple[float, float]:
+    xy = row.required("x_px") + offset, row.required("y_px") + offset
     if not all(-size <= value <= 2 * size for value, size in zip(xy, frame, strict=True)):
         raise row.place.error(f"the image is far outside the frame of {frame[0]:g} x {frame[1]:g} pixels")
     return xy
@@ -275,19 +307,43 @@ def _image(row: Row, frame: tuple[float, float]) -> tuple[float, float]:
 
 def _star(row: Row, index: dict[str, int]) -> int:
     name = row.cells.get("star", "")
-    if name and name not in index:
+    if not name:
+        return -1
+    found = index.get(name, index.get(star_key(name), -1))
+    if found < 0:
         raise row.place.error(f"star {name} is not in the catalogue")
-    return index[name] if name else -1
+    return found
 
 
-def _attitude(table: Table) -> Floats:
-    """Take alpha, omega, kappa in grads, or azimuth (from north or south), elevation, roll in degrees."""
+def _attitude(table: Table, utc: str, stars: Indices | None, site: Site, earth: Earth) -> Floats:
+    """Return alpha, omega, kappa of the direction of an exposure; NaN if its stars give it.
+
+    The table has alpha, omega, kappa in grads, or in degrees azimuth (from north or south), elevation and
+    roll, or right ascension, declination, and position angle or roll.
+    """
     if "alpha" in table:
         return GRAD * np.array([table.number(name) for name in ("alpha", "omega", "kappa")])
+    roll = math.radians(table.number("roll_deg", 0.0, low=-360, high=360))
+    if "ra_deg" in table or "dec_deg" in table:
+        if {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.values):
+            raise table.error("ra_deg", "and azimuth or elevation are both there; one direction is required")
+        angle = table.says("position_angle_deg", "roll_deg")
+        matrix = pointing_matrix(
+            math.radians(table.number("ra_deg", low=-360, high=360)),
+            math.radians(table.number("dec_deg", low=-90, high=90)),
+            math.radians(table.number("position_angle_deg", 0.0, low=-360, high=360)),
+        )
+        attitude = station_attitude(matrix, site, utc, earth)
+        return attitude if angle else attitude_of(*axis_of(attitude), roll)
+    if not {"azimuth_north_deg", "azimuth_deg", "elevation_deg"} & set(table.values):
+        if stars is not None and len(set(stars.tolist()) - {-1}) >= STARS_OF_AN_ATTITUDE:
+            return np.full(3, np.nan)
+        raise InputError(
+            f"[{table.name}] has no direction; required are azimuth_north_deg and elevation_deg, ra_deg and"
+            f" dec_deg, alpha, omega and kappa, or images that name {STARS_OF_AN_ATTITUDE} stars",
+            file=table.file,
+        )
     north = table.says("azimuth_north_deg", "azimuth_deg")
     azimuth = table.number("azimuth_north_deg" if north else "azimuth_deg", low=-360, high=360)
-    return attitude_of(
-        math.radians(azimuth - 180.0 if north else azimuth),
-        math.radians(table.number("elevation_deg", low=-90, high=90)),
-        math.radians(table.number("roll_deg", 0.0, low=-360, high=360)),
-    )
+    elevation = math.radians(table.number("elevation_deg", low=-90, high=90))
+    return attitude_of(math.radians(azimuth - 180.0 if north else azimuth), elevation, roll)

@@ -179,9 +179,9 @@ def _exposures(result: CalibratedNight) -> list[str]:
     grads = replace(angles, values=angles.values / GRAD, kind="number")
     row = [*field(names, 10, head="name"), *field(utc, 26, head="utc"), *field(count, 7, ".0f", "images")]
     row += [*field(identified, 7, ".0f", "found"), *field(rejected, 9, ".0f", "left out")]
-    row += [*field(azimuth, 11, ".5f", "azimuth"), *field(elevation, 11, ".5f", "elevation")]
+    row += [*field(azimuth, 11, ".5f", "azimuth S"), *field(elevation, 11, ".5f", "elevation")]
     row += [*field(grads, 13, ".6f", "{name}"), *field(errors, 10, ".2f", "sd {name}")]
-    said = "azimuth from south, positive west, and elevation in degrees; angles in grads, sd in arcsec"
+    said = "azimuth S: from south, positive west; elevation in degrees; angles in grads, sd in arcsec"
     return [*table_lines([*row, *field(rms, 8, ".3f", "rms {unit}")]), said]
 
 

@@ -13,7 +13,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, listed
 from photogram.stellar.comparison import fewer_stars, held_out
 from photogram.stellar.hints import Hint, Setting, find_hint
-from photogram.stellar.identification import Found, identify, identify_again
+from photogram.stellar.identification import STARS_OF_AN_ATTITUDE, Found, identify, identify_again
 from photogram.stellar.matching import STRETCH
 from photogram.stellar.night_result import Night
 from photogram.stellar.odds import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS
@@ -31,8 +31,6 @@ _UNEXPLAINED = (
     " view): compare attitudes, attitude_error_deg and field of view with the exposures, and the catalogue"
     " with the images"
 )
-_FEWEST = 2
-"""Stars that an attitude needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +151,7 @@ class Run:
     def _take(self, seen: Seen) -> None:
         """Let an exposure take part if it has stars enough."""
         count = int((seen.stars >= 0).sum())
-        if count < _FEWEST:
+        if count < STARS_OF_AN_ATTITUDE:
             self.left_out[seen.index] = f"{count} of its {len(seen.stars)} images have a star"
         else:
             self.left_out.pop(seen.index, None)
@@ -359,7 +357,7 @@ def _seen_again(night: Night, seen: Seen, found: SkyCalibration, attitude: Float
         kept = again.off <= limit
         if night.rejection:
             kept &= ~(probabilities < CERTAIN)
-    if kept.sum() < _FEWEST:
+    if kept.sum() < STARS_OF_AN_ATTITUDE:
         return replace(seen, odds=math.inf)
     odds = log_odds = math.nan
     if given.stars is None:

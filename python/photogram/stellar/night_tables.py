@@ -24,9 +24,10 @@ _PLACE = (Axis.of("ra", "arcsec"), Axis.of("dec", "arcsec"))
 def exposure_table(result: CalibratedNight) -> pd.DataFrame:
     """Return one row for each exposure that takes part.
 
-    Angles in degrees; the quaternion (w, x, y, z) leads from ICRS to the camera (x right, y down, z along
-    the axis), the covariance (radians squared) is that of the small turn about these axes, its upper triangle
-    row by row; `by_chance` is the expected number of chance matches, `log_odds` a natural logarithm.
+    Angles in degrees, azimuths from south, positive west; the quaternion (w, x, y, z) leads from ICRS to the
+    camera (x right, y down, z along the axis), the covariance (radians squared) is that of the small turn
+    about these axes, its upper triangle row by row; `by_chance` is the expected number of chance matches,
+    `log_odds` a natural logarithm.
     """
     import pandas as pd
 
@@ -69,7 +70,7 @@ def attitudes(result: CalibratedNight) -> list[Quantity]:
     south = "Azimuth from south, positive west"
     return [
         _exposure(result),
-        _degrees(azimuth, "azimuth_deg", south, 5, "azimuth_deg"),
+        _degrees(azimuth, "azimuth_south_deg", south, 5, "azimuth_deg"),
         _degrees(elevation, "elevation_deg", "Elevation", 5, "elevation_deg"),
         Quantity(found.attitudes, angles, "value", member="alpha_omega_kappa_rad"),
         Quantity(errors, angles, "deviation", head="sd {}", decimals=2),

@@ -226,7 +226,7 @@ def _directions(result: Result) -> list[Part]:
         Column("Star", text=True),
         Column("Right ascension"),
         Column("Declination"),
-        Column("Azimuth", "°", decimals=5),
+        Column("Azimuth from south, positive west", "°", decimals=5),
         Column("Elevation", "°", decimals=5),
         Column("Mean error, right ascension", "″", decimals=4),
         Column("declination", "″", decimals=4),

@@ -292,6 +292,29 @@ def inertial_attitude(
     return InertialAttitude(np.asarray(left @ right, float), np.asarray(local @ covariance @ local.T, float))
 
 
+def station_attitude(matrix: Floats, site: Site, utc: str, earth: Earth | None = None) -> Floats:
+    """Return alpha, omega, kappa of a camera at a station from its rotation matrix (ICRS to camera).
+
+    Camera axes are x right, y down, z along the axis; aberration and refraction are left out.
+    """
+    earth = earth or Earth()
+    place = earth.site_of_date(site)
+    local = equatorial_axes(place.latitude, sidereal_time(place, utc, earth.dut1))
+    return _photocore.pointing_of_matrix(np.ascontiguousarray(matrix @ to_date(utc).T @ local))
+
+
+def pointing_matrix(ra: float, dec: float, position_angle: float = 0.0) -> Floats:
+    """Return the rotation matrix (ICRS to camera) of a camera that points at a place.
+
+    The position angle of the upper edge counts from north through east; all angles are in radians.
+    """
+    (sr, cr), (sd, cd) = (np.sin(ra), np.cos(ra)), (np.sin(dec), np.cos(dec))
+    axis, north = np.array([cd * cr, cd * sr, sd]), np.array([-sd * cr, -sd * sr, cd])
+    east = np.array([-sr, cr, 0.0])
+    down = -(np.cos(position_angle) * north + np.sin(position_angle) * east)
+    return np.array([np.cross(down, axis), down, axis])
+
+
 def _local_axes(m: Floats) -> Floats:
     """Return the turns about the axes of the camera (columns) that alpha, omega, kappa make."""
     alpha = [

@@ -18,6 +18,7 @@ from photogram.io.toml_tables import Document, Table, read_document
 from photogram.messages import listed
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera
+from photogram.stellar.catalogue import star_key
 from photogram.stellar.landmarks import HOUR, landmark
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
@@ -105,18 +106,18 @@ def _problem(document: Document) -> Problem:
     ids = tuple(row.cells.get("star", "") for row in star_rows)
     place: dict[str, int] = {}
     for index, row in enumerate(star_rows):
-        if place.setdefault(ids[index], index) != index:
+        if place.setdefault(star_key(ids[index]), index) != index:
             raise row.place.error(f"star {ids[index]} is listed twice")
         if not _is_landmark(row) and abs(row.required("dec_rad")) > math.pi / 2:
             raise row.place.error("dec_rad is beyond the pole: declinations are between -pi/2 and pi/2")
     for row in image_rows:
         name = row.cells.get("star", "")
-        if name not in place:
+        if star_key(name) not in place:
             raise row.place.error(f"ERROR 1: star {name} is not listed")
     star_weight, image_weight = _common_weight(stars), _common_weight(images)
     places, weights = _stars(star_rows, star_weight, station)
     options = _options(document)
-    landmarks = {ids[i] for i, row in enumerate(star_rows) if _is_landmark(row)}
+    landmarks = {star_key(ids[i]) for i, row in enumerate(star_rows) if _is_landmark(row)}
     if landmarks and options.refraction:
         raise stars.error(
             "file", "has observed directions of landmarks: no refraction is estimated with them"
@@ -130,7 +131,7 @@ def _problem(document: Document) -> Problem:
         star_places=places,
         star_weights=weights,
         image_points=tuple(row.cells.get("point", "") for row in image_rows),
-        image_stars=np.array([place[row.cells.get("star", "")] for row in image_rows], np.int64),
+        image_stars=np.array([place[star_key(row.cells.get("star", ""))] for row in image_rows], np.int64),
         image_groups=np.array([groups.of(row) for row in image_rows], np.int64),
         image_xy=_pairs(image_rows, "x_m", "y_m"),
         image_weights=_matrices([_weight(row, image_weight, _IMAGE_WEIGHT) for row in image_rows]),
@@ -257,7 +258,7 @@ class _Groups:
 
     def time(self, row: Row) -> float:
         """Return the sidereal time of an image."""
-        if row.cells.get("star", "") in self.landmarks:
+        if star_key(row.cells.get("star", "")) in self.landmarks:
             return HOUR
         if utc := row.cells.get("utc", ""):
             try:

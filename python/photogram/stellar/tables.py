@@ -23,6 +23,8 @@ from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.result import Ellipse, Result, ellipse
 
+_AZIMUTHS = "azimuth S: from south, positive west; elevation: above the horizon"
+
 
 def _shown(name: str, value: float) -> float:
     return value / GRAD if UNITS[name] == "rad" else value
@@ -184,7 +186,7 @@ def directions(result: Result) -> list[str]:
     head = number + _head(
         "right ascension>18",
         "declination>18",
-        "azimuth deg>13",
+        "azimuth S deg>15",
         "elevation deg>15",
         "m ra arcsec>13",
         "m dec>9",
@@ -196,11 +198,11 @@ def directions(result: Result) -> list[str]:
         ellipses = "".join(_ellipse(e) for e in (d.orientation, d.total, d.published))
         lines.append(
             f"{star}{hours(d.place[0] % math.tau):>18}{degrees(d.place[1]):>18}"
-            f"{math.degrees(d.azimuth):13.5f}{math.degrees(d.elevation):15.5f}"
+            f"{math.degrees(d.azimuth):15.5f}{math.degrees(d.elevation):15.5f}"
             f"{d.mean_errors[0] / ARCSEC:13.4f}{d.mean_errors[1] / ARCSEC:9.4f}"
             f"{1e6 * d.image_mean_error:9.3f}{ellipses}"
         )
-    return lines if rows else []
+    return [*lines, _AZIMUTHS] if rows else []
 
 
 def _ellipse(e: Ellipse) -> str:
@@ -215,7 +217,7 @@ def fictitious(result: Result) -> list[str]:
             "x = y mm>9",
             "right ascension>18",
             "declination>18",
-            "azimuth deg>13",
+            "azimuth S deg>15",
             "elevation deg>15",
             "m ra arcsec>13",
             "m dec>9",
@@ -227,10 +229,10 @@ def fictitious(result: Result) -> list[str]:
         sd = np.sqrt(np.diag(p.covariance)) / ARCSEC * [math.cos(dec), 1.0]
         lines.append(
             f"{p.group:<8}{1e3 * p.xy:9.0f}{hours(ra % math.tau):>18}{degrees(dec):>18}"
-            f"{math.degrees(p.azimuth):13.5f}{math.degrees(p.elevation):15.5f}"
+            f"{math.degrees(p.azimuth):15.5f}{math.degrees(p.elevation):15.5f}"
             f"{sd[0]:13.4f}{sd[1]:9.4f}{_ellipse(ellipse(p.covariance, dec))}"
         )
-    return lines
+    return [*lines, _AZIMUTHS]
 
 
 def images(result: Result) -> list[str]:
