@@ -241,14 +241,14 @@ class _Exposures:
                 raise table.error("name", f"is {name!r}: two exposures have the same name")
         # A table of one exposure need not name it.
         single = self.names[0] if len(self.names) == 1 else ""
-        table = ImageTable.read(file, ragged=True)
-        lowered = {name.casefold() for name in table.columns}
+        images = ImageTable.read(file, ragged=True)
+        lowered = {name.casefold() for name in images.columns}
         pairs = {name: f"y{name[1:]}" for name in _FIRST_PIXELS}
         heading = next((name for name in pairs if {name, pairs[name]} <= lowered), "x_px")
         self.offset = _FIRST_PIXELS["x_px"] - _FIRST_PIXELS[heading]
-        table = table.renamed({"x_px": [heading], "y_px": [pairs[heading]], **_ALIASES})
-        table.require(*(() if single else ("exposure",)), "x_px", "y_px")
-        for row in table.rows():
+        images = images.renamed({"x_px": [heading], "y_px": [pairs[heading]], **_ALIASES})
+        images.require(*(() if single else ("exposure",)), "x_px", "y_px")
+        for row in images.rows():
             name = row.cells.get("exposure", "") or single
             if name not in self.rows:
                 raise row.place.error(
