@@ -129,6 +129,17 @@ def freeze_fields(owner: Any) -> None:
             value.flags.writeable = False
 
 
+def repeated_pairs(first: NDArray[np.int64], second: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Return the rows whose pair of indices is in an earlier row, too; `second` are below `count`."""
+    pairs = np.asarray(first, dtype=np.int64) * max(count, 1) + second
+    if (pairs[1:] > pairs[:-1]).all():  # sorted, as most blocks are
+        return np.zeros(0, dtype=np.int64)
+    ordered = np.sort(pairs)
+    if (ordered[1:] != ordered[:-1]).all():
+        return np.zeros(0, dtype=np.int64)
+    return np.setdiff1d(np.arange(len(pairs)), np.unique(pairs, return_index=True)[1])
+
+
 def length(name: str, value: ArrayLike) -> int:
     """Return the number of rows of an array; a single value has none."""
     array = _plain(name, value, "values")

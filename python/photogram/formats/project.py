@@ -10,6 +10,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.arguments.arrays import repeated_pairs
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.places import Place, at_place
@@ -251,13 +252,17 @@ def assembled(
         raise place.error("has no photos")
     _different(place, "photo", photo_ids)
     _different(place, "point", point_ids)
-    keep, left = _first_images(image_photos, image_points, len(point_ids))
+    left = repeated_pairs(image_photos, image_points, len(point_ids))
     repeated = Repeated(
         tuple(photo_ids[row] for row in image_photos[left].tolist()),
         tuple(point_ids[row] for row in image_points[left].tolist()),
         np.asarray(image_xy)[left],
     )
     if len(left):
+        image_photos, image_points = np.delete(image_photos, left), np.delete(image_points, left)
+        image_xy = np.delete(image_xy, left, axis=0)
+        if image_sd is not None and np.ndim(image_sd):
+            image_sd = np.delete(image_sd, left, axis=0)
         names = [f"{point} on {photo}" for point, photo in zip(repeated.points, repeated.photos, strict=True)]
         text = f"{len(left)} second images of a point on a photo are left out: {listed(names, 3)}"
         found.append(Message(f"{text} (--keep-repeated takes them in)"))
@@ -268,7 +273,10 @@ def assembled(
         lacking.append(
             f"no standard deviations of image coordinates: {image_sd:g} {unit} is assumed (--sd images=...)"
         )
-    sd: Any = image_sd if np.ndim(image_sd) == 0 else np.asarray(image_sd)[keep]
+    for each in (image_photos, image_points, image_xy, image_sd):
+        if isinstance(each, np.ndarray):
+            # Nobody writes these any more: the block shares them.
+            each.flags.writeable = False
     count = len(point_ids)
     angles = np.full((len(photo_ids), 3), np.nan)
     known = np.isfinite(matrices).all(axis=(1, 2))
@@ -291,10 +299,10 @@ def assembled(
             point_check_sd=None
             if point_check_sd is None or np.isnan(point_check_sd).all()
             else point_check_sd,
-            image_photos=image_photos[keep],
-            image_points=image_points[keep],
-            image_xy=image_xy[keep],
-            image_sd=sd,
+            image_photos=image_photos,
+            image_points=image_points,
+            image_xy=image_xy,
+            image_sd=image_sd,
             observations=observations,
             mounts=mounts,
             timed=timed,
@@ -324,14 +332,3 @@ def _different(place: Place, kind: str, names: Sequence[str]) -> None:
     if len(set(names)) < len(names):
         twice = next(name for name, count in Counter(names).items() if count > 1)
         raise place.error(f"the {kind} {twice} is there more than once")
-
-
-def _first_images(photos: Indices, points: Indices, count: int) -> tuple[Indices, Indices]:
-    """Return rows of the first image of each of so many points on a photo, and those of all others."""
-    pairs = np.asarray(photos, dtype=np.int64) * max(count, 1) + points
-    everything = np.arange(len(pairs))
-    if len(pairs) < 2 or (np.diff(pairs) > 0).all():
-        return everything, everything[:0]
-    others = np.ones(len(pairs), dtype=bool)
-    others[np.unique(pairs, return_index=True)[1]] = False
-    return everything[~others], everything[others]

@@ -11,6 +11,7 @@ import csv
 import io
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -20,14 +21,15 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.column_table import ColumnTable, Names, merged
-from photogram.io.files import read_text
+from photogram.io.files import read_beginning, read_text, reading
 from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
-from photogram.lazy_dataclasses import replace
 from photogram.messages import listed, quoted
 
 LARGE = 1 << 20
 """Bytes from which a table is worth the parser of pandas."""
+PIECE = 1 << 22
+"""Characters of a large table that are parsed at a time."""
 COMMENT = "#"
 TITLES = 30
 """Lines in which a header is looked for below titles."""
@@ -71,11 +73,13 @@ def read_columns(
     """
     if path.suffix == ".parquet":
         return _parquet(path, spelling, numbers)
-    text = read_text(path)
-    head, delimiter = _head(path, text, known, spelling, hint)
-    own = _lowered(head, delimiter)
-    names = _named(head, own, spelling, settled=hint is not None)
-    return _below(path, text, head, own, names, delimiter, numbers)
+
+    def header(text: str) -> _Header:
+        head, delimiter = _head(path, text, known, spelling, hint)
+        own = _lowered(head, delimiter)
+        return head, own, _named(head, own, spelling, settled=hint is not None), delimiter
+
+    return _read(path, header, numbers)
 
 
 def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool = False) -> tuple[str, ...]:
@@ -108,33 +112,44 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
     InputError
         The file cannot be read, or a row has more or fewer cells than there are columns.
     """
+
+    def header(text: str) -> _Header:
+        lines = text.split("\n")
+        filled = [
+            row for row, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENT)
+        ]
+        first = next(
+            (row for row in filled[:TITLES] if _fits(Place(path, row + 1, lines[row]), columns, numbers)), 0
+        )
+        first = first or (filled[0] if filled else 0)
+        sample = Place(path, first + 1, lines[first])
+        return Place(path, first), tuple(columns), tuple(columns), _delimiter(sample)
+
+    return _read(path, header, numbers)
+
+
+_Header = tuple[Place, tuple[str, ...], tuple[str, ...], str]
+"""The record of a header, the columns as the file and as photogram call them, and the delimiter."""
+
+
+def _read(path: Path, header: Callable[[str], _Header], numbers: Collection[str]) -> ColumnTable:
+    """Read a table; one that is large and well formed piece by piece, by its header at the beginning."""
+    if path.suffix.lower() != ".xlsx" and path.is_file() and path.stat().st_size > LARGE:
+        begin = read_beginning(path, LARGE).rpartition("\n")[0]
+        for encoding in ("utf-8-sig", "cp1252"):
+            try:
+                fast = _by_pandas(path, encoding, header(begin), numbers)
+            except UnicodeDecodeError:
+                continue
+            except InputError:
+                # The whole text may have its header later.
+                break
+            if fast is not None:
+                return fast
+            break
     text = read_text(path)
-    lines = text.split("\n")
-    filled = [row for row, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENT)]
-    first = next(
-        (row for row in filled[:TITLES] if _fits(Place(path, row + 1, lines[row]), columns, numbers)), 0
-    )
-    first = first or (filled[0] if filled else 0)
-    head = Place(path, first)
-    sample = Place(path, first + 1, lines[first])
-    return _below(path, text, head, tuple(columns), tuple(columns), _delimiter(sample), numbers)
-
-
-def _below(
-    path: Path,
-    text: str,
-    head: Place,
-    own: tuple[str, ...],
-    columns: tuple[str, ...],
-    delimiter: str,
-    numbers: Collection[str],
-) -> ColumnTable:
-    """Read what stands below the record of the header."""
+    head, own, columns, delimiter = header(text)
     assert head.record is not None
-    if len(text) > LARGE and delimiter != " ":
-        fast = _by_pandas(path, text, head, columns, delimiter, numbers)
-        if fast is not None:
-            return replace(fast, own=own)
     rows, records = _by_lines(path, text.split("\n"), head.record, columns, delimiter, numbers)
     if rows and len(rows[0]) > len(columns):
         own, columns = ("", *own), (NAMELESS, *columns)
@@ -283,35 +298,109 @@ def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[s
     return shifted and (not as_is or len(numeric) == len(columns))
 
 
-def _by_pandas(
-    path: Path,
-    text: str,
-    head: Place,
-    columns: Sequence[str],
-    delimiter: str,
-    numbers: Collection[str],
-) -> ColumnTable | None:
-    """Read a large table; None where anything is not as it should be: the other way says what."""
+def _by_pandas(path: Path, encoding: str, header: _Header, numbers: Collection[str]) -> ColumnTable | None:
+    """Read a large table; None if anything is not as it should be: `_by_lines` then names the place."""
     import pandas as pd
 
+    head, own, columns, delimiter = header
     assert head.record is not None
-    start = 0
-    for _ in range(head.record):
-        start = text.find("\n", start) + 1
-    body = text[start:].rstrip("\n")
-    if not body or not all(columns) or body.startswith(COMMENT) or "\n" + COMMENT in body:
+    if delimiter == " " or not all(columns):
         return None
-    count = body.count("\n") + 1
-    kinds = {each: float if each in numbers else str for each in columns}
+    most = _line_ends(path) + 1
+    values = {each: np.empty(most) for each in columns if each in numbers}
+    codes = {each: np.empty(most, dtype=np.int64) for each in columns if each not in numbers}
+    places: dict[str, dict[str, int]] = {each: {} for each in codes}
+    count = 0
+    for piece, frame in _parsed(path, encoding, header, numbers):
+        lines = piece.count("\n") + 1
+        if "\0" in piece or piece.startswith(COMMENT) or "\n" + COMMENT in piece:
+            return None
+        rows = slice(count, count + lines)
+        if frame is None or len(frame) != lines or rows.stop > most:
+            return None
+        empty = False
+        for each, column in values.items():
+            column[rows] = frame[each]
+            if np.isinf(column[rows]).any():
+                return None
+            empty = empty or bool(np.isnan(column[rows]).any())
+        if empty and not _empty_cells(piece, delimiter, lines, len(columns)):
+            return None
+        for each, named in codes.items():
+            own_codes, texts = pd.factorize(frame[each])
+            if (own_codes < 0).any():
+                return None
+            known = places[each]
+            own_rows = (known.setdefault(text.strip(), len(known)) for text in texts.tolist())
+            named[rows] = np.fromiter(own_rows, np.int64, len(texts))[own_codes]
+        count += lines
+    if not count:
+        return None
+    for whole in (*values.values(), *codes.values()):
+        whole.resize(count, refcheck=False)
+    names = {each: Names(list(places.pop(each)), named) for each, named in codes.items()}
+    records = range(head.record + 1, head.record + 1 + count)
+    return ColumnTable(path, head, columns, count, {}, records, delimiter, {**values, **names}, own=own)
+
+
+def _line_ends(path: Path) -> int:
+    with reading(path), path.open("rb") as file:
+        return sum(piece.count(b"\n") for piece in iter(partial(file.read, PIECE), b""))
+
+
+def _pieces(path: Path, encoding: str, first: int) -> Iterator[str]:
+    """Yield the lines of a file behind so many first ones in pieces, without the blank lines at the end."""
+    with reading(path), path.open(encoding=encoding) as file:
+        for _ in range(first):
+            file.readline()
+        piece = file.read(PIECE) + file.readline()
+        while piece:
+            after = file.read(PIECE) + file.readline()
+            body = piece.removesuffix("\n") if after else piece.rstrip("\n")
+            if body or after:
+                yield body
+            piece = after
+
+
+def _parsed(
+    path: Path, encoding: str, header: _Header, numbers: Collection[str]
+) -> Iterator[tuple[str, Any]]:
+    """Yield pieces of a table with their frames, None of other cells; a thread parses the next piece."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    head, _, columns, delimiter = header
+    assert head.record is not None
+    pieces = _pieces(path, encoding, head.record)
+    piece = next(pieces, "")
+    parse = _parser(path, piece, columns, delimiter, numbers)
+    with ThreadPoolExecutor(1) as pool:
+        frame = pool.submit(parse, piece)
+        for after in pieces:
+            ahead = pool.submit(parse, after)
+            yield piece, frame.result()
+            piece, frame = after, ahead
+        if piece:
+            yield piece, frame.result()
+
+
+def _parser(
+    path: Path, piece: str, columns: Sequence[str], delimiter: str, numbers: Collection[str]
+) -> Callable[[str], Any]:
+    """Return what makes a frame of a piece of a table, and None of one with other cells."""
+    import pandas as pd
+
     # From version 3 on pandas reads every number to the last bit, and does not want to be asked.
     exact: dict[str, Any] = (
         {} if int(pd.__version__.partition(".")[0]) >= 3 else {"float_precision": "round_trip"}
     )
-    sample = _split(Place(path, text=body.partition("\n")[0]), delimiter)
+    sample = _split(Place(path, text=piece.partition("\n")[0]), delimiter)
     comma = delimiter != "," and any(
         "," in cell for each, cell in zip(columns, sample, strict=False) if each in numbers
     )
     form: dict[str, Any] = {
+        "sep": delimiter,
+        "names": list(columns),
+        "dtype": {each: float if each in numbers else str for each in columns},
         "header": None,
         "index_col": False,
         "decimal": "," if comma else ".",
@@ -322,32 +411,14 @@ def _by_pandas(
         "engine": "c",
         **exact,
     }
-    try:
-        frame = pd.read_csv(
-            io.BytesIO(body.encode()), sep=delimiter, names=list(columns), dtype=kinds, **form
-        )
-    except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning):
-        return None
-    if len(frame) != count:
-        return None
-    ready: dict[str, Floats | Names] = {}
-    empty = False
-    for each in columns:
-        if each in numbers:
-            values = frame[each].to_numpy()
-            if np.isinf(values).any():
-                return None
-            empty = empty or bool(np.isnan(values).any())
-            ready[each] = values
-        else:
-            codes, texts = pd.factorize(frame[each])
-            if (codes < 0).any():
-                return None
-            ready[each] = merged(codes.astype(np.int64), [str(text).strip() for text in texts])
-    if empty and not _empty_cells(body, delimiter, count, len(columns)):
-        return None
-    records = range(head.record + 1, head.record + 1 + count)
-    return ColumnTable(path, head, tuple(columns), count, {}, records, delimiter, ready)
+
+    def parsed(text: str) -> Any:
+        try:
+            return pd.read_csv(io.BytesIO(text.encode()), **form)
+        except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning):
+            return None
+
+    return parsed
 
 
 def _empty_cells(body: str, delimiter: str, count: int, width: int) -> bool:

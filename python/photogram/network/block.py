@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from photogram.arguments.arrays import frozen, indices, length, shaped, shown, text, truth_value
+from photogram.arguments.arrays import (
+    frozen,
+    indices,
+    length,
+    repeated_pairs,
+    shaped,
+    shown,
+    text,
+    truth_value,
+)
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -305,14 +314,12 @@ class Block(Valued, Brief):
 
     def _check_twice(self) -> None:
         """Refuse a second image of a point on a photo: it would count as an independent observation."""
-        pairs = self.image_photos * len(self.point_ids) + self.image_points
-        if (np.diff(pairs) > 0).all():  # sorted by photo, then point, as most blocks are
-            return
-        order = np.argsort(pairs, kind="stable")
-        again = np.flatnonzero(np.diff(pairs[order]) == 0)
+        again = repeated_pairs(self.image_photos, self.image_points, len(self.point_ids))
         if again.size:
-            first, second = order[again[0]], order[again[0] + 1]
-            point, photo = self.point_ids[self.image_points[first]], self.photo_ids[self.image_photos[first]]
+            second = again[0]
+            photo, point = self.image_photos[second], self.image_points[second]
+            first = np.flatnonzero((self.image_photos == photo) & (self.image_points == point))[0]
+            point, photo = self.point_ids[point], self.photo_ids[photo]
             raise InputError(
                 f"the point {point} has two images on the photo {photo} (rows {first} and {second}):"
                 " average repeated pointings"

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from photogram.arguments.arrays import repeated_pairs
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.images import from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
@@ -152,9 +153,12 @@ def _attitude_weights(
 
 @dataclass(frozen=True)
 class Images:
-    """The table of images, as it is written; `left` are those that it leaves out of photos there are."""
+    """The table of images, as it is written; `left` are those that it leaves out of photos there are.
 
-    table: ColumnTable
+    `sd_given` is whether the table has standard deviations, or there is one for all; levels are ratios.
+    """
+
+    sd_given: bool
     photos: Indices
     points: Indices
     point_names: list[str]
@@ -179,11 +183,11 @@ def read_images(tables: Tables, photos: Photos) -> Images:
     keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
     sd = _image_sd(tables, table)
     if keep is None:
-        return Images(table, rows, names.rows, names.names, xy, sd)
+        return Images(_sd_is_given(tables, table), rows, names.rows, names.names, xy, sd)
     left = int(np.count_nonzero(~keep))
     if left:
         tables.tell(f"{left} images are not used", table.path)
-    whole = Images(table, rows, names.rows, names.names, xy, sd)
+    whole = Images(_sd_is_given(tables, table), rows, names.rows, names.names, xy, sd)
     return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))))
 
 
@@ -191,7 +195,7 @@ def _some(images: Images, which: Bools) -> Images:
     """Return some images, and the names of their points alone."""
     seen, points = np.unique(images.points[which], return_inverse=True)
     return Images(
-        images.table,
+        images.sd_given,
         images.photos[which],
         points.reshape(-1),
         [images.point_names[row] for row in seen.tolist()],
@@ -201,13 +205,11 @@ def _some(images: Images, which: Bools) -> Images:
 
 
 def _check_twice(table: ColumnTable, photos: Indices, points: Indices, count: int) -> None:
-    pairs = photos * count + points
-    if (np.diff(pairs) > 0).all():
-        return
-    order = np.argsort(pairs, kind="stable")
-    again = np.flatnonzero(np.diff(pairs[order]) == 0)
+    again = repeated_pairs(photos, points, count)
     if again.size:
-        first, second = sorted(order[again[0] : again[0] + 2].tolist())
+        second = int(again[0])
+        alike = (photos == photos[second]) & (points == points[second])
+        first = int(np.flatnonzero(alike)[0])
         raise table.error(
             second, f"the point has an image on this photo already, in record {table.records[first]}"
         )
@@ -218,10 +220,11 @@ def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
     own = [name for pair in pairs if pair[0] in table or pair[1] in table for name in pair]
     if "correlation" in table and table.numbers("correlation", 0.0).any():
         raise table.head.error("column correlation: images with correlated coordinates cannot be adjusted")
-    found = np.ones((table.count, 2))
-    if sd_is_given(tables, table):
+    if _sd_is_given(tables, table):
         found = tables.deviations(table, "images", own[:2] or ["sd_x", "sd_y"])
-    elif "level" not in table:
+    elif "level" in table:
+        found = np.ones((table.count, 2))
+    else:
         return None
     if "level" in table and not own and "sd" not in table:
         found = found * 2.0 ** table.numbers("level", 0.0)[:, np.newaxis]
@@ -233,8 +236,7 @@ def _image_sd(tables: Tables, table: ColumnTable) -> Floats | None:
     return found
 
 
-def sd_is_given(tables: Tables, table: ColumnTable) -> bool:
-    """Return whether standard deviations of images are given, in the table or for all; levels are ratios."""
+def _sd_is_given(tables: Tables, table: ColumnTable) -> bool:
     return "images" in tables.settings.sd or any(name in table for name in _OF_IMAGES)
 
 
@@ -248,14 +250,20 @@ def image_coordinates(
     """
     sd = images.sd if images.sd is None or settings.image != "um" else scaled(images.sd, 1e-3)
     pixels = settings.image == "px" and settings.image_y == "down"
-    found = in_unit(settings, images.xy, pixels=pixels).copy()
-    of_images = photo_cameras[images.photos]
-    for row, camera in enumerate(cameras.cameras):
-        own = of_images == row
+    plain = in_unit(settings, images.xy, pixels=pixels)
+
+    def converted(row: int, measured: Floats, own: Floats) -> Floats:
         if cameras.lines[row] is not None:
-            found[own] = in_unit(settings, images.xy[own], pixels=True)
-        else:
-            found[own] = from_tables(settings, camera, cameras.sizes[row], found[own])
+            return in_unit(settings, measured, pixels=True)
+        return from_tables(settings, cameras.cameras[row], cameras.sizes[row], own)
+
+    if len(cameras.cameras) == 1 and not scanned.any():
+        return converted(0, images.xy, plain), sd
+    found = plain.copy()
+    of_images = photo_cameras[images.photos]
+    for row in range(len(cameras.cameras)):
+        own = of_images == row
+        found[own] = converted(row, images.xy[own], plain[own])
     own = scanned[images.photos]
     found[own] = scaled(images.xy[own], 1e-3 if settings.image == "um" else 1.0)
     return found, sd

@@ -34,7 +34,6 @@ from photogram.formats.plain.photos import (
     image_coordinates,
     read_images,
     read_photos,
-    sd_is_given,
 )
 from photogram.formats.plain.rigs import read_frames, read_rigs, times_of_frames, times_said
 from photogram.formats.plain.schema import AXES, SD_AXES
@@ -113,7 +112,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     subjects = Subjects(
         {name: row for row, name in enumerate(photos.names)}, photos.times.tolist(), trajectories
     )
-    places = {name: row for row, name in enumerate(points.names)}
+    places = points.places
     observations = read_observations(tables, transform, subjects, places, rigs)
     boards = read_boards(tables)
     bends = read_bends(tables, boards)
@@ -125,7 +124,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
             f" origin, and tables with a crs go into one that is {transform.frame}",
             file=settings.path,
         )
-    assumed = not sd_is_given(tables, images.table)
+    assumed = not images.sd_given
     project = assembled(
         path=settings.path,
         title="plain project",
@@ -314,6 +313,7 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
 @dataclass(frozen=True)
 class _Points:
     names: list[str]
+    places: dict[str, int]
     starts: Floats
     positions: Floats
     sd: Floats
@@ -324,8 +324,10 @@ class _Points:
 def _points(tables: Tables, transform: Transform, images: Images, control: _Given | None) -> _Points:
     table = tables.read("points")
     own = table.names_once("point") if table is not None else []
-    names = list(dict.fromkeys([*images.point_names, *(control.names if control else []), *own]))
-    places = {name: row for row, name in enumerate(names)}
+    places = dict(zip(images.point_names, range(len(images.point_names)), strict=True))
+    for name in (*(control.names if control else ()), *own):
+        places.setdefault(name, len(places))
+    names = list(places)
     starts = np.full((len(names), 3), np.nan)
     positions, sd, check_sd = starts.copy(), np.full((len(names), 3), np.inf), starts.copy()
     if table is not None:
@@ -355,4 +357,4 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
             positions[places[each.points[0]]] = np.nan
         observed = control.observed
         starts[rows] = np.where(np.isnan(control.positions), starts[rows], control.positions)
-    return _Points(names, starts, positions, sd, check_sd, observed)
+    return _Points(names, places, starts, positions, sd, check_sd, observed)

@@ -227,6 +227,9 @@ class Tables:
         common = table.numbers("sd", infinite=True) if "sd" in table and kind != "photos" else None
         found = np.empty((table.count, len(columns)))
         for k, column in enumerate(columns):
+            if column not in table and common is None:
+                found[:, k] = defaults[k]
+                continue
             own = table.numbers(column, infinite=True)
             if common is not None:
                 own = np.where(np.isnan(own), common, own)

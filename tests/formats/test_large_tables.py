@@ -1,0 +1,114 @@
+"""Large tables are read piece by piece: with the values of small ones, in memory of a few pieces."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from photogram import InputError, formats
+from photogram.io import delimited
+from photogram.io.delimited import read_columns
+
+ROWS = 60_000
+
+
+def lines(count):
+    return [f"photo{row // 100}, p{row % 977} ,{row / 8},{-row / 4}" for row in range(count)]
+
+
+def written(path, rows, encoding="utf-8", end="\n"):
+    path.write_bytes(end.join(["# measured", "photo,point,column,row", *rows, ""]).encode(encoding))
+    return path
+
+
+def read(path):
+    return read_columns(path, known=("photo",), numbers=("column", "row"))
+
+
+def content(table):
+    names = [table.names(each) for each in ("photo", "point")]
+    numbers = [table.numbers(each).tolist() for each in ("column", "row")]
+    return [(each.names, each.rows.tolist()) for each in names], numbers, list(table.records), table.headings
+
+
+@pytest.fixture
+def pieces(monkeypatch):
+    monkeypatch.setattr(delimited, "LARGE", 1000)
+    monkeypatch.setattr(delimited, "PIECE", 700)
+
+
+@pytest.mark.parametrize(("encoding", "end"), [("utf-8", "\n"), ("utf-8-sig", "\r\n"), ("cp1252", "\r\n")])
+def test_pieces_have_the_values_of_the_whole(tmp_path, monkeypatch, pieces, encoding, end):
+    path = written(tmp_path / "images.csv", [*lines(500), "Süd,p1,,2.5"], encoding, end)
+    fast = read(path)
+    assert not fast.cells
+    monkeypatch.setattr(delimited, "LARGE", 1 << 30)
+    slow = read(path)
+    assert slow.cells
+    assert str(content(fast)) == str(content(slow))
+
+
+@pytest.mark.parametrize(
+    ("row", "text", "said"),
+    [
+        (400, "a,b,wide,1", "column column"),
+        (400, "a,b,1", "cells"),
+        (0, "a,b,1,2,3", "cells"),
+        (77, "\0", "cells"),
+    ],
+)
+def test_a_fault_in_any_piece_has_its_record(tmp_path, pieces, row, text, said):
+    rows = lines(500)
+    rows[row] = text
+    path = written(tmp_path / "images.csv", rows)
+    with pytest.raises(InputError, match=said) as found:
+        read(path).given(("column", "row"))
+    assert (found.value.file, found.value.record) == (path, row + 3)
+
+
+@pytest.mark.parametrize("extra", ["", "# later", "\n\n"])
+def test_blank_lines_and_comments_keep_the_numbers_of_records(tmp_path, pieces, extra):
+    path = written(tmp_path / "images.csv", [*lines(300), extra, *lines(10), "", ""])
+    table = read(path)
+    assert (table.count, table.records[-1]) == (310, 313 + extra.count("\n"))
+
+
+def test_memory_is_less_than_twice_the_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(delimited, "LARGE", 1 << 16)
+    monkeypatch.setattr(delimited, "PIECE", 1 << 16, raising=False)
+    path = written(tmp_path / "images.csv", lines(ROWS))
+    read(path)
+    tracemalloc.start()
+    try:
+        table = read(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert table.count == ROWS
+    assert peak < 2 * path.stat().st_size
+
+
+def test_images_of_a_project_are_shared_by_table_and_block(tmp_path):
+    photos = 40
+    rows = [
+        f"photo{row % photos},p{row // photos},{row % 3900 + 1}.5,{row % 2900 + 1}.25" for row in range(ROWS)
+    ]
+    written(tmp_path / "images.csv", rows)
+    (tmp_path / "cameras.csv").write_text(
+        "camera,model,width,height,f,cx,cy\nc,opencv,4000,3000,3000,2000,1500\n"
+    )
+    poses = "".join(f"photo{k},c,{10 * k},0,100,0,0,0\n" for k in range(photos))
+    (tmp_path / "photos.csv").write_text("photo,camera,x,y,z,omega,phi,kappa\n" + poses)
+    (tmp_path / "project.toml").write_text("[project]\nformat = 1\n[sd]\nimages = 0.5\n")
+    formats.read(tmp_path)
+    tracemalloc.start()
+    try:
+        block = formats.read(tmp_path).block
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert np.ptp(block.image_sd) == 0
+    own = sum(
+        each.nbytes for each in (block.image_xy, block.image_sd, block.image_photos, block.image_points)
+    )
+    assert peak < 3.5 * own
