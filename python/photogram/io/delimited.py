@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import re
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -195,7 +196,7 @@ def _head(
 def _below_titles(
     path: Path, text: str, first: int, known: Collection[str], spelling: Spelling
 ) -> Place | None:
-    for record, line in enumerate(islice(_lines(text), TITLES), 1):
+    for record, line in enumerate(itertools.islice(_lines(text), TITLES), 1):
         place = Place(path, record, line)
         if record > first and len(set(known).intersection(_spelled(place, spelling))) > 2:
             return place
@@ -309,7 +310,8 @@ def _by_pandas(path: Path, encoding: str, header: _Header, numbers: Collection[s
     most = _line_ends(path) + 1
     values = {each: np.empty(most) for each in columns if each in numbers}
     codes = {each: np.empty(most, dtype=np.int64) for each in columns if each not in numbers}
-    places: dict[str, dict[str, int]] = {each: {} for each in codes}
+    # A name that is new has the next number.
+    places = {each: defaultdict[str, int](itertools.count().__next__) for each in codes}
     count = 0
     for piece, frame in _parsed(path, encoding, header, numbers):
         lines = piece.count("\n") + 1
@@ -330,8 +332,7 @@ def _by_pandas(path: Path, encoding: str, header: _Header, numbers: Collection[s
             own_codes, texts = pd.factorize(frame[each])
             if (own_codes < 0).any():
                 return None
-            known = places[each]
-            own_rows = (known.setdefault(text.strip(), len(known)) for text in texts.tolist())
+            own_rows = map(places[each].__getitem__, map(str.strip, texts.tolist()))
             named[rows] = np.fromiter(own_rows, np.int64, len(texts))[own_codes]
         count += lines
     if not count:
