@@ -204,6 +204,15 @@ def test_empty_and_infinite_numbers_of_parquet_are_those_of_text(tmp_path):
         table.numbers("y")
 
 
+def test_a_column_of_text_in_parquet_has_numbers_where_they_are_asked_for(tmp_path):
+    path = parquet(tmp_path / "a.parquet", x=["1.5", ""], y=["", "wide"])
+    table = read_columns(path)
+    assert table.numbers("x", 7.0).tolist() == [1.5, 7.0]
+    with pytest.raises(InputError) as found:
+        table.numbers("y")
+    assert (found.value.file, found.value.record) == (path, 2)
+
+
 def test_a_camera_that_shows_everything_in_one_point_is_named():
     block = photogram.simulate(strips=1, photos_per_strip=3, points_per_photo=12, seed=5).block
     flat = photogram.Camera("pinhole", {"fx": 1e-30, "fy": 1e-30, "cx": 1000.0, "cy": 800.0}, name="flat")

@@ -43,10 +43,11 @@ def test_numbers_beyond_double_precision_in_storage_of_opencv(tmp_path, kind, nu
     assert "/image_points/data/1" in refusal(read_storage, path, None).message
 
 
+@pytest.mark.parametrize("number", [HUGE, "1e300", "1e-300"])
 @pytest.mark.parametrize("key", ["spacing", "sd_plane"])
-def test_numbers_beyond_double_precision_in_a_board(tmp_path, key):
+def test_lengths_of_a_board_whose_squares_are_no_numbers(tmp_path, key, number):
     path = tmp_path / "board.toml"
-    lines = {"columns": "4", "rows": "3", "spacing": "0.1", key: HUGE}
+    lines = {"columns": "4", "rows": "3", "spacing": "0.1", key: number}
     path.write_text("".join(f"{name} = {value}\n" for name, value in lines.items()))
     refusal(read_board, path)
 

@@ -195,7 +195,9 @@ def read(path: Path, file_format: str | None = None, wishes: Wishes | None = Non
             raise
         except (ArithmeticError, LookupError, ValueError) as error:
             # A reader has names for all that it expects; what it did not is still no bug of the user's.
-            raise InputError(f"cannot be read as {chosen.title}: {error}", file=path) from error
+            what = f"cannot be read as {chosen.title} because of a value that it does not allow"
+            remedy = "check the file, or name its format (--format)"
+            raise InputError(f"{what} ({type(error).__name__}: {error}): {remedy}", file=path) from error
 
 
 def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:

@@ -231,9 +231,10 @@ class ColumnTable:
         if column not in self.columns:
             return np.full(self.count, default)
         convert = finite_number if read is None else read
-        marks = self._marks if column in self.numeric else marks_of(self.cells[column], self.delimiter)
+        cells = self.texts(column)
+        marks = self._marks if column in self.numeric else marks_of(cells, self.delimiter)
         values = np.empty(self.count)
-        for row, cell in enumerate(self.texts(column)):
+        for row, cell in enumerate(cells):
             if not cell:
                 values[row] = default
                 continue

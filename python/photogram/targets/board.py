@@ -25,6 +25,8 @@ Shape = Literal["held", "bend", "points"]
 
 MAX_POINTS = 100_000
 """Points of a board of columns and rows."""
+MAX_LENGTH = 1e50
+"""In the unit of a board: the squares of squares of lengths are finite."""
 MANY_VIEWS = 8
 """Views from which the points of a board are adjusted, where nobody says what its shape is."""
 PLANE_PARTS, SPACING_PARTS = 200.0, 500.0
@@ -152,8 +154,8 @@ class Board(Valued, Brief):
             raise InputError("a bend is that of a board with columns and rows, not of points")
         count = length("points", self.points)
         self._set("points", shaped("points", self.points, (count, 3)))
-        if not np.isfinite(np.asarray(self.points)).all():
-            raise InputError("points of a board are not finite numbers")
+        if not (np.abs(np.asarray(self.points)) <= MAX_LENGTH).all():
+            raise InputError(f"points of a board are not finite numbers up to {MAX_LENGTH:g}")
         if self.point_names is not None:
             given = names("point_names", self.point_names)
             if len(given) != count or len(set(given)) < count:
@@ -266,6 +268,8 @@ class Board(Valued, Brief):
 
 def _length(name: str, value: object) -> float:
     found = number(name, value)
-    if not 0 < found < np.inf:
-        raise InputError(f"{name} of a board is a positive number, not {found:g}")
+    if not 1 / MAX_LENGTH <= found <= MAX_LENGTH:
+        raise InputError(
+            f"{name} of a board is a positive number from {1 / MAX_LENGTH:g} to {MAX_LENGTH:g}, not {found:g}"
+        )
     return found
