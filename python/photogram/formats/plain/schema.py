@@ -130,8 +130,9 @@ TABLES: Mapping[str, Schema] = {
         ),
         "`camera`; `model` (default `brown` with `c`, else `pinhole`), `width`, `height`, `pixel_mm`, `f` or"
         " `fx`, `fy` or `c` (positive for the positive plane; at least a tenth of `width`; a smaller one is"
-        " in mm, and `pixel_mm` converts the lengths of the row to px), all other parameters by the names of"
-        " the model, `sd_NAME` (0 held, `inf` unknown), `for_each` (`all`, `photo`, `group`), `weights`"
+        " in mm, and `pixel_mm` converts the lengths of the row to px); an unknown `f` is one unknown, in the"
+        " form of the model with one focal length (`radial` for `opencv`) if it has one; all other parameters"
+        " by the names of the model, `sd_NAME` (0 held, `inf` unknown), `for_each` (`all`, `photo`, `group`), `weights`"
         " (`corrected`, `measured`) of backward models; or `calibration` (`camera.json` of `photogram"
         " stellar-camera`: model and parameters with their covariance); of a [rolling"
         " shutter](#what-moves) `readout` (s),"
