@@ -244,6 +244,7 @@ def test_a_good_block(simulated):
         "next",
         "tests",
         "removed",
+        "outliers",
         "rivals",
         "hints",
     }

@@ -227,7 +227,8 @@ def _in_system(
         print_remark(f"no results in {of_control}: {error}")
         return {}, [], []
     files = {f"in_crs/{name}": each for name, each in placed_files(found).items()}
-    return files, [placed_section(found)], [control_lines(found)]
+    title, lines = control_lines(found)
+    return files, [placed_section(found)], [(title, lines)] if lines else []
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:

@@ -267,12 +267,10 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     variance = _variance(session, cases, pointing, linear, nonlinear, averages, options, messages)
     messages += plate_remarks(session, placed)
     joint = _joint(session, placed, linear, pointing, nonlinear is not None, options, messages)
-    pointings = pointing_tests(session.cases)
+    tests = pointing_tests(session.cases)
     readings = 2 * sum(len(case.points) for case in placed)
-    screening = screen(
-        placed, nonlinear or linear, session.grids, sum(each.ratios.size for each in pointings)
-    )
-    far = far_pointings(pointings, readings)
+    screening = screen(placed, nonlinear or linear, session.grids, sum(each.ratios.size for each in tests))
+    far = far_pointings(tests, readings)
     return Calibration(
         session=session,
         options=options,
@@ -287,7 +285,7 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         joint=joint,
         joint_check=_joint_check(session, placed, linear) if options.joint else None,
         screening=screening,
-        pointing_tests=tuple(pointings),
+        pointing_tests=tuple(tests),
         far_pointings=tuple(far),
         messages=[*problems(session, placed, screening, far, joint), *messages],
     )

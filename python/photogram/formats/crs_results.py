@@ -330,17 +330,16 @@ def _listed_differences(found: Placed) -> dict[int, list[float]]:
 
 def control_lines(found: Placed) -> Text:
     """Return title and lines of control and check points in a report: adjusted minus given, metres."""
-    names, kinds = (
-        np.array(each, dtype=object) for each in (found.result.block.point_ids, found.result.point_kinds)
-    )
+    ids = found.result.block.point_ids
     differences = _listed_differences(found)
-    rows = sorted(differences, key=lambda row: natural_order(names[row]))
+    rows = sorted(differences, key=lambda row: natural_order(ids[row]))
+    names, kinds = np.array([ids[row] for row in rows], dtype=object), found.result.point_kinds[rows]
     axes = tuple(Axis.of(name, "m") for name in _LOCAL)
     d = Quantity(np.reshape([differences[row] for row in rows], (-1, 3)), axes, "difference")
     lines = table_lines(
         [
-            *field(Quantity(names[rows], kind="name"), 10, head="point"),
-            *field(Quantity(kinds[rows], kind="name"), 9, head="kind"),
+            *field(Quantity(names, kind="name"), 10, head="point"),
+            *field(Quantity(kinds, kind="name"), 9, head="kind"),
             *field(d, 14, ".4f", "d {name} {unit}"),
         ]
     )

@@ -148,7 +148,7 @@ def tested_together(block: Block) -> list[int]:
 
 def point_kinds(block: Block) -> NDArray[np.str_]:
     """Return (n,) `control` with an observed component, `check` with known ones alone, else `pass`."""
-    held = np.isfinite(block.point_sd).any(axis=1)
+    held: Bools = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     held[observed_control(block)] = True
     known = np.isfinite(block.point_positions).any(axis=1)
     return np.where(held, "control", np.where(known, "check", "pass"))
