@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import re
 from typing import Any
 
 import numpy as np
 import pytest
 
-from photogram import Block, Result, Spheroid, adjust, simulate
+from photogram import Attitudes, Block, Result, Spheroid, adjust, simulate
 from photogram.network import project
 
 ARCSEC = 180 * 3600 / math.pi
@@ -69,6 +70,7 @@ def test_shapes(result):
         "photo_attitudes": (photos, 3),
         "photo_cofactors": (photos, 6, 6),
         "photo_covariances": (photos, 6, 6),
+        "photo_rotation_covariances": (photos, 6, 6),
         "photo_redundancy": (photos, 6),
         "photo_sd": (photos, 6),
         "point_positions": (points, 3),
@@ -105,6 +107,30 @@ def test_section_4_residuals_are_observed_minus_computed(result):
         photo_to_ground=block.photo_to_ground,
     )
     np.testing.assert_allclose(result.residuals[used], block.image_xy[used] - computed, rtol=0, atol=1e-9)
+
+
+def test_rotation_covariances_follow_from_a_numerical_jacobian(result):
+    block = result.block
+    kind = "omega_phi_kappa_photo_to_ground" if block.photo_to_ground else "omega_phi_kappa"
+    angles, step = result.photo_attitudes, 1e-6
+    adjusted = Attitudes.of(kind, angles).matrices
+
+    def rotation_vectors(changed: Any) -> Any:
+        turn = adjusted.transpose(0, 2, 1) @ Attitudes.of(kind, changed).matrices
+        return np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+
+    jacobian = np.tile(np.eye(6), (len(angles), 1, 1))
+    for k, axis in enumerate(np.eye(3)):
+        apart = rotation_vectors(angles + step * axis) - rotation_vectors(angles - step * axis)
+        jacobian[:, 3:, 3 + k] = apart / (2 * step)
+    expected = jacobian @ result.photo_covariances @ jacobian.transpose(0, 2, 1)
+    sd = np.sqrt(np.diagonal(expected, axis1=1, axis2=2))
+    scale = sd[:, :, np.newaxis] * sd[:, np.newaxis]
+    found = result.photo_rotation_covariances
+    np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(found[:, :3, :3], result.photo_covariances[:, :3, :3])
+    again = pickle.loads(pickle.dumps(result))
+    np.testing.assert_array_equal(again.photo_rotation_covariances, found)
 
 
 def test_kinds_and_rays(result):

@@ -17,6 +17,7 @@ from photogram import (
     LeverArm,
     Position,
     Refraction,
+    Result,
     Spheroid,
     adjust,
     formats,
@@ -139,6 +140,10 @@ def test_what_is_read_is_what_was_written(pair):
         lower = np.tril_indices(one.shape[1])
         np.testing.assert_array_equal(one[:, *lower], two[:, *lower])
     np.testing.assert_array_equal(again.point_sd, result.point_sd)
+    if isinstance(result, Result):
+        one, two = (own.photo_rotation_covariances for own in (again, result))
+        sd = np.sqrt(np.diagonal(two, axis1=1, axis2=2))
+        assert np.all(np.isnan(two) | (abs(one - two) <= 1e-15 * sd[:, :, np.newaxis] * sd[:, np.newaxis]))
 
 
 def test_it_says_the_same(pair):

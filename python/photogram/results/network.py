@@ -124,7 +124,7 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         (m,) factor by which the loss has changed the weight of an image point; 1 without a loss.
     ordering, predictions
         The ordering of photos in force, and the predicted multiply-adds of one factorisation in each ordering
-        that was tried.
+        that was tried; NaN if the network is too large for an ordering.
     operations, formations, seconds
         Predicted multiply-adds of each phase, the number of formations of the normal equations, and seconds
         spent in each phase.
@@ -356,7 +356,13 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
 
     @property
     def photo_covariances(self) -> Floats:
-        """(P, k, k) covariances of the unknowns of photos, scaled by the variance of unit weight."""
+        """(P, k, k) covariances of the unknowns of photos, scaled by the variance of unit weight.
+
+        Of a block, k = 6: X, Y, Z in its linear unit (longitude and latitude in radians, height), then omega,
+        phi, kappa in radians. These angles are the numbers of `photo_attitudes`, in the sense that
+        `block.photo_to_ground` names; `Result.photo_rotation_covariances` has rotation vectors instead. Of a
+        collection: `collection.parameters`, in their order.
+        """
         return self.photo_cofactors * self.covariance_scale
 
     @property

@@ -357,6 +357,21 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     @property
+    def photo_rotation_covariances(self) -> Floats:
+        """(P, 6, 6) covariances of positions and rotation vectors of photos, scaled as `photo_covariances`.
+
+        The order is X, Y, Z (longitude, latitude, height), then the three components of rho in radians. A
+        photo turns by rho about its own axes (x right, y up, z back towards the viewer): its true attitude is
+        A Exp(rho), A the adjusted one (docs/conventions.md). NaN where phi is 90 degrees.
+        """
+        kind = "omega_phi_kappa_photo_to_ground" if self.block.photo_to_ground else "omega_phi_kappa"
+        _, rates = _photocore.attitudes_from_numbers(kind, self.photo_attitudes, np.eye(3))
+        jacobian = np.tile(np.eye(6), (len(rates), 1, 1))
+        jacobian[:, 3:, 3:] = rates
+        found: Floats = jacobian @ self.photo_covariances @ jacobian.transpose(0, 2, 1)
+        return found
+
+    @property
     def photo_given_sd(self) -> Floats:
         """(P, 6) standard deviations of observed positions and attitudes: infinite free, zero fixed.
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import posed
@@ -314,10 +313,7 @@ def _centre_and_rotation(result: Result) -> Floats:
 
     A Exp(rho) is F A' before: r = -F rho.
     """
-    kind = "omega_phi_kappa_photo_to_ground" if result.block.photo_to_ground else "omega_phi_kappa"
-    rates = _photocore.attitudes_from_numbers(kind, result.photo_attitudes, _photocore.nadir_boresight(0))[1]
-    jacobian = np.zeros((len(rates), 6, 6))
-    jacobian[:, :3, :3] = np.eye(3)
-    jacobian[:, 3:, 3:] = -Y_DOWN @ rates
-    found: Floats = jacobian @ result.photo_covariances @ jacobian.transpose(0, 2, 1)
+    jacobian = np.eye(6)
+    jacobian[3:, 3:] = -Y_DOWN
+    found: Floats = jacobian @ result.photo_rotation_covariances @ jacobian.T
     return found
