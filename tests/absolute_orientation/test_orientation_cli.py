@@ -53,6 +53,13 @@ def test_the_example(run, tmp_path):
     assert Path("o/residuals.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_default_directory_of_the_example(run, tmp_path):
+    assert run("--example").exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["example-oriented"]
+    written = {path.name for path in (tmp_path / "example-oriented").iterdir()}
+    assert written == {"points-transformed.csv", "report.html", "report.txt"}
+
+
 @pytest.mark.parametrize("case", cases("partial_mixed", "partial_min"))
 @pytest.mark.parametrize("write", [csv_of, cards_of])
 def test_a_golden_model_from_a_file(run, case, write, tmp_path):
@@ -69,7 +76,8 @@ def test_a_golden_model_from_a_file(run, case, write, tmp_path):
     assert (document["covariance"] is not None) == determined
     assert (document["sigma0"] is not None) == determined
     assert document["points"][0]["covariance"][0][0] is not None or not determined
-    assert Path("points-transformed.csv").is_file()
+    written = {path.name for path in Path("stations-oriented").iterdir()}
+    assert written == {"points-transformed.csv", "report.html", "report.txt"}
 
 
 @pytest.mark.parametrize("case", cases("blunder_full"))

@@ -68,11 +68,7 @@ def test_no_option_is_hidden():
 
 def test_pictures_without_a_place_are_refused(run, tmp_path):
     examples = Path(str(files("photogram") / "examples"))
-    for command in (
-        ["plan"],
-        ["perspective-center", str(examples / "perspective_center" / "grid.deck")],
-        ["absolute-orientation", str(examples / "absolute_orientation" / "stations.csv")],
-    ):
+    for command in (["plan"], ["collection", str(examples / "collection" / "ring.txt")]):
         refused = run(*command, "--plots")
         assert refused.exit_code == 2
         assert "goes with --out DIR" in refused.stderr

@@ -99,6 +99,24 @@ def test_everything_is_written(run, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"out.json", "o"}
 
 
+def test_the_default_directory_is_named_like_the_deck(run, tmp_path):
+    (tmp_path / "grid.deck").write_text(EXAMPLE.read_text())
+    assert run("grid.deck").exit_code == 0
+    assert run("--example").exit_code == 0
+    for folder in ("grid-resected", "example-resected"):
+        assert {path.name for path in (tmp_path / folder).iterdir()} == {"listing.txt", "report.html"}
+    listings = [
+        (tmp_path / folder / "listing.txt").read_text() for folder in ("grid-resected", "example-resected")
+    ]
+    assert listings == [listing(run_deck(Path(str(EXAMPLE))))] * 2
+
+
+def test_a_deck_without_a_solution_leaves_no_directory(run, tmp_path):
+    (tmp_path / "bad.deck").write_text("\n".join(EXAMPLE.read_text().splitlines()[:12]))
+    assert run("bad.deck").exit_code == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"bad.deck"}
+
+
 def test_the_document_agrees_with_the_result():
     done = run_deck(Path(str(EXAMPLE)))
     document = json.loads(to_json(done))
@@ -205,5 +223,5 @@ def test_fields_that_overflow_are_stars(tmp_path):
 
 def test_the_worked_example_of_the_page_is_what_the_command_prints(run):
     page = (REPOSITORY / "docs" / "perspective-center.md").read_text()
-    printed = run("--example").output.rstrip()
+    printed = run("--example").output.split("\nwritten: ")[0]
     assert f"```text\n{printed}\n```" in page

@@ -14,7 +14,7 @@ from rich.markup import escape
 from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, Reads, Writes, with_job
-from photogram.cli.options import Quiet, Strict, example_out, out_option
+from photogram.cli.options import Quiet, Strict, default_out, out_option
 from photogram.cli.projects import Additions, Example, project_path, read_project
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 SHOWN = 40
 """Lines of a section that the summary shows at most."""
-TRANSFORMED = "points-transformed.csv"
-"""What becomes of the points of the packaged example."""
 EXAMPLE = "absolute_orientation"
 """The packaged example, a directory of photogram.examples."""
 
@@ -59,11 +57,12 @@ def absolute_orientation(
         OutputFile,
         typer.Option(
             metavar="FILE",
-            help="Where they go, as CSV. Default: POINTS-transformed.csv in --out, or beside them.",
+            help="CSV file for the transformed points. Default: POINTS-transformed.csv in --out.",
         ),
     ] = None,
     out: Annotated[
-        OutputFolder, out_option("Directory for report.html and report.txt. Default: no report.")
+        OutputFolder,
+        out_option("Directory for report.html, report.txt and transformed points. Default: FILE-oriented."),
     ] = None,
     documents: OfPrograms,
     trace: Annotated[
@@ -140,7 +139,7 @@ def absolute_orientation(
 ) -> None:
     """Orient a model absolutely: s, A, B of x = s A X + B from full, horizontal and height control.
 
-    Prints problems, figures, parameters and residuals; writes what is asked for, whole or not at all.
+    Prints problems, figures, parameters and residuals; writes reports and transformed points to --out.
     Stations without control are transformed too. Exit code 3: not converged, or control that does not fit.
     """
     if trace and method == "rigorous":
@@ -151,17 +150,16 @@ def absolute_orientation(
         from photogram.messages import Message
         from photogram.show.methods import page_of
 
-        target = points_out
         if file is None:
             directory = job.packaged(EXAMPLE)
-            out = example_out(out, documents.plots, "example-oriented")
             file, ground_unit, model_unit = directory / "stations.csv", "m", "mm"
-            if points is None:
-                points, target = directory / "points.csv", target or (out or Path()) / TRANSFORMED
+            points = points or directory / "points.csv"
             job.reads(file, points)
+        folder = out or (Path("example-oriented") if example else default_out(file, "-oriented"))
+        target = points_out
         if points and not target:
-            target = (out or points.parent) / f"{points.stem}-transformed.csv"
-        pictures = documents.announce(job, out, TEXT, picture="residuals")
+            target = folder / f"{points.stem}-transformed.csv"
+        pictures = documents.announce(job, folder, TEXT, picture="residuals")
         if target and target is not points_out:
             job.writes(target)
         deck = _read(file, format, zero_missing, ground_unit, model_unit)
@@ -179,12 +177,12 @@ def absolute_orientation(
         if points and not result.usable:
             result.messages.append(Message("no points were transformed: the orientation is not to be used"))
             points = None
-        made = _small_files(result, out, pictures, trace, None if points else documents.json)
+        made = _small_files(result, folder, pictures, trace, None if points else documents.json)
         name = deck.identification if ident is None else ident
         made |= _records(result, part_two, restart_out, name)
         title = file.name
         made |= documents.page(
-            job, "absolute-orientation", out, lambda: replace(page_of(result), title=title)
+            job, "absolute-orientation", folder, lambda: replace(page_of(result), title=title)
         )
         written = list(made)
         with job.outputs() as outputs:
@@ -341,12 +339,10 @@ def _records(
 
 
 def _small_files(
-    result: Orientation, out: Path | None, pictures: list[Path], trace: Path | None, json: Path | None
+    result: Orientation, folder: Path, pictures: list[Path], trace: Path | None, json: Path | None
 ) -> dict[Path, bytes]:
     """Make everything that is small, before anything is written."""
-    made: dict[Path, bytes] = {}
-    if out:
-        made[out / TEXT] = result.report().encode()
+    made = {folder / TEXT: result.report().encode()}
     if pictures:
         from photogram.absolute_orientation.plot import residuals_sketch
         from photogram.show.pictures import drawn

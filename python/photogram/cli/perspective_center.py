@@ -11,7 +11,7 @@ from rich.markup import escape
 from photogram.cli.console import output, print_remark
 from photogram.cli.documents import OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, with_job
-from photogram.cli.options import Quiet, Strict, example_out, out_option
+from photogram.cli.options import Quiet, Strict, default_out, out_option
 
 if TYPE_CHECKING:
     from photogram.perspective_center import Run
@@ -31,7 +31,7 @@ def perspective_center(
     out: Annotated[
         OutputFolder,
         out_option(
-            "Directory for report.html, and listing.txt, what the 1969 program printed. Default: no files."
+            "Directory for report.html and listing.txt (the printout of 1969). Default: DECK-resected."
         ),
     ] = None,
     documents: OfPrograms,
@@ -63,7 +63,7 @@ def perspective_center(
 ) -> None:
     """Determine perspective centre, attitude and distortion of projectors from grid measurements.
 
-    The run stops at the first set that cannot be read or solved; what was solved before is written.
+    The run stops at the first set that cannot be read or solved. The sets before it are written to --out.
     """
     with job:
         from photogram.perspective_center import run_deck
@@ -72,9 +72,9 @@ def perspective_center(
 
         if deck is None:
             deck = job.packaged(*EXAMPLE)
-            out = example_out(out, documents.plots, "example-resected")
             job.reads(deck)
-        pictures = documents.announce(job, out, "listing.txt", picture="residuals")
+        folder = out or (Path("example-resected") if example else default_out(deck, "-resected"))
+        pictures = documents.announce(job, folder, "listing.txt", picture="residuals")
         unknown = [name.strip() for name in calibrate.split(",")] if calibrate else []
         run = run_deck(
             deck,
@@ -85,8 +85,8 @@ def perspective_center(
         )
         stopped = run.stop is not None
         job.finish(
-            _files(run, documents.json, out, pictures),
-            documents.page(job, "perspective-center", out, lambda: page_of(run)),
+            _files(run, documents.json, folder, pictures),
+            documents.page(job, "perspective-center", folder, lambda: page_of(run)) if run.results else {},
             summary=lambda: _summarize(run),
             code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
         )
@@ -94,17 +94,17 @@ def perspective_center(
             raise run.stop.error
 
 
-def _files(run: Run, json: Path | None, out: Path | None, pictures: list[Path]) -> dict[Path, bytes]:
-    """Make everything that is asked for, before anything is written."""
+def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> dict[Path, bytes]:
+    """Make all files but the report for the browser, before anything is written."""
     made = {}
     if json is not None:
         from photogram.perspective_center.report import to_json
 
         made[json] = to_json(run)
-    if out is not None:
+    if run.results:
         from photogram.perspective_center.listing import listing
 
-        made[out / "listing.txt"] = listing(run).encode()
+        made[folder / "listing.txt"] = listing(run).encode()
     if pictures and run.results:
         from photogram.perspective_center.plot import draw
 
