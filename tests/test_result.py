@@ -6,6 +6,7 @@ import json
 import math
 import pickle
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -371,6 +372,13 @@ def test_units_and_conventions_of_the_document(result, document):
     assert conventions["object_space"] == ("geographic" if result.block.geographic else "rectangular")
     assert conventions["rotation"].startswith("photo" if result.block.photo_to_ground else "ground")
     assert "covariance_scale" in conventions["covariance"]
+
+
+def test_an_ordering_that_failed_is_reported(result):
+    failed = replace(result, predictions={**result.predictions, "amd": math.nan})
+    line = next(line for line in failed.report().splitlines() if line.endswith("too large for this ordering"))
+    assert "minimum degree" in line
+    assert json.loads(failed.to_json())["predictions"]["amd"] is None
 
 
 def test_photos_of_the_document(result, document):

@@ -1637,7 +1637,7 @@ class _NetworkSolution:
 
     @property
     def predictions(self) -> dict[str, float]:
-        """Predicted multiply-adds of one factorisation in each ordering that was tried."""
+        """Predicted multiply-adds of one factorisation in each ordering that was tried; NaN if it failed."""
 
     @property
     def operations(self) -> dict[str, float]:

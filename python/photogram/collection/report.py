@@ -10,7 +10,12 @@ from photogram.collection.result import AdjustedCollection
 from photogram.results.iteration_text import iteration_lines
 from photogram.results.network_tables import control, iterations, photos, stations
 from photogram.results.observation_rows import image_lines, largest, observed_lines
-from photogram.results.report import first_sections, reliability_lines, suspects_section
+from photogram.results.report import (
+    first_sections,
+    predicted_operations,
+    reliability_lines,
+    suspects_section,
+)
 from photogram.results.weakest import weakest_lines
 from photogram.show.lines import Field, field, table_lines
 from photogram.show.methods import report_of
@@ -104,7 +109,9 @@ def _points(result: AdjustedCollection) -> list[str]:
 
 
 def _work(result: AdjustedCollection) -> list[str]:
-    tried = ", ".join(f"{name} {operations:.2g}" for name, operations in result.predictions.items())
+    tried = ", ".join(
+        f"{name} {predicted_operations(operations, '.2g')}" for name, operations in result.predictions.items()
+    )
     return [
         f"ordering                            {result.ordering} (multiply-adds predicted: {tried})",
         f"formations of the normal equations  {result.formations}",

@@ -366,7 +366,7 @@ def _work(result: Result) -> list[str]:
     order = ORDERINGS[result.ordering]
     lines = [f"photos eliminated {order}; normal equations formed {result.formations} times"]
     lines += [
-        f"{f'multiply-adds if {ORDERINGS[name]}':<36}{count:.3e}"
+        f"{f'multiply-adds if {ORDERINGS[name]}':<36}{predicted_operations(count, '.3e')}"
         for name, count in result.predictions.items()
         if name != result.ordering
     ]
@@ -374,6 +374,11 @@ def _work(result: Result) -> list[str]:
     lines += [head, *(f"{f'  {name}':<36}{value}" for name, value in figures)]
     lines += [f"{f'multiply-adds of one {name}':<36}{count:.3e}" for name, count in result.operations.items()]
     return lines
+
+
+def predicted_operations(count: float, form: str) -> str:
+    """Return the predicted operations of an ordering as text."""
+    return "too large for this ordering" if math.isnan(count) else format(count, form)
 
 
 def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
