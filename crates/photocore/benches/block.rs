@@ -7,19 +7,20 @@
 // A benchmark that cannot run has nobody to report to.
 #![allow(clippy::expect_used, missing_docs)]
 
+use std::fmt::Debug;
 use std::hint::black_box;
 use std::ops::ControlFlow;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
+use photocore::Threads;
 use photocore::adjustment;
 use photocore::geometry::{self, Bal, ObjectSpace, Orientation, Perspective, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Image, Network, Options, Photo, Point, Screens, Start, UnitVariance};
 use photocore::normals::{
     Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SolveOptions, System,
 };
-use photocore::{Stopped, Threads};
 
 /// Rows and columns of the dense product.
 const DENSE: usize = 1024;
@@ -216,11 +217,8 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
-    match flow {
-        ControlFlow::Continue(value) => value,
-        ControlFlow::Break(_) => unreachable!("nothing interrupts"),
-    }
+fn done<T, E: Debug>(result: Result<T, E>) -> T {
+    result.expect("a result")
 }
 
 /// Multiply-adds as criterion's elements.

@@ -49,8 +49,8 @@ fn factor(threads: &Threads, system: &System, prior: &Prior) -> Duration {
         .factor(threads, &Anything, prior, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));
     let elapsed = start.elapsed();
     match done {
-        ControlFlow::Continue(factor) => elapsed.mul_f64(1.0 - factor.formation_share),
-        ControlFlow::Break(_) => unreachable!("nothing interrupts"),
+        Ok(factor) => elapsed.mul_f64(1.0 - factor.formation_share),
+        Err(_) => unreachable!("nothing interrupts"),
     }
 }
 

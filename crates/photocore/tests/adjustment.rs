@@ -11,10 +11,10 @@ use std::sync::Mutex;
 use std::thread::{self, ThreadId};
 
 use photocore::adjustment::{
-    AdjustError, Adjustment, Evaluated, Event, Method, Model, Options, Phase, Problem, Published, Status,
-    Stop, adjust,
+    AdjustError, Adjustment, Evaluated, Event, Linearized, Method, Model, Options, Phase, Problem, Published,
+    Status, Stop, adjust,
 };
-use photocore::normals::{GroupRows, Layout, Ordering, System};
+use photocore::normals::{GroupRows, Layout, LayoutError, Ordering, System};
 use photocore::{Stopped, Threads};
 
 const FRAMES: usize = 4;
@@ -251,6 +251,31 @@ fn what_cannot_be_computed_is_refused() {
     hold(&mut problem, &DATUM, 0.0);
     problem.initial[SCALE] = f64::NAN;
     assert_eq!(run(&problem, &STRICT).unwrap_err(), AdjustError::NotFinite);
+}
+
+#[test]
+fn slices_of_other_lengths_are_refused() {
+    let observations = 2 * POINTS * FRAMES;
+    type Field = fn(&mut Problem<Frames>) -> &mut Vec<f64>;
+    let fields: [(&str, Field, usize); 4] = [
+        ("Problem::observation_sd", |problem| &mut problem.observation_sd, observations),
+        ("Problem::initial", |problem| &mut problem.initial, UNKNOWNS),
+        ("Problem::prior", |problem| &mut problem.prior, UNKNOWNS),
+        ("Problem::sd", |problem| &mut problem.sd, UNKNOWNS),
+    ];
+    let threads = Threads::new(1).unwrap();
+    for (field, slice, required) in fields {
+        for length in [0, required - 1, required + 1] {
+            let mut problem = problem();
+            hold(&mut problem, &DATUM, 0.0);
+            slice(&mut problem).resize(length, 1.0);
+            let expected = AdjustError::Layout(LayoutError::Length { field, length, required });
+            assert_eq!(run(&problem, &STRICT).unwrap_err(), expected);
+            let mut go = |_| ControlFlow::Continue(());
+            let formed = Linearized::form(&problem, None, truth(), vec![], &threads, &mut go);
+            assert_eq!(formed.unwrap_err(), expected);
+        }
+    }
 }
 
 #[test]

@@ -304,3 +304,18 @@ fn a_balanced_lens_is_one_with_another_principal_distance() {
         assert!((a - b).amax() < 1e-15);
     }
 }
+
+/// The table in the documentation of `Camera` has all cameras with the names of their parameters in their order.
+#[test]
+fn the_documentation_lists_the_parameters_of_every_camera() {
+    let listed =
+        include_str!("../src/geometry/camera/parameters.md").lines().filter(|line| line.starts_with("| [`"));
+    let cells: Vec<Vec<&str>> = listed.map(|line| line.split('|').map(str::trim).collect()).collect();
+    assert_eq!(cells.len(), Camera::NAMES.len());
+    for (cells, &name) in cells.iter().zip(Camera::NAMES) {
+        let model = Camera::model(name).unwrap();
+        let names: Vec<&str> = model.parameters.iter().map(|&(name, _)| name).collect();
+        let (free, constants) = names.split_at(names.len() - model.constants);
+        assert_eq!(cells[2..5], [&format!("`{name}`"), &free.join(", "), &constants.join(", ")]);
+    }
+}

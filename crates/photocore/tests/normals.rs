@@ -3,15 +3,16 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::collections::BTreeSet;
+use std::fmt::Debug;
 use std::ops::ControlFlow;
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
+use photocore::Threads;
 use photocore::normals::{
     Chord, Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError,
-    Ordering, Prior, SelectedInverse, SolveOptions, System, Tie, TieRows,
+    Ordering, Prior, SelectedInverse, SolveOptions, System, SystemError, Tie, TieRows,
 };
-use photocore::{Stopped, Threads};
 use proptest::prelude::*;
 
 /// A system of given equations, dense.
@@ -120,11 +121,8 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
-    match flow {
-        ControlFlow::Continue(value) => value,
-        ControlFlow::Break(stopped) => panic!("{stopped:?}"),
-    }
+fn done<T, E: Debug>(result: Result<T, E>) -> T {
+    result.unwrap()
 }
 
 fn solved_for(rights: &[f64]) -> SolveOptions<'_> {
@@ -320,7 +318,7 @@ fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedIn
     for local in (0..layout.locals()).step_by(layout.locals().div_ceil(20).max(1)) {
         let groups = layout.groups_of(local);
         let (first, count) = (groups.start * layout.rows(), groups.len() * layout.rows());
-        let found = system.local_cofactors(selected, dense, &dense.prior, dense, local, &[]);
+        let found = done(system.local_cofactors(selected, dense, &dense.prior, dense, local, &[]));
         assert_eq!(found.rows(), count);
         let group = |row: usize| row / layout.rows();
         for (k, value) in found.equations.iter().enumerate() {
@@ -416,9 +414,9 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
 fn compare_blocks(layout: &Layout, selected: &SelectedInverse, inverse: &Mat<f64>) {
     let (blocks, range) = (layout.retained(), |block: usize| layout.retained_range(block));
     for row in 0..blocks {
-        assert!(selected.block(row, row).is_some());
+        assert!(selected.block(row, row).is_ok());
         for column in 0..blocks {
-            let Some(values) = selected.block(row, column) else { continue };
+            let Ok(values) = selected.block(row, column) else { continue };
             let indices = range(row).flat_map(|i| range(column).map(move |j| (i, j)));
             for ((i, j), value) in indices.zip(values) {
                 let scale = (inverse[(i, i)] * inverse[(j, j)]).sqrt();
@@ -430,7 +428,7 @@ fn compare_blocks(layout: &Layout, selected: &SelectedInverse, inverse: &Mat<f64
         let blocks: BTreeSet<usize> =
             layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).collect();
         for (&one, &other) in blocks.iter().flat_map(|one| blocks.iter().map(move |other| (one, other))) {
-            assert!(selected.block(one, other).is_some(), "a pair that shares a local block");
+            assert!(selected.block(one, other).is_ok(), "a pair that shares a local block");
         }
     }
 }
@@ -692,6 +690,75 @@ fn layouts_that_contradict_themselves_are_refused() {
     assert!(refused(1, &[]));
     assert!(refused(0, &[0]));
     assert!(!refused(1, &[0]));
+}
+
+#[test]
+fn slices_of_other_lengths_are_refused() {
+    let dense = block(1, 3, 0);
+    let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
+    let (threads, unknowns) = (threads(1), dense.layout.unknowns());
+    let factor = |prior: &Prior| system.factor(&threads, &dense, prior, &FactorOptions::default(), &mut go);
+    let length =
+        |field, length, required| SystemError::Layout(LayoutError::Length { field, length, required });
+    let (mut short, mut long) = (dense.prior.clone(), dense.prior.clone());
+    short.weight.pop();
+    long.right.push(0.0);
+    assert_eq!(factor(&short).unwrap_err(), length("Prior::weight", unknowns - 1, unknowns));
+    assert_eq!(factor(&long).unwrap_err(), length("Prior::right", unknowns + 1, unknowns));
+    let formed = factor(&dense.prior).unwrap();
+    let solve = |prior, options| system.solve(&threads, &formed, &dense, prior, &options, &mut go);
+    let refused = solve(&short, SolveOptions::default()).unwrap_err();
+    assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
+    for count in [1, unknowns - 1, 2 * unknowns + 1] {
+        let expected = LayoutError::Columns { field: "SolveOptions::rights", length: count, unknowns };
+        let rights = vec![0.0; count];
+        let refused = system.solve(&threads, &formed, &dense, &dense.prior, &solved_for(&rights), &mut go);
+        assert_eq!(refused.unwrap_err(), SystemError::Layout(expected));
+    }
+    let outer = SolveOptions { outer: &[0.0], ..SolveOptions::default() };
+    assert_eq!(solve(&dense.prior, outer).unwrap_err(), length("SolveOptions::outer", 1, 0));
+    let options = InvertOptions::default();
+    let refused = system.invert(&threads, formed, &dense, &short, &options, &mut go).unwrap_err();
+    assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
+}
+
+#[test]
+fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
+    // A chain of twenty photos: the first and the last have no point in common.
+    let dense = block(1, 20, 0);
+    let count = dense.layout.unknowns();
+    let inverse =
+        dense.normal_matrix().llt(faer::Side::Lower).unwrap().solve(Mat::<f64>::identity(count, count));
+    let inverted = |layout: Layout| {
+        let system = System::new(layout, Ordering::Input).unwrap();
+        let factoring = FactorOptions::default();
+        let factor = done(system.factor(&threads(1), &dense, &dense.prior, &factoring, &mut go));
+        let options = InvertOptions::default();
+        (done(system.invert(&threads(1), factor, &dense, &dense.prior, &options, &mut go)), system)
+    };
+    let (found, _) = inverted(dense.layout.clone());
+    let outside = LayoutError::Block { row: 0, column: 19 };
+    assert_eq!(found.selected.block(0, 19).unwrap_err(), outside);
+    assert!(matches!(found.selected.triangle(&dense.layout, &[0, 19]), Err(LayoutError::Block { .. })));
+    let (with_pair, _) = inverted(dense.layout.clone().with_pairs(vec![[0, 19]]).unwrap());
+    let (rows, columns) = (dense.layout.retained_range(0), dense.layout.retained_range(19));
+    for (k, value) in with_pair.cofactors.pairs.iter().enumerate() {
+        let (i, j) = (rows.start + k / 6, columns.start + k % 6);
+        let scale = (inverse[(i, i)] * inverse[(j, j)]).sqrt();
+        assert_close(*value, inverse[(i, j)], 1e-9 * scale, "pair");
+    }
+    assert_eq!(with_pair.cofactors.pairs.len(), 36);
+    // The inverse of a system in which the photos of a point are not coupled.
+    let count = dense.layout.groups();
+    let groups: Vec<u32> = (0..count).map(|group| dense.layout.retained_of(group) as u32).collect();
+    let apart = Dense::new(Layout::new(2, 3, &[6; 20], (0..=count).collect(), groups).unwrap(), 3);
+    let system = System::new(apart.layout.clone(), Ordering::Input).unwrap();
+    let factor = done(system.factor(&threads(1), &apart, &apart.prior, &FactorOptions::default(), &mut go));
+    let options = InvertOptions::default();
+    let foreign = done(system.invert(&threads(1), factor, &apart, &apart.prior, &options, &mut go)).selected;
+    let (_, whole) = inverted(dense.layout.clone());
+    let refused = whole.local_cofactors(&foreign, &dense, &dense.prior, &dense, 0, &[]);
+    assert!(matches!(refused, Err(LayoutError::Block { .. })));
 }
 
 /// Two points at one height, and nothing else that joins two photos: a tie alone holds a network together.

@@ -3,14 +3,15 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::collections::BTreeSet;
+use std::fmt::Debug;
 use std::ops::ControlFlow;
 
 use crate::cut::{Cut, TREES};
+use photocore::Threads;
 use photocore::normals::{
     Chord, Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError,
     Ordering, Prior, ReducedRights, SolveOptions, System, Tie, TieRows,
 };
-use photocore::{Stopped, Threads};
 use proptest::prelude::*;
 
 /// Numbers between -1 and 1 that a seed and two places give.
@@ -159,11 +160,8 @@ fn go(_: usize) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn done<T>(flow: ControlFlow<Stopped, T>) -> T {
-    match flow {
-        ControlFlow::Continue(value) => value,
-        ControlFlow::Break(stopped) => panic!("{stopped:?}"),
-    }
+fn done<T, E: Debug>(result: Result<T, E>) -> T {
+    result.unwrap()
 }
 
 /// Every node of a tree, formed and eliminated from the leaves up.
@@ -356,11 +354,11 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
         ));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             let outer_step = own.unknowns_of(blocks).map(|unknown| step[unknown]).collect();
-            handed[child] = (outer_step, found.selected.triangle(own, blocks));
+            handed[child] = (outer_step, found.selected.triangle(own, blocks).unwrap());
         }
         for (i, &block) in piece.retained.iter().enumerate() {
             let pair =
-                [found.selected.block(i, i), cofactors.selected.block(block, block)].map(Option::unwrap);
+                [found.selected.block(i, i), cofactors.selected.block(block, block)].map(Result::unwrap);
             pair[0]
                 .iter()
                 .zip(&pair[1])

@@ -20,11 +20,12 @@ struct Trilateration {
 }
 
 impl Trilateration {
-    /// Observed minus computed, and the partials by the first point; those by the second are the opposite.
+    /// Observed minus computed, and the partials by the first point; those by the second are the opposite. NaN if the length is NaN.
     fn distance(&self, values: &[f64], observation: usize, from: usize, to: usize) -> (f64, [f64; 2]) {
         let difference = [values[from] - values[to], values[from + 1] - values[to + 1]];
         let length = difference[0].hypot(difference[1]);
-        (self.lengths[observation] - length, difference.map(|value| value / length))
+        let left = self.lengths[observation] - length;
+        (left, difference.map(|value| if left.is_nan() { left } else { value / length }))
     }
 }
 
@@ -324,6 +325,44 @@ fn a_loss_takes_the_weight_of_a_wrong_tie() {
 }
 
 #[test]
+fn excluded_observations_may_not_be_finite() {
+    let threads = threads();
+    let adjusted = |length: f64, method: Method, loss: Option<Loss>| {
+        let mut problem = network(vec![16, 17, 19]);
+        for excluded in [5, problem.layout().groups() + 7] {
+            problem.observation_sd[excluded] = f64::INFINITY;
+            problem.model.lengths[excluded] = length;
+        }
+        let found = adjust(&problem, &Options { method, loss, ..options() }, &threads, &mut go).unwrap();
+        let (values, held) = (found.unknowns.clone(), found.datum.clone());
+        let leverages = Leverages::at(&problem, values, held, &threads, &mut go).unwrap();
+        let of_point =
+            leverages.of_locals(&problem, &problem.observation_sd, &[1], |_| vec![], &threads).unwrap();
+        (found, leverages.sum_of_squares(&problem), of_point[0].equations.clone())
+    };
+    for (method, loss) in [
+        (Method::default(), None),
+        (Method::default(), Some(Loss::Huber(1.5))),
+        (Method::TrustRegion(Stop::Decrease(1e-14)), None),
+        (Method::TrustRegion(Stop::Decrease(1e-14)), Some(Loss::Cauchy(1.5))),
+        (Method::Full(Published::Percent(1e-6)), None),
+    ] {
+        let (expected, squares, equations) = adjusted(90.0, method, loss);
+        let (found, found_squares, found_equations) = adjusted(f64::NAN, method, loss);
+        assert_eq!((found.status, &found.unknowns), (Status::Converged, &expected.unknowns), "{method:?}");
+        assert_eq!(
+            found.iterations.last().unwrap().sum_of_squares,
+            expected.iterations.last().unwrap().sum_of_squares
+        );
+        assert_eq!((found.datum, found.weights), (expected.datum, expected.weights));
+        assert_eq!(found.redundancy, expected.redundancy);
+        assert_eq!(found.cofactors.unwrap().retained, expected.cofactors.unwrap().retained);
+        assert_eq!((found_squares, found_equations), (squares, equations));
+        assert!(found.residuals[5].is_nan());
+    }
+}
+
+#[test]
 fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say() {
     let (problem, threads) = (network(vec![]), threads());
     let mut go_on = |_| ControlFlow::Continue(());
@@ -350,7 +389,8 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
     let rows: Vec<Vec<f64>> = layout.groups_of(local).map(row).collect();
     let linearized = Linearized::form(&problem, None, values, held, &threads, &mut go_on).unwrap();
     let solved = linearized.solve_for(&problem, &rows.concat(), &threads, &mut go_on).unwrap();
-    let found = leverages.of_locals(&problem, &problem.observation_sd, &[local, 0], |_| vec![], &threads);
+    let sd = &problem.observation_sd;
+    let found = leverages.of_locals(&problem, sd, &[local, 0], |_| vec![], &threads).unwrap();
     let blocks: Vec<Vec<f64>> = found.into_iter().map(|own| own.equations).collect();
     assert_eq!(blocks.len(), 2);
     for (k, value) in blocks[0].iter().enumerate() {

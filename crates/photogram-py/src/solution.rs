@@ -21,11 +21,11 @@ pub fn status_name(status: Status) -> &'static str {
     }
 }
 
-/// Predicted multiply-adds of a factorisation in each ordering that was tried.
+/// Predicted multiply-adds of a factorisation in each ordering that was tried; NaN if the network is too large for it.
 pub fn predictions<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     for (ordering, operations) in &adjustment.effort.predictions {
-        dict.set_item(ordering.name(), operations)?;
+        dict.set_item(ordering.name(), operations.unwrap_or(f64::NAN))?;
     }
     Ok(dict)
 }

@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use super::damped::ROUNDING;
 use super::equations::ObservationEquations;
 use super::options::{Iteration, NEGLIGIBLE, Phase, Stop};
-use super::result::{AdjustError, unless_stopped};
+use super::result::AdjustError;
 use super::run::{Run, State, between};
 use super::secants::Secants;
 use crate::normals::{Chord, dot};
@@ -108,7 +108,7 @@ impl<'a> Run<'a, '_> {
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
         let of = (&equations as _, &prior);
         let chord = problem.system.chord(threads, &state.linearized.factor, of, &mut between);
-        Ok((equations, unless_stopped(chord)?))
+        Ok((equations, chord?))
     }
 }
 

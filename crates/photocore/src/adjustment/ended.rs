@@ -8,7 +8,7 @@ use super::linearized::{Inverted, Linearized};
 use super::loss::{Loss, Reweighting};
 use super::options::{Options, Status};
 use super::problem::AnyProblem;
-use super::result::{Adjustment, Effort, Seconds};
+use super::result::{AdjustError, Adjustment, Effort, Seconds};
 use crate::Threads;
 use crate::normals::{Between, FactorOptions, InvertOptions};
 
@@ -123,6 +123,7 @@ impl Linearized {
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Self, DatumError> {
+        problem.check_lengths(adjusted.unknowns).map_err(AdjustError::from)?;
         let (unknowns, basis) = moved(problem, adjusted, datum, reference, threads)?;
         let Adjusted { held, loss, .. } = adjusted;
         let reweighting = loss.map(Reweighting::plain);

@@ -12,7 +12,7 @@ use crate::normals::{Contribution, Equations, GroupRows, Layout, Prior, TieRows,
 pub(super) struct ObservationEquations<'a> {
     problem: &'a AnyProblem<'a>,
     at: Box<dyn Evaluated + 'a>,
-    /// Standard deviations of the observations; infinite for those that do not take part.
+    /// Standard deviations of the observations; infinite for excluded ones.
     observation_sd: &'a [f64],
     /// Which unknowns are fixed or held; None where none is.
     fixed: Option<Vec<bool>>,
@@ -249,19 +249,39 @@ impl GroupRows<'_> {
     pub(crate) fn weigh(&mut self, sd: &[f64]) {
         weigh(sd, self.constant, [&mut *self.local, &mut *self.retained, &mut *self.shared]);
     }
+
+    /// Excludes one of these observations.
+    #[cold]
+    pub(crate) fn exclude(&mut self, row: usize) {
+        exclude(row, self.constant, &mut [&mut *self.local, &mut *self.retained, &mut *self.shared]);
+    }
 }
 
-/// Gives equations unit weight.
+/// Gives equations unit weight, and excludes observations of infinite standard deviation.
 #[inline(always)]
 fn weigh<const N: usize>(sd: &[f64], constant: &mut [f64], mut parts: [&mut [f64]; N]) {
     let widths = parts.each_ref().map(|part| part.len() / constant.len());
     for (row, sd) in sd.iter().enumerate() {
+        if sd.is_infinite() {
+            exclude(row, constant, &mut parts);
+            continue;
+        }
         constant[row] /= sd;
         let weight = sd.recip();
         for (part, width) in parts.iter_mut().zip(widths) {
             part[row * width..][..width].iter_mut().for_each(|value| *value *= weight);
         }
     }
+}
+
+/// Sets an equation to 0 = 0. A weight of zero does not: the observation and its partials may not be finite.
+#[cold]
+fn exclude(row: usize, constant: &mut [f64], parts: &mut [&mut [f64]]) {
+    for part in parts {
+        let width = part.len() / constant.len();
+        part[row * width..][..width].fill(0.0);
+    }
+    constant[row] = 0.0;
 }
 
 /// Takes the columns of fixed unknowns out of some equations; `fixed` tells of each column whether it is.

@@ -13,8 +13,8 @@ use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
 use crate::normals::{
-    Cofactors, Equations, FactorOptions, InvertOptions, Layout, LocalCofactors, Prior, SelectedInverse,
-    TieRows,
+    Cofactors, Equations, FactorOptions, InvertOptions, Layout, LayoutError, LocalCofactors, Prior,
+    SelectedInverse, TieRows,
 };
 use crate::sorting::sort_by;
 use crate::{Threads, parallel};
@@ -63,6 +63,7 @@ impl Leverages {
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Self, AdjustError> {
+        problem.check_lengths(&values)?;
         let mut between = between(watch, Phase::Form, problem.layout().locals());
         let equations = ObservationEquations::new(problem, None, &values, &held, threads);
         let forming = FactorOptions::UNCACHED;
@@ -88,6 +89,9 @@ impl Leverages {
 
     /// Cofactors of all equations of some local blocks, with the given standard deviations; with those of their weighted unknowns, where
     /// `terms` gives these (see [`crate::normals::System::local_cofactors`]).
+    ///
+    /// # Errors
+    /// A problem of another layout.
     pub fn of_locals(
         &self,
         problem: &AnyProblem<'_>,
@@ -95,13 +99,14 @@ impl Leverages {
         locals: &[usize],
         terms: impl Fn(usize) -> Vec<f64> + Sync,
         threads: &Threads,
-    ) -> Vec<LocalCofactors> {
+    ) -> Result<Vec<LocalCofactors>, AdjustError> {
         let (formed, asked, prior) = self.equations(problem, observation_sd, threads);
         let of = |&local: &usize| {
             let own_terms = terms(local);
             problem.system.local_cofactors(&self.selected, &formed, &prior, &asked, local, &own_terms)
         };
-        threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])))
+        let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
+        Ok(found.into_iter().collect::<Result<_, _>>()?)
     }
 
     /// The same with what groups of local blocks that are held have to do with each other, which no pattern of normal equations has.
@@ -118,7 +123,7 @@ impl Leverages {
         (terms, limit): (impl Fn(usize) -> Vec<f64> + Sync, f64),
         threads: &Threads,
     ) -> Result<Vec<LocalCofactors>, AdjustError> {
-        let mut found = self.of_locals(problem, observation_sd, locals, terms, threads);
+        let mut found = self.of_locals(problem, observation_sd, locals, terms, threads)?;
         self.put_together(problem, observation_sd, (locals, limit), &mut found, threads)?;
         Ok(found)
     }
@@ -199,7 +204,8 @@ impl Leverages {
             let own_terms = terms(local);
             problem.system.local_cofactors(&self.selected, &asked, &prior, &asked, local, &own_terms)
         };
-        let mut found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
+        let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
+        let mut found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
         self.put_together(problem, observation_sd, (locals, 0.0), &mut found, threads)?;
         let shown = |own: &LocalCofactors| {
             let rows = own.rows();
@@ -212,21 +218,29 @@ impl Leverages {
     }
 
     /// Cofactors of the equations of some ties, with the given standard deviations.
+    ///
+    /// # Errors
+    /// A problem of another layout.
     pub fn of_ties(
         &self,
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
         ties: &[usize],
         threads: &Threads,
-    ) -> Vec<TieCofactors> {
+    ) -> Result<Vec<TieCofactors>, AdjustError> {
         if ties.is_empty() {
-            return vec![];
+            return Ok(vec![]);
         }
         let (_, asked, _) = self.equations(problem, observation_sd, threads);
-        ties.iter().map(|&tie| self.of_tie(problem, &asked, tie)).collect()
+        ties.iter().map(|&tie| Ok(self.of_tie(problem, &asked, tie)?)).collect()
     }
 
-    fn of_tie(&self, problem: &AnyProblem<'_>, asked: &ObservationEquations<'_>, tie: usize) -> TieCofactors {
+    fn of_tie(
+        &self,
+        problem: &AnyProblem<'_>,
+        asked: &ObservationEquations<'_>,
+        tie: usize,
+    ) -> Result<TieCofactors, LayoutError> {
         let layout = problem.layout();
         let (each, width) = (&layout.ties()[tie], layout.tie_columns(tie).count());
         let (mut constant, mut coefficients) = (vec![0.0; each.rows], vec![0.0; each.rows * width]);
@@ -239,9 +253,9 @@ impl Leverages {
         };
         let blocks: Vec<(usize, usize, usize)> = each.retained.iter().map(place).collect();
         let mut along = vec![0.0; each.rows * width];
-        for &(row_block, to, height) in &blocks {
+        for &(row_block, to, _) in &blocks {
             for &(column_block, from, count) in &blocks {
-                let values = self.selected.block(row_block, column_block).unwrap_or_default();
+                let values = self.selected.block(row_block, column_block)?;
                 for (k, row) in values.chunks_exact(count.max(1)).enumerate() {
                     for equation in 0..each.rows {
                         let own = &coefficients[equation * width + from..][..count];
@@ -249,7 +263,6 @@ impl Leverages {
                             row.iter().zip(own).map(|(q, a)| q * a).sum::<f64>();
                     }
                 }
-                debug_assert!(values.is_empty() || values.len() == height * count);
             }
         }
         let row = |values: &'_ [f64], i: usize| values[i * width..(i + 1) * width].to_vec();
@@ -259,10 +272,10 @@ impl Leverages {
         let of_block = |&(block, first, count): &(usize, usize, usize)| {
             (block, (0..each.rows).flat_map(|i| along[i * width + first..][..count].to_vec()).collect())
         };
-        TieCofactors {
+        Ok(TieCofactors {
             equations: (0..each.rows * each.rows).map(|k| product(k / each.rows, k % each.rows)).collect(),
             blocks: blocks.iter().map(of_block).collect(),
-        }
+        })
     }
 
     /// The equations that take part, those that are asked for, and the weighted unknowns.

@@ -9,7 +9,7 @@ use super::datum::Basis;
 use super::equations::ObservationEquations;
 use super::loss::{Loss, Reweighting};
 use super::problem::AnyProblem;
-use super::result::{AdjustError, Seconds, gib, unless_stopped};
+use super::result::{AdjustError, Seconds, gib};
 use super::transformation::Transformation;
 use crate::Threads;
 use crate::normals::{
@@ -74,7 +74,7 @@ impl Linearized {
     /// Whether everything is determined is for the caller to ask.
     ///
     /// # Errors
-    /// An interruption, no memory.
+    /// Lengths that contradict the layout, an interruption, no memory.
     pub fn form(
         problem: &AnyProblem<'_>,
         loss: Option<Loss>,
@@ -83,6 +83,7 @@ impl Linearized {
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
+        problem.check_lengths(&values)?;
         let reweighting = loss.map(Reweighting::plain);
         let equations = ObservationEquations::new(problem, reweighting, &values, &held, threads);
         Self::of(&equations, values, held, &FactorOptions::UNCACHED, threads, between)
@@ -100,7 +101,7 @@ impl Linearized {
         let (start, problem) = (Instant::now(), equations.problem());
         let terms = problem.terms(&values);
         let prior = problem.prior_equations(&terms, &held);
-        let factor = unless_stopped(problem.system.factor(threads, equations, &prior, options, between))?;
+        let factor = problem.system.factor(threads, equations, &prior, options, between)?;
         let sum_of_squares = factor.sum_of_squares + terms.sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
@@ -233,20 +234,16 @@ impl Linearized {
         let system = &problem.system;
         let reduced = {
             let equations = self.equations(problem, threads);
-            unless_stopped(system.reduce(
-                threads,
-                &equations,
-                &self.prior,
-                &free,
-                others.as_deref(),
-                between,
-            ))?
+            let prior = &self.prior;
+            let reduced = system.reduce(threads, &equations, prior, &free, others.as_deref(), between);
+            reduced.map_err(AdjustError::from)?
         };
         let needed = system.memory_of(&reduced);
         if let Some(available) = memory.filter(|&available| needed > available) {
             return Err(CofactorError::Memory { needed, available });
         }
-        let mut matrix = unless_stopped(system.cofactors_of(threads, &self.factor, &reduced, between))?;
+        let matrix = system.cofactors_of(threads, &self.factor, &reduced, between);
+        let mut matrix = matrix.map_err(AdjustError::from)?;
         if let Some(transformation) = &self.transformation {
             transformation.apply_to_functions(rows, columns, &mut matrix);
         }
@@ -302,7 +299,7 @@ impl Linearized {
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let Self { factor, prior, .. } = self;
-        unless_stopped(equations.problem().system.solve(threads, factor, equations, prior, options, between))
+        Ok(equations.problem().system.solve(threads, factor, equations, prior, options, between)?)
     }
 
     /// The selected inverse, in the datum that it was taken to.
@@ -316,7 +313,7 @@ impl Linearized {
         let (start, problem) = (Instant::now(), equations.problem());
         let Self { values, held, prior, factor, transformation, mut seconds, .. } = self;
         let found = problem.system.invert(threads, factor, equations, &prior, options, between);
-        let Inversion { mut cofactors, selected, inversion_share } = unless_stopped(found)?;
+        let Inversion { mut cofactors, selected, inversion_share } = found?;
         let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, &values);
         let lost = transformation
             .map(|transformation| threads.install(|| transformation.apply(problem.layout(), &mut cofactors)));

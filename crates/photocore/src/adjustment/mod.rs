@@ -110,6 +110,7 @@ pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
 pub(crate) use run::go_on;
 pub use run::{Watch, adjust, adjust_by_groups, adjust_in_datum};
+pub(crate) use statistics::weighted;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub use term::Term;
 pub use terms::Terms;

@@ -139,7 +139,9 @@ impl<'a> Candidates<'a> {
             if let Some((motion, carried)) = &carried {
                 let along = sums.along.as_flattened_mut()[*motion..].iter_mut();
                 let sd = equations.deviation(first + k);
-                along.zip(&carried[k]).for_each(|(along, by)| *along = by / sd);
+                if sd.is_finite() {
+                    along.zip(&carried[k]).for_each(|(along, by)| *along = by / sd);
+                }
             }
             self.add_to_row(sums, layout.tie_columns(tie).zip(row.iter().copied()));
         }

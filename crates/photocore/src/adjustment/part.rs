@@ -12,7 +12,7 @@ use super::linearized::Linearized;
 use super::loss::{Loss, Reweighting};
 use super::options::Phase;
 use super::problem::AnyProblem;
-use super::result::{AdjustError, Adjustment, unless_stopped};
+use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
 use super::transformation::{DatumOfPart, Transformation};
 use crate::Threads;
@@ -50,7 +50,7 @@ impl Linearized {
     /// * `contributions`: what the parts below leave, in the order of the layout: they are added in this order.
     ///
     /// # Errors
-    /// Contributions of other unknowns, an interruption, no memory.
+    /// Contributions of other unknowns, lengths that contradict the layout, an interruption, no memory.
     pub fn of_part(
         problem: &AnyProblem<'_>,
         values: Vec<f64>,
@@ -67,6 +67,7 @@ impl Linearized {
         if contributions.len() != blocks.len() || !contributions.iter().zip(blocks).all(fit) {
             return Err(PartError::Foreign);
         }
+        problem.check_lengths(&values).map_err(AdjustError::from)?;
         let PartOptions { held, damping, loss, curved } = options;
         let reweighting = loss.map(|loss| Reweighting { loss, curved });
         let equations = ObservationEquations::new(problem, reweighting, &values, &held, threads)
@@ -122,7 +123,8 @@ impl Linearized {
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
         let equations = self.equations(problem, threads);
         let of = (&equations as &dyn Equations, &self.prior);
-        Ok(unless_stopped(problem.system.reduce_rights(threads, &self.factor, of, &rights, &mut between))?)
+        let found = problem.system.reduce_rights(threads, &self.factor, of, &rights, &mut between);
+        Ok(found.map_err(AdjustError::from)?)
     }
 
     /// Reduces the right-hand side that the equations of a part have at other values, `left` of the parts below in it: a chord, over all parts.
@@ -148,7 +150,7 @@ impl Linearized {
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
         let of = (&equations as &dyn Equations, &prior);
         let found = problem.system.reduce_chord(threads, &self.factor, of, &rights, &mut between);
-        Ok(Some(unless_stopped(found)?))
+        Ok(Some(found.map_err(AdjustError::from)?))
     }
 
     /// Right-hand sides, zero where unknowns are held or fixed: these stand in the normal equations by themselves.
@@ -178,7 +180,7 @@ impl Linearized {
         let of = (&equations as &dyn Equations, &self.prior);
         let system = &problem.system;
         let found = system.solve_reduced_rights(threads, &self.factor, of, reduced, outer, &mut between);
-        Ok(unless_stopped(found)?)
+        Ok(found.map_err(AdjustError::from)?)
     }
 
     /// The adjustment of what is at home in a part, and the cofactors of the unknowns of each part below: lower triangles, column by column.
@@ -213,7 +215,7 @@ impl Linearized {
         };
         problem.system.release();
         let below = layout.contributions().iter().map(|blocks| inverted.selected.triangle(layout, blocks));
-        let below = below.collect();
+        let below = below.collect::<Result<_, _>>().map_err(AdjustError::from)?;
         let before = datum.map(|datum| reached.iter().zip(datum.last).map(|(x, dx)| x - dx).collect());
         let before: &Vec<f64> = before.as_ref().unwrap_or(&inverted.values);
         let mut adjustment = Adjustment::between(problem, loss, &inverted.held, before, reached, threads);

@@ -1,7 +1,7 @@
 //! Models, and problems: a model with everything that is known beforehand.
 
 use super::term::{Term, is_weighted};
-use crate::normals::{GroupRows, Layout, System, TieRows};
+use crate::normals::{GroupRows, Layout, LayoutError, System, TieRows};
 
 /// How observations follow from unknowns.
 pub trait Model: Sync {
@@ -143,7 +143,7 @@ pub struct Motions {
 pub struct Problem<M: ?Sized> {
     /// The unknowns and groups, ordered.
     pub system: System,
-    /// Standard deviation of each observation, in the order of groups and rows, then of ties and rows.
+    /// Standard deviation of each observation, in the order of groups and rows, then of ties and rows; infinite to exclude it.
     pub observation_sd: Vec<f64>,
     /// Initial value of each unknown.
     pub initial: Vec<f64>,
@@ -185,6 +185,16 @@ impl<M: Model> Problem<M> {
 }
 
 impl AnyProblem<'_> {
+    /// An error unless all lengths, and that of given values of the unknowns, are those of the layout.
+    pub(super) fn check_lengths(&self, values: &[f64]) -> Result<(), LayoutError> {
+        let (equations, unknowns) = (self.layout().equations(), self.layout().unknowns());
+        LayoutError::unless_of_length("Problem::observation_sd", self.observation_sd.len(), equations)?;
+        LayoutError::unless_of_length("Problem::initial", self.initial.len(), unknowns)?;
+        LayoutError::unless_of_length("Problem::prior", self.prior.len(), unknowns)?;
+        LayoutError::unless_of_length("Problem::sd", self.sd.len(), unknowns)?;
+        LayoutError::unless_of_length("values", values.len(), unknowns)
+    }
+
     /// The unknowns after a step.
     pub(super) fn advanced(&self, unknowns: &[f64], step: &[f64]) -> Vec<f64> {
         let mut values = unknowns.to_vec();

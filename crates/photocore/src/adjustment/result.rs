@@ -1,14 +1,12 @@
 //! What an adjustment ends with.
 
-use std::ops::ControlFlow;
-
 use thiserror::Error;
 
 use super::options::NEGLIGIBLE;
 use super::options::{Iteration, Status};
-use super::statistics::{Counts, Observed, standardized};
+use super::statistics::{Counts, Observed, square, standardized};
 use crate::Stopped;
-use crate::normals::{Cofactors, Operations, Ordering, SelectedInverse};
+use crate::normals::{Cofactors, LayoutError, Operations, Ordering, SelectedInverse, SystemError};
 
 /// Time spent in each phase, in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
@@ -46,8 +44,8 @@ pub struct Effort {
     pub seconds: Seconds,
     /// The ordering in force.
     pub ordering: Ordering,
-    /// The orderings that were compared, each with the predicted multiply-adds of a factorisation.
-    pub predictions: Vec<(Ordering, f64)>,
+    /// The orderings that were compared, each with the predicted multiply-adds of a factorisation; None if the layout is too large for it.
+    pub predictions: Vec<(Ordering, Option<f64>)>,
     /// Retained blocks in the order of their elimination.
     pub order: Vec<usize>,
 }
@@ -152,7 +150,7 @@ impl Adjustment {
     /// Weighted sum of squares of the first residuals, those of observations of the given standard deviations in groups of so many rows,
     /// weights as the loss has changed them.
     pub fn reweighted_sum_of_squares(&self, sd: &[f64], rows: usize) -> f64 {
-        let squares = self.residuals.iter().zip(sd).map(|(residual, sd)| (residual / sd).powi(2));
+        let squares = self.residuals.iter().zip(sd).map(square);
         match &self.weights {
             None => squares.sum(),
             Some(weights) => squares.enumerate().map(|(i, square)| weights[i / rows] * square).sum(),
@@ -177,21 +175,25 @@ pub enum AdjustError {
     /// The initial values give observations that are not finite.
     #[error("the initial values give computed observations that are not finite")]
     NotFinite,
+    /// The problem contradicts its layout.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// The work was stopped: by whoever watched it, or for want of memory or threads.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+}
+
+impl From<SystemError> for AdjustError {
+    fn from(error: SystemError) -> Self {
+        match error {
+            SystemError::Layout(error) => Self::Layout(error),
+            SystemError::Stopped(stopped) => Self::Stopped(stopped),
+        }
+    }
 }
 
 /// A number of bytes for a message.
 pub(crate) fn gib(bytes: usize) -> String {
     let gib = bytes as f64 / f64::from(1 << 30);
     if gib < 0.1 { format!("{:.1} MiB", 1024.0 * gib) } else { format!("{gib:.1} GiB") }
-}
-
-/// What the work has ended with.
-pub(super) fn unless_stopped<T>(flow: ControlFlow<Stopped, T>) -> Result<T, AdjustError> {
-    match flow {
-        ControlFlow::Continue(found) => Ok(found),
-        ControlFlow::Break(stopped) => Err(stopped.into()),
-    }
 }

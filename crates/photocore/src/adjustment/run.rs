@@ -27,7 +27,8 @@ impl<M: Model> Problem<M> {
     /// Adjusts by least squares, on threads of its own; [`adjust`] takes those of its caller and tells what is going on.
     ///
     /// # Errors
-    /// Unknowns that are not determined, or observations that cannot be computed; threads that cannot be started.
+    /// Lengths that contradict the layout, unknowns that are not determined, or observations that cannot be computed; threads that cannot
+    /// be started.
     pub fn adjust(&self, options: &Options) -> Result<Adjustment, AdjustError> {
         adjust(self.any(), options, &Threads::new(options.threads)?, &mut go_on)
     }
@@ -38,7 +39,7 @@ impl<M: Model> Problem<M> {
 /// `watch` is called on the calling thread with what is going on; when it breaks, the adjustment stops.
 ///
 /// # Errors
-/// Unknowns that are not determined, observations that cannot be computed, or an interruption.
+/// Lengths that contradict the layout, unknowns that are not determined, observations that cannot be computed, or an interruption.
 pub fn adjust(
     problem: &AnyProblem<'_>,
     options: &Options,
@@ -93,6 +94,7 @@ fn adjusted(
     watch: Watch<'_>,
     by_groups: Option<(&[usize], Option<usize>)>,
 ) -> Result<Adjustment, AdjustError> {
+    problem.check_lengths(&problem.initial)?;
     let mut run = Run {
         problem,
         options,

@@ -46,6 +46,16 @@ pub fn standardized(residual: f64, sd: f64, redundancy: f64) -> f64 {
     if redundancy > 1e-10 { residual / (sd * redundancy.sqrt()) } else { f64::NAN }
 }
 
+/// Residual / standard deviation; zero of an excluded observation (infinite standard deviation), whose residual may not be finite.
+pub(crate) fn weighted(residual: f64, sd: f64) -> f64 {
+    if sd.is_infinite() { 0.0 } else { residual / sd }
+}
+
+/// The square of it.
+pub(super) fn square((&residual, &sd): (&f64, &f64)) -> f64 {
+    weighted(residual, sd).powi(2)
+}
+
 /// The matrix at the start of a run of cofactors; NaN where there are none.
 pub fn leading_matrix<const N: usize>(cofactors: Option<&[f64]>) -> [[f64; N]; N] {
     std::array::from_fn(|i| std::array::from_fn(|j| cofactors.map_or(f64::NAN, |values| values[N * i + j])))
@@ -154,7 +164,7 @@ impl AnyProblem<'_> {
 impl<M: ?Sized> Problem<M> {
     /// Weighted sum of squares of the given residuals.
     pub fn sum_of_squares(&self, residuals: &[f64]) -> f64 {
-        residuals.iter().zip(&self.observation_sd).map(|(residual, sd)| (residual / sd).powi(2)).sum()
+        residuals.iter().zip(&self.observation_sd).map(square).sum()
     }
 
     /// Weighted sum of squares of each group, then of each tie, of the given residuals.
@@ -166,9 +176,8 @@ impl<M: ?Sized> Problem<M> {
             let range = layout.tie_rows(tie);
             first + range.start..first + range.end
         });
-        groups.chain(ties).map(|range| {
-            let pairs = residuals[range.clone()].iter().zip(&self.observation_sd[range]);
-            pairs.map(|(v, sd)| (v / sd).powi(2)).sum()
-        })
+        groups
+            .chain(ties)
+            .map(|range| residuals[range.clone()].iter().zip(&self.observation_sd[range]).map(square).sum())
     }
 }

@@ -14,6 +14,7 @@ use super::options::{FIRST_DAMPING, Iteration, Status, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;
 use super::run::{End, Run, State};
+use super::statistics::weighted;
 use super::walk::Buffers;
 use crate::normals::Equations;
 use crate::{Threads, parallel};
@@ -297,7 +298,7 @@ impl ObservationEquations<'_> {
                     for row in 0..layout.rows() {
                         let observation = group * layout.rows() + row;
                         let difference =
-                            ahead[observation] / self.deviation(observation) - rows.constant[row];
+                            weighted(ahead[observation], self.deviation(observation)) - rows.constant[row];
                         let bend = 2.0 / PART * (difference / PART + of_group.change(&rows, row));
                         add_row(&mut own[begin..], rows.local, row, of_group.local.len(), bend);
                         add_row(&mut others[retained..], rows.retained, row, of_group.retained.len(), bend);

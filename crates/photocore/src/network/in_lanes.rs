@@ -157,6 +157,10 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
         for (t, place) in places.enumerate() {
             for (row, own) in [&x, &y].into_iter().enumerate() {
                 let at = 2 * place + row;
+                if sd[row][t].is_infinite() {
+                    rows.exclude(at);
+                    continue;
+                }
                 rows.constant[at] = own.constant[t];
                 put(&mut rows.local[3 * at..][..3], &own.point, t);
                 put(&mut rows.retained[width * at..][..POSE], &own.photo, t);
@@ -258,6 +262,33 @@ mod tests {
         ];
         for (name, parameters) in cameras {
             compare(&Camera::named(name, parameters).unwrap(), &orientation);
+        }
+    }
+
+    #[test]
+    fn excluded_images_may_not_be_finite() {
+        let attitude: Matrix3 = rotation([0.02, -0.03, 1.1]).transpose();
+        let centre = [3.0, -4.0, 150.0];
+        let orientation = Orientation::stepping(ObjectSpace::Rectangular, centre, &attitude);
+        let camera = Camera::named("perspective", &[-152.7]).unwrap();
+        let point = Point::new(ObjectSpace::Rectangular, [1.0, 2.0, 3.0]);
+        let at_centre = Point::new(ObjectSpace::Rectangular, centre);
+        let image = Image { photo: 0, point: 0, xy: [1.0, 2.0], sd: [0.004; 2] };
+        let excluded = [f64::INFINITY; 2];
+        let sights = [(&point, image.sd), (&at_centre, excluded), (&point, [image.sd[0], f64::INFINITY])];
+        let sight = |t: usize| Sight { point: sights[t].0, image: &image, sd: sights[t].1 };
+        let mut parts = [1, 3, POSE, 1].map(|width| vec![f64::NAN; 2 * sights.len() * width]);
+        let [constant, local, retained, shared] = &mut parts;
+        let mut rows = GroupRows { constant, local, retained, shared };
+        assert!(crate::geometry::camera::each_camera!(
+            &camera, camera => write_in_lanes(&orientation, camera, sights.len(), &sight, &mut rows)
+        ));
+        for part in parts {
+            let rows: Vec<&[f64]> = part.chunks_exact(part.len() / 6).collect();
+            assert!(rows[2..4].iter().all(|row| row.iter().all(|&value| value == 0.0)));
+            assert!(rows[5].iter().all(|&value| value == 0.0));
+            assert_eq!(rows[4], rows[0]);
+            assert!(rows[1].iter().all(|value| value.is_finite()) && rows[1] != rows[5]);
         }
     }
 

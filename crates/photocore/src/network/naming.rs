@@ -26,6 +26,7 @@ impl NetworkError {
             }
             AdjustError::Undetermined(combinations) => Self::undetermined(combinations, assembled),
             AdjustError::NotFinite => Self::NotFinite,
+            AdjustError::Layout(error) => Self::Layout(error),
             AdjustError::Stopped(stopped) => Self::Stopped(stopped),
         }
     }

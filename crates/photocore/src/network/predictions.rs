@@ -9,7 +9,7 @@ use super::group_tests::{in_units, sub};
 use super::suspects::{Home, Row, Suspect};
 use super::trial::Trial;
 use crate::Threads;
-use crate::adjustment::{Leverages, Terms, TieCofactors};
+use crate::adjustment::{Leverages, Terms, TieCofactors, weighted};
 use crate::normals::{LocalCofactors, dot};
 
 /// What is out against what the rest predicts of it.
@@ -55,7 +55,7 @@ impl Trial {
     ) -> Result<Vec<Option<Prediction>>, NetworkError> {
         let found = self.found()?;
         let problem = &self.assembled.problem;
-        let around = self.around(suspects, &self.observation_sd, found, threads);
+        let around = self.around(suspects, &self.observation_sd, found, threads)?;
         let terms = self.terms(&self.sd, &found.values);
         let predict = |&index: &usize| {
             let suspect = &self.suspects.all[index];
@@ -90,7 +90,7 @@ impl Trial {
         observation_sd: &[f64],
         found: &Leverages,
         threads: &Threads,
-    ) -> Around {
+    ) -> Result<Around, NetworkError> {
         let problem = &self.assembled.problem;
         let (mut places, mut ties) = (vec![], vec![]);
         for &index in suspects {
@@ -102,12 +102,13 @@ impl Trial {
         }
         places.sort_unstable();
         places.dedup();
+        let named = |error| NetworkError::new(error, &self.assembled);
         let of_points = found.of_locals(problem, observation_sd, &places, |_| vec![], threads);
         let of_ties = found.of_ties(problem, observation_sd, &ties, threads);
-        Around {
-            points: places.into_iter().zip(of_points).collect(),
-            ties: ties.into_iter().zip(of_ties).collect(),
-        }
+        Ok(Around {
+            points: places.into_iter().zip(of_points.map_err(named)?).collect(),
+            ties: ties.into_iter().zip(of_ties.map_err(named)?).collect(),
+        })
     }
 
     fn prediction(
@@ -245,7 +246,7 @@ impl Trial {
             for (k, &(row, _)) in suspect.rows.iter().enumerate() {
                 rows.push(first + k);
                 off.push(match row {
-                    Row::Equation(equation) => found.residuals[equation] / observation_sd[equation],
+                    Row::Equation(equation) => weighted(found.residuals[equation], observation_sd[equation]),
                     Row::Unknown(unknown) => terms.row(unknown).1,
                 });
             }

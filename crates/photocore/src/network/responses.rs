@@ -221,7 +221,7 @@ impl Trial {
     pub fn effects(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<[f64; 9]>, NetworkError> {
         let found = self.found()?;
         let (problem, model) = (&self.assembled.problem, &self.assembled.problem.model);
-        let around = self.around(suspects, &problem.observation_sd, found, threads);
+        let around = self.around(suspects, &problem.observation_sd, found, threads)?;
         let terms = self.terms(&problem.sd, &found.values);
         let mut all = Vec::new();
         for &index in suspects {

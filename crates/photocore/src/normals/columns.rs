@@ -2,15 +2,15 @@
 //!
 //! The solution with an older factor for the right-hand sides that the equations have elsewhere.
 
-use std::ops::ControlFlow;
-
 use super::eliminated::{Elimination, Reduced};
 use super::equations::{Equations, Prior, TieRows};
+use super::error::SystemError;
 use super::factor::Factor;
+use super::layout::LayoutError;
 use super::system::System;
 use super::vectorised::{LANES, dot};
 use super::watch::{Between, Control, watched};
-use crate::{Stopped, Threads, parallel};
+use crate::{Threads, parallel};
 
 /// Right-hand sides of a part, reduced by the unknowns that it eliminates, C at a time: y = L^-1 r.
 #[derive(Debug)]
@@ -61,6 +61,9 @@ impl<const C: usize> ReducedRights<C> {
 
 impl System {
     /// Reduces right-hand sides over all unknowns of a part, one after the other. What its factor comes from is as in [`System::solve`].
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn reduce_rights(
         &self,
         threads: &Threads,
@@ -68,8 +71,10 @@ impl System {
         (equations, prior): (&dyn Equations, &Prior),
         rights: &[f64],
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, ReducedRights> {
-        watched(threads, between, |control| {
+    ) -> Result<ReducedRights, SystemError> {
+        prior.check(&self.layout)?;
+        self.layout.check_columns("rights", rights.len())?;
+        let reduced = watched(threads, between, |control| {
             let elimination = self.elimination(factor, equations, prior, control);
             let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
             let mut others = control.allocated(self.of_others(rights))?;
@@ -80,10 +85,14 @@ impl System {
             let mut reduced = ReducedRights { own, others, products: vec![], counts };
             reduced.products = elimination.products(&reduced, rights.len() / self.layout.unknowns().max(1));
             Some(reduced)
-        })
+        });
+        Ok(reduced?)
     }
 
     /// Solves for all unknowns of a part where right-hand sides were reduced, solutions for the outer ones being given.
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn solve_reduced_rights<const C: usize>(
         &self,
         threads: &Threads,
@@ -92,14 +101,18 @@ impl System {
         mut reduced: ReducedRights<C>,
         outer: &[f64],
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, Vec<f64>> {
-        watched(threads, between, |control| {
+    ) -> Result<Vec<f64>, SystemError> {
+        prior.check(&self.layout)?;
+        let required = reduced.products.len().isqrt() * self.symbolic.outer_unknowns();
+        LayoutError::unless_of_length("outer", outer.len(), required)?;
+        let solved = watched(threads, between, |control| {
             let elimination = self.elimination(factor, equations, prior, control);
             reduced.put(outer);
             let ReducedRights { own, mut others, products, .. } = reduced;
             factor.backward_columns(&mut others);
             elimination.complete(Some(own), &others, products.len().isqrt())
-        })
+        });
+        Ok(solved?)
     }
 }
 
@@ -130,17 +143,20 @@ impl System {
     /// The chord step to equations and priors at other values of the unknowns than those that the factor comes from.
     ///
     /// For a whole system, and a factor that has cached what the elimination of the local blocks has left ([`Factor::has_cached`]).
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn chord(
         &self,
         threads: &Threads,
         factor: &Factor,
         of: (&dyn Equations, &Prior),
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, Chord> {
+    ) -> Result<Chord, SystemError> {
         let rights = self.reduce_chord(threads, factor, of, &of.1.right, &mut *between)?;
         let (reduced, decrease) = (rights.reduced(), rights.products[0]);
         let step = self.solve_reduced_rights(threads, factor, of, rights, &[], between)?;
-        ControlFlow::Continue(Chord { step, reduced, decrease })
+        Ok(Chord { step, reduced, decrease })
     }
 
     /// The right-hand side A^T l of equations and priors at other values than those that the factor comes from, with `rights` over all unknowns,
@@ -148,6 +164,9 @@ impl System {
     /// threads. For a factor that has cached what the elimination of the local blocks has left.
     ///
     /// `rights`: of a whole system those of priors; of a part also what the parts below it have left, and zero for outer unknowns.
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn reduce_chord(
         &self,
         threads: &Threads,
@@ -155,8 +174,10 @@ impl System {
         (equations, prior): (&dyn Equations, &Prior),
         rights: &[f64],
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, ReducedRights<1>> {
-        watched(threads, between, |control| {
+    ) -> Result<ReducedRights<1>, SystemError> {
+        prior.check(&self.layout)?;
+        LayoutError::unless_of_length("rights", rights.len(), self.layout.unknowns())?;
+        let reduced = watched(threads, between, |control| {
             let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
             let mut others = control.allocated(self.of_others(rights))?;
             self.add_rights_of_ties(equations, &mut others);
@@ -170,7 +191,8 @@ impl System {
             let of_locals = own.iter().map(|own| square(own.as_flattened())).sum::<f64>();
             let products = vec![of_locals + square(&others[..counts.0 - counts.1])];
             Some(ReducedRights { own, others, products, counts })
-        })
+        });
+        Ok(reduced?)
     }
 
     /// What the local blocks assembled in a supernode have as right-hand sides, and what they leave to others. Their normal matrices are those of the

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::front::Front;
-use super::layout::Layout;
+use super::layout::{Layout, LayoutError};
 use super::panels::SelectedInverse;
 use super::system::System;
 
@@ -82,9 +82,11 @@ pub(super) fn unpack(order: usize, triangle: &[f64], square: &mut [f64]) {
 }
 
 impl SelectedInverse {
-    /// The inverse over some retained blocks that stand together in its pattern, in their order: a lower triangle, column by column. What is
-    /// not in the pattern is NaN.
-    pub fn triangle(&self, layout: &Layout, blocks: &[u32]) -> Vec<f64> {
+    /// The inverse over some retained blocks that stand together in its pattern, in their order: a lower triangle, column by column.
+    ///
+    /// # Errors
+    /// [`LayoutError::Block`] if two of them are outside the pattern.
+    pub fn triangle(&self, layout: &Layout, blocks: &[u32]) -> Result<Vec<f64>, LayoutError> {
         let starts = blocks.iter().scan(0, |next, &block| {
             let start = *next;
             *next += layout.retained_dim(block as usize);
@@ -92,11 +94,11 @@ impl SelectedInverse {
         });
         let starts: Vec<usize> = starts.collect();
         let order = layout.unknowns_of(blocks).count();
-        let mut triangle = vec![f64::NAN; packed(order)];
+        let mut triangle = vec![0.0; packed(order)];
         for (a, (&block, &left)) in blocks.iter().zip(&starts).enumerate() {
             let width = layout.retained_dim(block as usize);
             for (&other, &top) in blocks[a..].iter().zip(&starts[a..]) {
-                let values = self.block(other as usize, block as usize).unwrap_or_default();
+                let values = self.block(other as usize, block as usize)?;
                 for (i, row) in values.chunks_exact(width.max(1)).enumerate() {
                     for (j, &value) in row.iter().enumerate().filter(|(j, _)| left + j <= top + i) {
                         triangle[column(order, left + j).start + top + i - left - j] = value;
@@ -104,6 +106,6 @@ impl SelectedInverse {
                 }
             }
         }
-        triangle
+        Ok(triangle)
     }
 }

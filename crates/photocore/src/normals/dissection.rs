@@ -15,12 +15,12 @@ const LEAF: usize = 48;
 const CUTS: [f64; 5] = [0.5, 0.44, 0.56, 0.38, 0.62];
 
 /// Orders a graph by nested dissection: cut across the positions of the blocks where they are given, else across the levels of
-/// a breadth-first search.
-pub(super) fn nested_dissection(graph: &Graph, places: Option<&[[f64; 3]]>) -> Vec<usize> {
+/// a breadth-first search. None if a part that is not cut is too large for minimum degree.
+pub(super) fn nested_dissection(graph: &Graph, places: Option<&[[f64; 3]]>) -> Option<Vec<usize>> {
     let (part, place) = (vec![0; graph.len()], vec![NOWHERE; graph.len()]);
     let mut dissection = Dissection { graph, places, part, place, parts: 0, order: vec![] };
-    dissection.dissect((0..graph.len()).collect());
-    dissection.order
+    dissection.dissect((0..graph.len()).collect())?;
+    Some(dissection.order)
 }
 
 struct Dissection<'a> {
@@ -50,19 +50,20 @@ impl Cut {
 
 impl Dissection<'_> {
     /// Appends the blocks of a part in the order of their elimination.
-    fn dissect(&mut self, members: Vec<usize>) {
+    fn dissect(&mut self, members: Vec<usize>) -> Option<()> {
         let cut = if members.len() > LEAF { self.best_cut(&members) } else { None };
         match cut {
             Some(Cut { sides: [one, other], separator }) => {
-                self.dissect(one);
-                self.dissect(other);
+                self.dissect(one)?;
+                self.dissect(other)?;
                 self.order.extend(separator);
             }
             None => {
                 let part = self.graph.subgraph(&members, &mut self.place);
-                self.order.extend(minimum_degree(&part).into_iter().map(|block| members[block]));
+                self.order.extend(minimum_degree(&part)?.into_iter().map(|block| members[block]));
             }
         }
+        Some(())
     }
 
     /// The cheapest cut; none that leaves blocks on both sides when the part hangs together too closely.
@@ -140,16 +141,14 @@ fn principal_axes(members: &[usize], places: &[[f64; 3]]) -> [[f64; 3]; 2] {
     }
 }
 
-/// Orders a graph so that each block in turn leaves few couplings behind; in input order where the graph is too large.
-pub(super) fn minimum_degree(graph: &Graph) -> Vec<usize> {
-    let (pointers, neighbours) = graph.compressed();
+/// Orders a graph so that each block in turn leaves few couplings behind; None if the graph is too large.
+pub(super) fn minimum_degree(graph: &Graph) -> Option<Vec<usize>> {
+    let (pointers, neighbours) = graph.compressed()?;
     let count = graph.len();
     let matrix = SymbolicSparseColMatRef::new_checked(count, count, &pointers, None, neighbours);
     let (mut order, mut place) = (vec![0_u32; count], vec![0_u32; count]);
     let mut memory = MemBuffer::new(amd::order_scratch::<u32>(count, neighbours.len()));
     let control = amd::Control::default();
-    match amd::order(&mut order, &mut place, matrix, control, MemStack::new(&mut memory)) {
-        Ok(_) => order.into_iter().map(|block| block as usize).collect(),
-        Err(_) => (0..count).collect(),
-    }
+    amd::order(&mut order, &mut place, matrix, control, MemStack::new(&mut memory)).ok()?;
+    Some(order.into_iter().map(|block| block as usize).collect())
 }

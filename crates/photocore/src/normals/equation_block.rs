@@ -8,6 +8,7 @@ use faer::{Mat, Side};
 
 use super::equations::{Equations, GroupRows, Prior};
 use super::functions::Function;
+use super::layout::LayoutError;
 use super::panels::SelectedInverse;
 use super::system::System;
 
@@ -56,6 +57,9 @@ impl System {
     /// * `equations`, `prior`: those that the inverse comes from;
     /// * `asked`: the equations whose cofactors are asked for, which may have another weight;
     /// * `further`: coefficients of the unknowns of the local block, one equation after the other.
+    ///
+    /// # Errors
+    /// [`LayoutError::Block`] if the inverse is of another system, [`LayoutError::Length`] if the priors are.
     pub fn local_cofactors(
         &self,
         selected: &SelectedInverse,
@@ -64,7 +68,8 @@ impl System {
         asked: &dyn Equations,
         local: usize,
         terms: &[f64],
-    ) -> LocalCofactors {
+    ) -> Result<LocalCofactors, LayoutError> {
+        prior.check(&self.layout)?;
         let groups = self.layout.groups_of(local);
         if self.layout.stands_apart(local) {
             return self.cofactors_apart(selected, asked, local, groups, terms.len());
@@ -75,12 +80,12 @@ impl System {
         let mut normal = formed.local.transpose() * &formed.local;
         self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
         let Ok(factor) = normal.llt(Side::Lower) else {
-            return LocalCofactors::unknown(dim, rows, &blocks);
+            return Ok(LocalCofactors::unknown(dim, rows, &blocks));
         };
         let coupling = factor.solve(formed.local.transpose() * &formed.others);
         let by_local = factor.solve(a.transpose());
         let c = &b - &a * &coupling;
-        let others = self.inverse_over(selected, &blocks, b.ncols()) * c.transpose();
+        let others = self.inverse_over(selected, &blocks, b.ncols())? * c.transpose();
         let alone = &a * &by_local;
         let found = &c * &others + &alone;
         let own = by_local - coupling * &others;
@@ -88,12 +93,12 @@ impl System {
             let width = self.layout.retained_dim(block);
             (block, (0..rows * width).map(|k| others[(first + k % width, k / width)]).collect())
         };
-        LocalCofactors {
+        Ok(LocalCofactors {
             equations: (0..rows * rows).map(|k| found[(k / rows, k % rows)]).collect(),
             by_local: (0..rows * rows).map(|k| alone[(k / rows, k % rows)]).collect(),
             local: (0..rows * dim).map(|k| own[(k % dim, k / dim)]).collect(),
             others: blocks.iter().map(of_block).collect(),
-        }
+        })
     }
 
     /// The same of a local block that is held, group by group; further equations of its unknowns, so many numbers, take up nothing.
@@ -104,7 +109,7 @@ impl System {
         local: usize,
         groups: Range<usize>,
         terms: usize,
-    ) -> LocalCofactors {
+    ) -> Result<LocalCofactors, LayoutError> {
         let (rows, dim) = (self.layout.rows(), self.layout.local_dim());
         let (of_groups, count) = (groups.len() * rows, groups.len() * rows + terms / dim);
         let known = |k: usize| if k / count < of_groups && k % count < of_groups { f64::NAN } else { 0.0 };
@@ -112,7 +117,7 @@ impl System {
         let mut others: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         for (first, group) in (0..).step_by(rows).zip(groups) {
             let Own { others: b, blocks, .. } = self.own_equations(asked, local, group..group + 1, &[]);
-            let along = self.inverse_over(selected, &blocks, b.ncols()) * b.transpose();
+            let along = self.inverse_over(selected, &blocks, b.ncols())? * b.transpose();
             let found = &b * &along;
             for (i, j) in (0..rows * rows).map(|k| (k / rows, k % rows)) {
                 equations[(first + i) * count + first + j] = found[(i, j)];
@@ -125,7 +130,7 @@ impl System {
             }
         }
         let [by_local, local] = [count * count, count * dim].map(|length| vec![0.0; length]);
-        LocalCofactors { equations, by_local, local, others: others.into_iter().collect() }
+        Ok(LocalCofactors { equations, by_local, local, others: others.into_iter().collect() })
     }
 
     /// The equations of a local block as functions of the unknowns that are not local.
@@ -141,22 +146,22 @@ impl System {
         (0..others.nrows()).map(function).collect()
     }
 
-    /// The inverse over some blocks, each from a row and column on; zero outside the pattern.
+    /// The inverse over some blocks, each from a row and column on.
     fn inverse_over(
         &self,
         selected: &SelectedInverse,
         blocks: &BTreeMap<usize, usize>,
         order: usize,
-    ) -> Mat<f64> {
+    ) -> Result<Mat<f64>, LayoutError> {
         let mut q = Mat::<f64>::zeros(order, order);
         for (&row, &first) in blocks {
             for (&column, &left) in blocks {
-                let values = selected.block(row, column).unwrap_or_default();
+                let values = selected.block(row, column)?;
                 let width = self.layout.retained_dim(column);
                 values.iter().enumerate().for_each(|(k, &v)| q[(first + k / width, left + k % width)] = v);
             }
         }
-        q
+        Ok(q)
     }
 
     /// Some groups of a local block, and further equations of its unknowns.

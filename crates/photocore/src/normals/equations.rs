@@ -1,7 +1,7 @@
 //! Where the equations of a system come from.
 
 use super::contribution::Contribution;
-use super::layout::Layout;
+use super::layout::{Layout, LayoutError};
 
 /// Where the equations of a system come from.
 ///
@@ -83,6 +83,13 @@ pub struct Prior {
 }
 
 impl Prior {
+    /// An error unless both lengths are those of a layout.
+    pub(super) fn check(&self, layout: &Layout) -> Result<(), LayoutError> {
+        let Self { weight, right, .. } = self;
+        LayoutError::unless_of_length("Prior::weight", weight.len(), layout.unknowns())?;
+        LayoutError::unless_of_length("Prior::right", right.len(), layout.unknowns())
+    }
+
     /// The normal equations of the unknowns of one local block themselves: diagonal, with the damping still to come, and
     /// right-hand side.
     #[inline(always)]

@@ -1,7 +1,6 @@
 //! Formation, reduction and Cholesky factorisation of the normal equations in one walk up the elimination tree
 //! (multifrontal method, Duff and Reid 1983; Liu 1992).
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -10,6 +9,7 @@ use faer::MatMut;
 use super::assembly::{Formation, Sums};
 use super::dense::{Pivots, factor_front};
 use super::equations::{Equations, Prior};
+use super::error::SystemError;
 use super::front::Front;
 use super::layout::Layout;
 use super::options::FactorOptions;
@@ -18,8 +18,8 @@ use super::symbolic::Supernode;
 use super::system::System;
 use super::watch::{Between, Control, watched};
 use super::workspace::Eliminated;
+use crate::Threads;
 use crate::parallel::lock;
-use crate::{Stopped, Threads};
 
 /// The Cholesky factor L of the reduced normal equations.
 #[derive(Debug)]
@@ -76,6 +76,9 @@ impl System {
     /// threads: every value is summed by one thread, in an order that depends on the pattern only.
     ///
     /// Whether everything is determined is for the caller to ask: see [`Factor::deficient_locals`] and [`Factor::deficiency`].
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn factor(
         &self,
         threads: &Threads,
@@ -83,19 +86,10 @@ impl System {
         prior: &Prior,
         options: &FactorOptions,
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, Factor> {
-        self.factored(threads, equations, prior, *options, between)
-    }
-
-    fn factored(
-        &self,
-        threads: &Threads,
-        equations: &dyn Equations,
-        prior: &Prior,
-        FactorOptions { damping, cached }: FactorOptions,
-        between: Between<'_>,
-    ) -> ControlFlow<Stopped, Factor> {
-        watched(threads, between, |control| {
+    ) -> Result<Factor, SystemError> {
+        prior.check(&self.layout)?;
+        let FactorOptions { damping, cached } = *options;
+        let factored = watched(threads, between, |control| {
             let caches = cached && self.caches;
             let formation = Formation { system: self, equations, prior, damping, caches, control };
             let mut given_up = Vec::new();
@@ -113,7 +107,8 @@ impl System {
                 given_up.extend(lost);
                 factor.recycle(self);
             }
-        })
+        });
+        Ok(factored?)
     }
 }
 

@@ -8,11 +8,11 @@
 //! Half of a solution does for all of them, and what it gives is symmetric and positive by construction.
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 
 use super::batch::Batch;
 use super::eliminated::{Coupled, EliminatedBatch, Reduced as OfLocal};
 use super::equations::{Equations, Prior};
+use super::error::SystemError;
 use super::factor::Factor;
 use super::layout::Layout;
 use super::products::Products;
@@ -55,6 +55,9 @@ impl System {
     ///
     /// `columns` is None where the cofactors of every two of `rows` are asked for. `equations` and `prior` must be those that the factor
     /// comes from; what is held must not be taken.
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn reduce(
         &self,
         threads: &Threads,
@@ -63,13 +66,15 @@ impl System {
         rows: &[Function],
         columns: Option<&[Function]>,
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, Functions> {
-        watched(threads, between, |control| {
+    ) -> Result<Functions, SystemError> {
+        prior.check(&self.layout)?;
+        let reduced = watched(threads, between, |control| {
             let places = self.symbolic.places(&self.layout);
             let work = Reduction { system: self, equations, prior, places: &places, control };
             let rows = work.reduced(rows);
             Some(Functions { rows, columns: columns.map(|columns| work.reduced(columns)) })
-        })
+        });
+        Ok(reduced?)
     }
 
     /// Bytes that their cofactors take at the most, the matrix counted.
@@ -84,13 +89,16 @@ impl System {
     }
 
     /// The cofactors f^T N^-1 g of functions: a matrix row by row; the same bits for any number of threads.
+    ///
+    /// # Errors
+    /// An interruption, no memory.
     pub fn cofactors_of(
         &self,
         threads: &Threads,
         factor: &Factor,
         functions: &Functions,
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, Vec<f64>> {
+    ) -> Result<Vec<f64>, Stopped> {
         watched(threads, between, |control| {
             let rows = &functions.rows;
             let columns = functions.columns.as_ref().unwrap_or(rows);

@@ -1,4 +1,4 @@
-//! Which retained blocks share a local block, a tie or what a system below leaves.
+//! Which retained blocks share a local block, a tie or what a system below leaves, or are a pair that is asked for.
 
 use super::layout::Layout;
 use crate::parallel;
@@ -9,7 +9,7 @@ pub(super) const MANY: usize = 500;
 /// The place of a block that is not in a list.
 pub(crate) const NOWHERE: u32 = u32::MAX;
 
-/// Which retained blocks share a local block, a tie or what a system below leaves: an undirected graph in compressed form, neighbours ascending.
+/// Which retained blocks share a local block, a tie or what a system below leaves, or are a pair that is asked for: an undirected graph in compressed form, neighbours ascending.
 #[derive(Debug, Clone)]
 pub struct Graph {
     ptr: Vec<usize>,
@@ -20,8 +20,10 @@ impl Graph {
     /// Joins every two retained blocks that share one.
     pub fn new(layout: &Layout) -> Self {
         let retained = layout.retained();
-        let ties = layout.ties().iter().map(|tie| &tie.retained);
-        let ties: Vec<&Vec<u32>> = ties.chain(layout.contributions()).collect();
+        let ties = layout.ties().iter().map(|tie| &tie.retained[..]);
+        let contributions = layout.contributions().iter().map(|blocks| &blocks[..]);
+        let pairs = layout.pairs().iter().map(|pair| &pair[..]);
+        let ties: Vec<&[u32]> = ties.chain(contributions).chain(pairs).collect();
         let mut ties_of = vec![Vec::new(); retained];
         for (index, tie) in ties.iter().enumerate() {
             tie.iter().for_each(|&block| ties_of[block as usize].push(index));
@@ -139,9 +141,10 @@ impl Graph {
         line
     }
 
-    /// Where the neighbours of each block start, and the neighbours.
-    pub(crate) fn compressed(&self) -> (Vec<u32>, &[u32]) {
-        (self.ptr.iter().map(|&start| start as u32).collect(), &self.neighbours)
+    /// Where the neighbours of each block start, and the neighbours; None if there are more than 32 bits number.
+    pub(crate) fn compressed(&self) -> Option<(Vec<u32>, &[u32])> {
+        let starts: Result<Vec<u32>, _> = self.ptr.iter().map(|&start| u32::try_from(start)).collect();
+        Some((starts.ok()?, &self.neighbours))
     }
 }
 

@@ -3,7 +3,6 @@
 //!
 //! The front of outer unknowns, which stays unfactored (see [`Contribution`]).
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -13,15 +12,17 @@ use super::cofactors::{AtNode, Cofactors, GroupCofactors};
 use super::contribution::{Contribution, packed, unpack};
 use super::dense::invert_front;
 use super::equations::{Equations, Prior};
+use super::error::SystemError;
 use super::factor::Factor;
+use super::layout::LayoutError;
 use super::options::InvertOptions;
 use super::panels::SelectedInverse;
 use super::panels::{Handover, Panels};
 use super::symbolic::Symbolic;
 use super::system::System;
 use super::watch::{Between, Control, watched};
+use crate::Threads;
 use crate::parallel::lock;
-use crate::{Stopped, Threads};
 
 /// Cofactors with the selected inverse that they come from.
 #[derive(Debug)]
@@ -38,6 +39,9 @@ impl System {
     /// Computes all cofactors.
     ///
     /// `equations` and `prior` must be those that the factor comes from, and its damping zero.
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn invert(
         &self,
         threads: &Threads,
@@ -46,14 +50,17 @@ impl System {
         prior: &Prior,
         options: &InvertOptions<'_>,
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, Inversion> {
+    ) -> Result<Inversion, SystemError> {
+        prior.check(&self.layout)?;
+        let outer = packed(self.symbolic.outer_unknowns());
+        LayoutError::unless_of_length("InvertOptions::outer", options.outer.len(), outer)?;
         factor.forget();
         let Factor { mut panels, diagonal, .. } = factor;
         watched(threads, between, |control| {
             let information = self.information(&diagonal);
             panels.reopen();
             Walk { system: self, equations, prior, options, control }.invert(panels, information)
-        })
+        })?
     }
 
     /// The diagonal of the normal equations of the unknowns of retained blocks before any elimination, which is given in that order, in the order
@@ -82,7 +89,7 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     /// None without memory.
-    fn invert(&self, mut panels: Panels, information: Vec<f64>) -> Option<Inversion> {
+    fn invert(&self, mut panels: Panels, information: Vec<f64>) -> Option<Result<Inversion, SystemError>> {
         let symbolic = &*self.system.symbolic;
         let count = symbolic.supernode_count();
         // The front of its parent for each supernode still to be done; a front lives until the last child has taken it.
@@ -106,12 +113,29 @@ impl Walk<'_> {
         }
         found.push(self.at_node(count, &[], 0));
         let selected = SelectedInverse { panels };
-        let mut cofactors = Cofactors::collect(self.system, self.control, &selected, &found, information)?;
+        let of_blocks = match self.blocks(&selected) {
+            Ok([retained, pairs]) => [retained, pairs, information],
+            Err(error) => return Some(Err(error.into())),
+        };
+        let mut cofactors = Cofactors::collect(self.system, self.control, &found, of_blocks)?;
         if self.options.by_groups {
             cofactors.groups = Some(GroupCofactors::collect(self.system, self.control, &found)?);
         }
         let inversion_share = if inversion > 0.0 { inversion / (inversion + rest) } else { 0.0 };
-        Some(Inversion { cofactors, selected, inversion_share })
+        Some(Ok(Inversion { cofactors, selected, inversion_share }))
+    }
+
+    /// The blocks of the inverse of each retained block, one after the other, and of each pair of the layout.
+    fn blocks(&self, selected: &SelectedInverse) -> Result<[Vec<f64>; 2], LayoutError> {
+        let layout = &self.system.layout;
+        let (mut retained, mut pairs) = (vec![], vec![]);
+        for block in 0..layout.retained() {
+            retained.extend(selected.block(block, block)?);
+        }
+        for &[row, column] in layout.pairs() {
+            pairs.extend(selected.block(row as usize, column as usize)?);
+        }
+        Ok([retained, pairs])
     }
 
     /// Inverts one panel, given the front of its parent, and hands its own front to its children. Returns the cofactors of the local

@@ -39,8 +39,8 @@
 //! let threads = Threads::new(1)?;
 //! let mut go_on = |_| ControlFlow::Continue(());
 //! let (factoring, solving) = (FactorOptions::default(), SolveOptions::default());
-//! let factor = system.factor(&threads, &Differences, &prior, &factoring, &mut go_on).continue_value().expect("not stopped");
-//! let x = system.solve(&threads, &factor, &Differences, &prior, &solving, &mut go_on).continue_value().expect("not stopped");
+//! let factor = system.factor(&threads, &Differences, &prior, &factoring, &mut go_on)?;
+//! let x = system.solve(&threads, &factor, &Differences, &prior, &solving, &mut go_on)?;
 //! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -56,6 +56,7 @@ mod dissection;
 mod eliminated;
 mod equation_block;
 mod equations;
+mod error;
 mod factor;
 mod front;
 mod functions;
@@ -86,6 +87,7 @@ pub use deficiency::Deficiency;
 pub use dense::take_product_buffers;
 pub use equation_block::LocalCofactors;
 pub use equations::{Equations, GroupRows, Prior, TieRows};
+pub use error::SystemError;
 pub use factor::Factor;
 pub use functions::{Function, Functions};
 pub use graph::Graph;

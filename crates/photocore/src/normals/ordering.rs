@@ -65,8 +65,8 @@ impl Ordering {
     ///
     /// What nearly all others are joined to (the camera of a whole block) goes last, and is taken out of the graph before: a search
     /// through it reaches everything in two steps, and there is no shape left to follow.
-    /// Outer blocks come after all others, in their own order.
-    pub(crate) fn order(self, graph: &Graph, layout: &Layout) -> Vec<usize> {
+    /// Outer blocks come after all others, in their own order. None if the graph is too large for the ordering.
+    pub(crate) fn order(self, graph: &Graph, layout: &Layout) -> Option<Vec<usize>> {
         let mut last = if self == Ordering::Input { Vec::new() } else { dense_blocks(graph, layout) };
         last.retain(|&block| !layout.outer().contains(&(block as u32)));
         last.extend(layout.outer().iter().map(|&block| block as usize));
@@ -79,14 +79,14 @@ impl Ordering {
         let places: Option<Vec<[f64; 3]>> =
             layout.places().map(|places| others.iter().map(|&block| places[block]).collect());
         let order =
-            self.order_all(&graph.subgraph(&others, &mut vec![NOWHERE; graph.len()]), places.as_deref());
-        order.into_iter().map(|block| others[block]).chain(last).collect()
+            self.order_all(&graph.subgraph(&others, &mut vec![NOWHERE; graph.len()]), places.as_deref())?;
+        Some(order.into_iter().map(|block| others[block]).chain(last).collect())
     }
 
-    fn order_all(self, graph: &Graph, places: Option<&[[f64; 3]]>) -> Vec<usize> {
+    fn order_all(self, graph: &Graph, places: Option<&[[f64; 3]]>) -> Option<Vec<usize>> {
         match self {
-            Ordering::Auto | Ordering::Input => (0..graph.len()).collect(),
-            Ordering::ReverseCuthillMckee => graph.breadth_first_line().into_iter().rev().collect(),
+            Ordering::Auto | Ordering::Input => Some((0..graph.len()).collect()),
+            Ordering::ReverseCuthillMckee => Some(graph.breadth_first_line().into_iter().rev().collect()),
             Ordering::MinimumDegree => minimum_degree(graph),
             Ordering::DissectionByPlace => nested_dissection(graph, places),
             Ordering::DissectionByGraph => nested_dissection(graph, None),

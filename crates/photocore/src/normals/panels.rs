@@ -4,6 +4,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::layout::LayoutError;
 use super::symbolic::Symbolic;
 use crate::parallel::lock;
 
@@ -66,20 +67,23 @@ impl<T> Handover<T> {
 }
 
 /// The blocks of N^-1 inside the pattern of the factor: every retained block's own, and those of every two retained blocks that
-/// share a local block.
+/// share a local block, a tie or what a system below leaves, or are a pair of the layout.
 #[derive(Debug)]
 pub struct SelectedInverse {
     pub(super) panels: Panels,
 }
 
 impl SelectedInverse {
-    /// Block (row, column) of the inverse, row by row; None outside the pattern. Kept blocks are counted as in the layout.
-    pub fn block(&self, row: usize, column: usize) -> Option<Vec<f64>> {
+    /// Block (row, column) of the inverse, row by row. Retained blocks are counted as in the layout.
+    ///
+    /// # Errors
+    /// [`LayoutError::Block`] if it is outside the pattern.
+    pub fn block(&self, row: usize, column: usize) -> Result<Vec<f64>, LayoutError> {
         let symbolic = &*self.panels.symbolic;
         let (p, q) = (symbolic.position(row), symbolic.position(column));
         let (first, last) = (p.min(q), p.max(q));
         let supernode = symbolic.supernode_of(first);
-        let at = symbolic.panel_row(supernode, last)?;
+        let at = symbolic.panel_row(supernode, last).ok_or(LayoutError::Block { row, column })?;
         let height = symbolic.supernodes()[supernode].height();
         let left = symbolic.range(first).start - symbolic.first_unknown(supernode);
         let panel = self.panels.panel(supernode);
@@ -93,6 +97,6 @@ impl SelectedInverse {
             }
         };
         let columns = symbolic.dim(q);
-        Some((0..symbolic.dim(p) * columns).map(|k| value(k / columns, k % columns)).collect())
+        Ok((0..symbolic.dim(p) * columns).map(|k| value(k / columns, k % columns)).collect())
     }
 }

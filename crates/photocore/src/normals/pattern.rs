@@ -4,7 +4,7 @@ use super::layout::LayoutError;
 use super::system::System;
 
 impl System {
-    /// Refuses a pattern that lacks a block which equations, a system below or a child of the elimination tree bring to a front.
+    /// Refuses a pattern that lacks a block which equations, a system below or a child of the elimination tree bring to a front, or a pair.
     pub(super) fn check_pattern(&self) -> Result<(), LayoutError> {
         let (layout, symbolic, incidence) = (&self.layout, &*self.symbolic, &self.incidence);
         let mut in_front = vec![usize::MAX; symbolic.blocks()];
@@ -28,7 +28,12 @@ impl System {
                 return Err(LayoutError::Pattern { front });
             }
         }
-        Ok(())
+        let has_pair = |&[one, other]: &[u32; 2]| {
+            let [p, q] = [one, other].map(|block| symbolic.position(block as usize));
+            let front = symbolic.supernode_of(p.min(q));
+            symbolic.panel_row(front, p.max(q)).map(drop).ok_or(LayoutError::Pattern { front })
+        };
+        layout.pairs().iter().try_for_each(has_pair)
     }
 }
 
@@ -50,11 +55,12 @@ mod tests {
             apart().with_shared(vec![0, 0, 0, 1], vec![3]).unwrap(),
             apart().with_ties(vec![tie]).unwrap(),
             apart().as_part(vec![], vec![vec![1, 2]]).unwrap(),
+            apart().with_pairs(vec![[0, 3]]).unwrap(),
         ];
         for layout in together {
-            let its_own = Symbolic::new(&layout, Ordering::Input);
+            let its_own = Symbolic::new(&layout, Ordering::Input).unwrap();
             assert!(System::with_pattern(layout.clone(), its_own).is_ok());
-            let found = System::with_pattern(layout, Symbolic::new(&apart(), Ordering::Input));
+            let found = System::with_pattern(layout, Symbolic::new(&apart(), Ordering::Input).unwrap());
             assert!(matches!(found, Err(LayoutError::Pattern { .. })));
         }
     }

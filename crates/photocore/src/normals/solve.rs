@@ -2,8 +2,6 @@
 //!
 //! Forward and back substitution with the factor L of the reduced normal equations.
 
-use std::ops::ControlFlow;
-
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, MatMut, MatRef, Par};
@@ -11,15 +9,16 @@ use pulp::Simd;
 
 use super::eliminated::Elimination;
 use super::equations::{Equations, Prior};
+use super::error::SystemError;
 use super::factor::Factor;
-use super::layout::Layout;
+use super::layout::{Layout, LayoutError};
 use super::options::SolveOptions;
 use super::panels::Panels;
 use super::system::System;
 use super::vectorised::{Kernel, LANES, dot_in_lanes, run_unsized};
 use super::watch::{Between, Control, watched};
 use super::workspace::{reserved, zeros};
-use crate::{Stopped, Threads, parallel};
+use crate::{Threads, parallel};
 
 /// Right-hand sides that go through the factor together.
 const TOGETHER: usize = 16;
@@ -30,6 +29,9 @@ impl System {
     ///
     /// `equations` and `prior` must be those that the factor comes from. The equations are written again where the factor has not cached
     /// what the elimination of the local blocks has left; those of local blocks whose right-hand sides are all zero once only.
+    ///
+    /// # Errors
+    /// An interruption, no memory, lengths that contradict the layout.
     pub fn solve(
         &self,
         threads: &Threads,
@@ -38,8 +40,16 @@ impl System {
         prior: &Prior,
         options: &SolveOptions<'_>,
         between: Between<'_>,
-    ) -> ControlFlow<Stopped, Vec<f64>> {
-        watched(threads, between, |control| {
+    ) -> Result<Vec<f64>, SystemError> {
+        prior.check(&self.layout)?;
+        match options.rights {
+            Some(rights) => self.layout.check_columns("SolveOptions::rights", rights.len())?,
+            None => {
+                let outer = self.symbolic.outer_unknowns();
+                LayoutError::unless_of_length("SolveOptions::outer", options.outer.len(), outer)?;
+            }
+        }
+        let solved = watched(threads, between, |control| {
             let elimination = self.elimination(factor, equations, prior, control);
             match options.rights {
                 None => {
@@ -54,7 +64,8 @@ impl System {
                 }
                 Some(rights) => elimination.solve_for::<LANES>(factor, rights),
             }
-        })
+        });
+        Ok(solved?)
     }
 
     /// The elimination of the local blocks that a factor comes from.

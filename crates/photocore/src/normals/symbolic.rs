@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::graph::{Graph, MANY};
-use super::layout::Layout;
+use super::layout::{Layout, LayoutError};
 use super::ordering::Ordering;
 use super::supernodes::{Merged, merge_columns, offsets, places, sort_commons};
 use crate::parallel;
@@ -19,7 +19,7 @@ const AS_GOOD: f64 = 1.05;
 #[derive(Debug, Clone)]
 pub struct Symbolic {
     ordering: Ordering,
-    predictions: Vec<(Ordering, f64)>,
+    predictions: Vec<(Ordering, Option<f64>)>,
     position_of: Vec<usize>,
     block_at: Vec<usize>,
     offset: Vec<usize>,
@@ -79,30 +79,27 @@ pub struct Operations {
 
 impl Symbolic {
     /// Orders the retained blocks of a layout and finds the pattern of the factor.
-    pub fn new(layout: &Layout, ordering: Ordering) -> Self {
+    ///
+    /// # Errors
+    /// [`LayoutError::Ordering`] if the layout is too large for the ordering. [`Ordering::Auto`] passes over the orderings that it is too
+    /// large for (see [`Symbolic::predictions`]).
+    pub fn new(layout: &Layout, ordering: Ordering) -> Result<Self, LayoutError> {
         let graph = Graph::new(layout);
         let try_out = |&candidate: &Ordering| {
             let order = candidate.order(&graph, layout);
-            (candidate, predicted_operations(layout, &graph, &order), order)
+            (candidate, order.map(|order| (predicted_operations(layout, &graph, &order), order)))
         };
         let orderings = ordering.candidates();
-        let candidates: Vec<(Ordering, f64, Vec<usize>)> = if graph.len() < MANY {
+        let candidates: Vec<Candidate> = if graph.len() < MANY {
             orderings.iter().map(try_out).collect()
         } else {
             parallel::map_each(orderings.iter().collect(), &try_out)
         };
-        let predictions =
-            candidates.iter().map(|&(candidate, operations, _)| (candidate, operations)).collect();
-        let least = candidates.iter().map(|&(_, operations, _)| operations).fold(f64::INFINITY, f64::min);
+        let predictions = predictions_of(&candidates);
         // In the order of the input, which comes first, photos stand before what they share: equations go into small fronts, side by side.
-        let enough = if layout.has_shared() { AS_GOOD * least } else { least };
-        let is_as_good = |(candidate, operations, _): &(Ordering, f64, _)| {
-            *operations <= if *candidate == Ordering::Input { enough } else { least }
-        };
-        let best = candidates.into_iter().find(is_as_good);
-        let (ordering, order) =
-            best.map_or((Ordering::Input, Vec::new()), |(candidate, _, order)| (candidate, order));
-        Self { predictions, ..Self::with_order(layout, &graph, ordering, &order) }
+        let enough = if layout.has_shared() { AS_GOOD } else { 1.0 };
+        let (ordering, order) = cheapest(candidates, enough).ok_or(LayoutError::Ordering(ordering.name()))?;
+        Ok(Self { predictions, ..Self::with_order(layout, &graph, ordering, &order) })
     }
 
     fn with_order(layout: &Layout, graph: &Graph, ordering: Ordering, order: &[usize]) -> Self {
@@ -166,8 +163,8 @@ impl Symbolic {
         self.ordering
     }
 
-    /// The orderings that were candidates, each with the predicted multiply-adds of a factorisation.
-    pub fn predictions(&self) -> &[(Ordering, f64)] {
+    /// The orderings that were candidates, each with the predicted multiply-adds of a factorisation; None if the layout is too large for it.
+    pub fn predictions(&self) -> &[(Ordering, Option<f64>)] {
         &self.predictions
     }
 
@@ -300,6 +297,28 @@ impl Symbolic {
     }
 }
 
+/// An ordering with its predicted multiply-adds and the order; None if the graph is too large for it.
+type Candidate = (Ordering, Option<(f64, Vec<usize>)>);
+
+fn predictions_of(candidates: &[Candidate]) -> Vec<(Ordering, Option<f64>)> {
+    candidates.iter().map(|(ordering, order)| (*ordering, order.as_ref().map(|(count, _)| *count))).collect()
+}
+
+/// The candidate of the fewest operations, or the order of the input if it takes no more than `enough` times as many; None if all have failed.
+fn cheapest(candidates: Vec<Candidate>, enough: f64) -> Option<(Ordering, Vec<usize>)> {
+    let mut orders: Vec<(Ordering, f64, Vec<usize>)> = candidates
+        .into_iter()
+        .filter_map(|(ordering, order)| order.map(|(operations, order)| (ordering, operations, order)))
+        .collect();
+    let least = orders.iter().map(|&(_, operations, _)| operations).fold(f64::INFINITY, f64::min);
+    let is_as_good = |(ordering, operations, _): &(Ordering, f64, _)| {
+        *operations <= if *ordering == Ordering::Input { enough * least } else { least }
+    };
+    let best = orders.iter().position(is_as_good)?;
+    let (ordering, _, order) = orders.swap_remove(best);
+    Some((ordering, order))
+}
+
 /// The elimination tree of a graph in a given order (Liu 1990, algorithm 4.2): parent of each place in the order.
 fn elimination_tree(graph: &Graph, order: &[usize], place: &[usize]) -> Vec<Option<usize>> {
     let mut parent = vec![None; order.len()];
@@ -405,4 +424,28 @@ fn column_patterns(graph: &Graph, block_at: &[usize], position_of: &[usize]) -> 
         columns.push(pattern);
     }
     columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orderings_that_fail_are_reported_and_not_taken() {
+        let order = |operations: f64, first: usize| Some((operations, vec![first, 1 - first]));
+        let candidates = vec![
+            (Ordering::Input, order(30.0, 0)),
+            (Ordering::MinimumDegree, None),
+            (Ordering::DissectionByGraph, order(20.0, 1)),
+        ];
+        let expected = [
+            (Ordering::Input, Some(30.0)),
+            (Ordering::MinimumDegree, None),
+            (Ordering::DissectionByGraph, Some(20.0)),
+        ];
+        assert_eq!(predictions_of(&candidates), expected);
+        assert_eq!(cheapest(candidates.clone(), 1.0), Some((Ordering::DissectionByGraph, vec![1, 0])));
+        assert_eq!(cheapest(candidates, 1.5), Some((Ordering::Input, vec![0, 1])));
+        assert_eq!(cheapest(vec![(Ordering::MinimumDegree, None)], 1.0), None);
+    }
 }

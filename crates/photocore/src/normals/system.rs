@@ -36,9 +36,9 @@ impl System {
     /// Orders a layout.
     ///
     /// # Errors
-    /// [`LayoutError::Pattern`], where the order contradicts the layout.
+    /// [`LayoutError::Pattern`] if the order contradicts the layout, [`LayoutError::Ordering`] if the layout is too large for the ordering.
     pub fn new(layout: Layout, ordering: Ordering) -> Result<Self, LayoutError> {
-        let symbolic = Symbolic::new(&layout, ordering);
+        let symbolic = Symbolic::new(&layout, ordering)?;
         Self::with_pattern(layout, symbolic)
     }
 

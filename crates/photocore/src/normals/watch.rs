@@ -39,11 +39,11 @@ impl Control {
     }
 
     /// What the work ended with, or why it did not.
-    fn ended<T>(&self, result: Option<T>) -> ControlFlow<Stopped, T> {
+    fn ended<T>(&self, result: Option<T>) -> Result<T, Stopped> {
         match (self.failed.load(Relaxed), result) {
-            (0, Some(result)) => ControlFlow::Continue(result),
-            (0, None) => ControlFlow::Break(Stopped::Interrupted),
-            (bytes, _) => ControlFlow::Break(Stopped::OutOfMemory(bytes)),
+            (0, Some(result)) => Ok(result),
+            (0, None) => Err(Stopped::Interrupted),
+            (bytes, _) => Err(Stopped::OutOfMemory(bytes)),
         }
     }
 
@@ -58,9 +58,9 @@ pub(super) fn watched<T: Send>(
     threads: &Threads,
     between: Between<'_>,
     work: impl FnOnce(&Control) -> Option<T> + Send,
-) -> ControlFlow<Stopped, T> {
+) -> Result<T, Stopped> {
     if between(0).is_break() {
-        return ControlFlow::Break(Stopped::Interrupted);
+        return Err(Stopped::Interrupted);
     }
     let control = Control::default();
     if threads.pool().current_thread_index().is_some() {
@@ -70,7 +70,7 @@ pub(super) fn watched<T: Send>(
     let (mut work, mut result) = (Some(work), None);
     let mut work = || result = work.take().and_then(|work| work(&control));
     if watch(threads, between, &control, &mut work).is_break() {
-        return ControlFlow::Break(Stopped::Interrupted);
+        return Err(Stopped::Interrupted);
     }
     // The work leaves its result unless it panics, and then the scope has passed the panic on.
     control.ended(result)

@@ -11,6 +11,8 @@ use crate::geometry::Vector3;
 /// ```
 ///
 /// Image coordinates are pixels counted from the principal point, x to the right and y up.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bal {
     /// f in pixels.

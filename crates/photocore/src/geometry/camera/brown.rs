@@ -17,6 +17,8 @@ use super::radial_tangential::{Bent, RadialTangential, Terms, power_of};
 ///
 /// x to the right, y up. r0 is zero unless the radial terms are balanced, and never an unknown. With AFTER, X = x - xp, and b1 X + b2 Y
 /// is added to gx (Fraser 1997): affinity beside the terms of the lens.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrownCorrection<const AFTER: bool> {
     /// c, negative for the positive plane.

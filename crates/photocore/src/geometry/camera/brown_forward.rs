@@ -18,6 +18,8 @@ use crate::geometry::Vector3;
 /// ```
 ///
 /// x to the right, y up. r0 is never an unknown.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrownForward {
     /// c, negative for the positive plane.

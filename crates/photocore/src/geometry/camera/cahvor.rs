@@ -12,6 +12,8 @@ use crate::geometry::{Matrix3, Vector3};
 /// ```
 ///
 /// with v = (u1, -u2, -u3). What is along o stays, what is across becomes 1 + mu times as long; t is the square of its tangent.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cahvor {
     /// fx, fy, cx, cy, a, b, r0, r1, r2.

@@ -13,6 +13,8 @@ use crate::geometry::Vector3;
 /// ```
 ///
 /// The first column follows the last: residuals of columns are at most w/2.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equirectangular {
     /// w, h in pixels.

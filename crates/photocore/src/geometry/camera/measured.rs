@@ -13,6 +13,8 @@ use crate::geometry::Vector3;
 /// To first order this is D^-1 (g(measured) - c (u1, u2) / u3) with D = dg/d(measured), and its weight that of the residual in the
 /// corrected image with the covariance D S D^T. Least squares of what is left, the image being found by Newton's method, has no bias: with
 /// D S D^T as weights that move with the parameters it would.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured<C>(pub C);
 

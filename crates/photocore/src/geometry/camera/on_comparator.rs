@@ -21,6 +21,8 @@ const COUNT: usize = 33;
 ///
 /// x0, y0, the reading from which corrections count, and hx, hy, half the calibrated range, are never unknowns; xp, yp is the principal
 /// point from there, corrected.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnComparator {
     /// c, negative for the positive plane.

@@ -12,6 +12,8 @@ use crate::geometry::{Matrix3, Vector3};
 /// ```
 ///
 /// with A, B of [`OpencvPinhole`], `Rx = [1 0 0; 0 c s; 0 -s c]` and `Ry = [c 0 -s; 0 1 0; s 0 c]`.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpencvTilted {
     /// fx, fy, cx, cy and the terms of the lens.

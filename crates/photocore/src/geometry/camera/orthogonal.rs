@@ -42,6 +42,8 @@ pub trait OrthogonalSet<const N: usize>: Copy {
 ///
 /// With X = x - xp, Y = y - yp, x to the right and y up, and b half the side of the used format, which is never an unknown. What shifts,
 /// rotations, scale and tilts of a vertical photo do is not among them.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Orthogonal<S, const N: usize> {
     /// c, negative for the positive plane; xp, yp; the corrections; b.

@@ -5,6 +5,8 @@ use crate::geometry::Vector3;
 
 /// x = c u1/u3, y = c u2/u3, measured from the principal point. With either sign of c the camera looks along its -z axis (GIANT
 /// guide, sections 4 and 5 of its specification).
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Perspective {
     /// c, the signed principal distance in the unit of the image: negative for the positive plane.

@@ -18,6 +18,8 @@ use crate::geometry::{Displacement, Vector3};
 ///
 /// x, y and the axis towards what is seen are right-handed. `c_y` is that of x where it is zero. c0, the principal distance of the form
 /// with distortion before scale, is never an unknown.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plate {
     /// Its lens, with decentering in polar form.

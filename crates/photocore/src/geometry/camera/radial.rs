@@ -13,6 +13,8 @@ use crate::geometry::Vector3;
 ///
 /// Image coordinates are pixels from the upper-left corner, column and row. It is the lens of [`Bal`] with y
 /// turned down. SIMPLE_RADIAL is this camera with k2 held at zero.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Radial {
     /// f, k1, k2.

@@ -25,6 +25,8 @@ const LAST: f64 = 1e-8;
 ///
 /// Image coordinates are pixels, column and row. order, nx, ny and fov, in degrees, are never unknowns. The knots, beside the parameters,
 /// are row by row, columns fastest; zero unless given by [`CameraModel::with_knots`]. Beyond them the polynomials at the edge go on.
+///
+/// [`Camera`](super::Camera) lists the parameters in their order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SplinedStereographic {
     /// fx, fy, cx, cy, order, nx, ny, fov.

@@ -8,7 +8,6 @@ use self::others::Others;
 use super::assembly::TieEquations;
 use super::equations::{Equations, Prior};
 use super::incidence::Batches;
-use super::panels::SelectedInverse;
 use super::system::System;
 use super::vectorised::dot;
 use super::watch::Control;
@@ -29,7 +28,7 @@ pub struct Cofactors {
     pub equations: Vec<f64>,
     /// a Q a^T of the equations a of each tie, a square block row by row, one after the other.
     pub ties: Vec<f64>,
-    /// Of the pairs of retained blocks that were asked for, one after the other; NaN where no equations touch both.
+    /// Of the pairs of retained blocks that were asked for, one after the other.
     pub pairs: Vec<f64>,
     /// What the equations of each group have to do with each other, where that was asked for.
     pub groups: Option<GroupCofactors>,
@@ -50,14 +49,13 @@ pub struct GroupCofactors {
 }
 
 impl Cofactors {
-    /// Puts together what was found at each supernode, and last for the local blocks without equations, with the information; None
-    /// without memory.
+    /// Puts together what was found at each supernode, and last for the local blocks without equations, with `retained` and `pairs` of
+    /// the inverse and the information; None without memory.
     pub(super) fn collect(
         system: &System,
         control: &Control,
-        inverse: &SelectedInverse,
         found: &[AtNode],
-        information: Vec<f64>,
+        [retained, pairs, information]: [Vec<f64>; 3],
     ) -> Option<Self> {
         let layout = &system.layout;
         let (rows, l) = (layout.rows(), layout.local_dim());
@@ -91,14 +89,6 @@ impl Cofactors {
                 values = rest;
             }
         }
-        let retained =
-            (0..layout.retained()).filter_map(|block| inverse.block(block, block)).flatten().collect();
-        let pair = |pair: &[u32; 2]| {
-            let [row, column] = pair.map(|block| block as usize);
-            let size = layout.retained_dim(row) * layout.retained_dim(column);
-            inverse.block(row, column).unwrap_or_else(|| vec![f64::NAN; size])
-        };
-        let pairs = layout.pairs().iter().flat_map(pair).collect();
         Some(Self { local, retained, equations, ties, pairs, groups: None, information })
     }
 }

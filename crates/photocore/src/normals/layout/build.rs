@@ -136,8 +136,7 @@ impl Layout {
         self
     }
 
-    /// Asks for the cofactors of pairs of retained blocks, the first of which have the rows; those are found that some equations touch
-    /// together.
+    /// Asks for the cofactors of pairs of retained blocks, the first of which have the rows. The pattern of the factor includes all pairs.
     pub fn with_pairs(mut self, mut pairs: Vec<[u32; 2]>) -> Result<Self, LayoutError> {
         pairs.sort_unstable();
         pairs.dedup();

@@ -104,6 +104,39 @@ pub enum LayoutError {
     /// A pair names a retained block that does not exist.
     #[error("a pair of retained blocks names one that does not exist: {0:?}")]
     Pair([usize; 2]),
+    /// A block of the inverse that was asked for is outside the pattern of the factor.
+    #[error(
+        "block ({row}, {column}) of the inverse is outside the pattern of the factor: ask for it by Layout::with_pairs"
+    )]
+    Block {
+        /// The retained block of its rows.
+        row: usize,
+        /// The retained block of its columns.
+        column: usize,
+    },
+    /// A slice is longer or shorter than the layout requires.
+    #[error("{field} has {length} elements, and the layout requires {required}")]
+    Length {
+        /// The type and the field, such as `Problem::sd`.
+        field: &'static str,
+        /// Its length.
+        length: usize,
+        /// The length that the layout requires.
+        required: usize,
+    },
+    /// A slice of right-hand sides has a length that is not a multiple of the number of unknowns.
+    #[error("{field} has {length} elements, and the layout requires a multiple of {unknowns}")]
+    Columns {
+        /// The type and the field, such as `SolveOptions::rights`.
+        field: &'static str,
+        /// Its length.
+        length: usize,
+        /// The number of unknowns.
+        unknowns: usize,
+    },
+    /// The graph of the blocks is too large for the ordering that was asked for.
+    #[error("the graph of the retained blocks is too large for the ordering {0}: use input or rcm")]
+    Ordering(&'static str),
     /// A list of outer or contributed blocks with one that does not exist or is there twice.
     #[error("outer or contributed blocks do not exist or are named twice")]
     Outer,
@@ -121,6 +154,13 @@ pub enum LayoutError {
     },
 }
 
+impl LayoutError {
+    /// An error unless a field has the length that the layout requires.
+    pub(crate) fn unless_of_length(field: &'static str, length: usize, required: usize) -> Result<(), Self> {
+        if length == required { Ok(()) } else { Err(Self::Length { field, length, required }) }
+    }
+}
+
 impl Layout {
     /// The unknowns of a retained block that are not held, counted from its first, as ranges.
     pub(super) fn free_of(&self, block: usize) -> impl Iterator<Item = Range<usize>> + '_ {
@@ -132,6 +172,13 @@ impl Layout {
     /// The pairs of retained blocks whose cofactors are asked for.
     pub fn pairs(&self) -> &[[u32; 2]] {
         &self.pairs
+    }
+
+    /// An error unless a field holds columns over all unknowns.
+    pub(super) fn check_columns(&self, field: &'static str, length: usize) -> Result<(), LayoutError> {
+        let unknowns = self.unknowns();
+        let fits = length.checked_rem(unknowns).unwrap_or(length) == 0;
+        if fits { Ok(()) } else { Err(LayoutError::Columns { field, length, unknowns }) }
     }
 
     /// Where the cofactors of a pair of retained blocks stand among those of all pairs; None where they were not asked for.

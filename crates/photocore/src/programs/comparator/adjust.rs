@@ -47,6 +47,7 @@ impl Calibration {
                         .collect(),
                 ),
                 AdjustError::NotFinite => CalibrationError::NotFinite,
+                AdjustError::Layout(error) => error.into(),
                 AdjustError::Stopped(stopped) => CalibrationError::Stopped(stopped),
             })?;
         Ok(Solution::new(&problem, adjusted))

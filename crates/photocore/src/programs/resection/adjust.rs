@@ -80,6 +80,7 @@ impl Resection {
         let problem = threads.install(|| self.problem(&start, origin))?;
         let adjusted = adjustment::adjust(&problem, options, threads, watch);
         let adjustment = adjusted.map_err(|error| match error {
+            AdjustError::Layout(error) => error.into(),
             AdjustError::Stopped(stopped) => ResectionError::Stopped(stopped),
             AdjustError::NotFinite => ResectionError::NotFinite,
             AdjustError::Undetermined(_) | AdjustError::UndeterminedLocals(_) => {

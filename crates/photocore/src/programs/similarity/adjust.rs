@@ -80,6 +80,7 @@ fn adjust(
     };
     let mut adjusted =
         adjustment::adjust(&problem, &engine, threads, watch).map_err(|error| match error {
+            AdjustError::Layout(error) => error.into(),
             AdjustError::Stopped(stopped) => SimilarityError::Stopped(stopped),
             AdjustError::NotFinite => SimilarityError::NotFinite,
             AdjustError::UndeterminedLocals(stations) => {

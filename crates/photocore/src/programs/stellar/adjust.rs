@@ -94,6 +94,7 @@ impl Calibration {
                     (0..self.images.len()).map(|image| problem.model.image(&sight, image)).collect();
                 StellarError::NotFinite(self.unseen(&rows))
             }
+            AdjustError::Layout(error) => error.into(),
             AdjustError::Stopped(stopped) => StellarError::Stopped(stopped),
         }
     }
