@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 _Floats = NDArray[np.float64]
 _Indices = NDArray[np.int64]
 FoundRow = tuple[
-    _Floats, _Floats, list[tuple[str, int, int]], _Floats, NDArray[np.bool_], int | None, float | None
+    _Floats,
+    _Floats,
+    list[tuple[str, int, int]],
+    _Floats,
+    NDArray[np.bool_],
+    NDArray[np.bool_],
+    int | None,
+    float | None,
 ]
 """What `find_first_values` returns."""
 
@@ -620,7 +627,8 @@ def find_first_values(
     (P, 3) positions and (P, 3, 3) attitudes, NaN where none was found; for each photo (`given`, `resected`,
     `observed` or `oriented`, 0, 0), or why it has none: (`points`, known points, 0), (`misfit`, known points,
     0) or (`apart`, what its model has in common, photos of the model); (n, 3) positions of points; (m,)
-    whether an image was set aside; the photo that is the datum, if nothing else is; the median of the angles
+    whether an image was set aside; (n,) whether the images of a control point agree with each other but not
+    with its coordinates; the photo that is the datum, if nothing else is; the median of the angles
     between observed and computed directions, radians.
 
     Raises

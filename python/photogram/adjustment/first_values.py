@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.a_priori import Known
+from photogram.adjustment.adjustment import adjust
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
@@ -36,7 +37,9 @@ _Array = TypeVar("_Array", bound=NDArray[np.generic])
 NEEDED = 4
 """Known points of a photo that is resected."""
 DOUBTFUL = 0.3
-"""Part of the images of control that is set aside where the control, or the start, is doubted."""
+"""Part of the images of control that do not fit where the control, or the start, is doubted."""
+ESTIMATES = 3
+"""Times that free cameras are estimated and photos are searched again, at most."""
 IN_COMMON = 3
 """What a model must have in common with what is known."""
 SOURCES = {
@@ -67,6 +70,9 @@ class FirstValues(Brief):
         (n, 3) where the rays of points meet, as in the block; NaN where they do not.
     set_aside
         (m,) whether an image does not fit the poses: a wrong point, or a poor ray.
+    contradicted_control
+        Control points whose image observations agree with each other but not with the coordinates. They take
+        part in the adjustment with all their images.
     misfit
         Median of the angles between observed and computed directions, radians; NaN without any.
     first_photo
@@ -82,6 +88,7 @@ class FirstValues(Brief):
     contradicted: tuple[str, ...]
     point_positions: Floats
     set_aside: Bools
+    contradicted_control: tuple[str, ...]
     misfit: float
     first_photo: str | None
     messages: list[Message]
@@ -152,18 +159,22 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
         return _beside_trajectories(block, keep_all=keep_all)
     axes = Cartesian(block.spheroid)
     known = Known.of(block, axes)
-    directions = image_directions(block)
-    row = _found(block, known, directions)
+    directions, search = _searched(block, known, axes)
     nominal = (
-        None if any(why[0] in SOURCES for why in row[2]) else _on_nominal(block, known, directions, axes)
+        None if any(why[0] in SOURCES for why in search[2]) else _on_nominal(block, known, directions, axes)
     )
-    row, orienting = (row, []) if nominal is None else nominal
-    positions, attitudes, how, points, aside, first, misfit = row
+    search, orienting = (search, []) if nominal is None else nominal
+    positions, attitudes, how, points, aside, against, first, misfit = search
     names = block.photo_ids
     missing = {photo: _reason(*why) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES}
     sources = {photo: why[0] for photo, why in zip(names, how, strict=True) if why[0] in SOURCES}
     kept = truth_value("keep_all", keep_all)
-    mirrored = _mirrored(block, known, directions, len(sources), aside)
+    control = tuple(np.array(block.point_ids, dtype=object)[against])
+    mirrored = _mirrored(block, known, directions, len(sources), aside | against[block.image_points])
+    # One image of a control point is not checked by others: the adjustment tests it.
+    posed = np.array([why[0] in SOURCES for why in how])[block.image_photos]
+    images = np.bincount(block.image_points[posed], minlength=len(block.point_ids))
+    aside = aside & ~((images == 1) & np.isfinite(block.point_sd).any(axis=1))[block.image_points]
     if not sources:
         hints = "".join(f"\n  hint: {hint}" for hint in mirrored)
         raise AdjustmentError(f"no photo could be started: {_reasons(missing)}{hints}")
@@ -179,11 +190,13 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
         ),
         point_positions=axes.from_cartesian(points),
         set_aside=np.zeros_like(aside) if kept else aside,
+        contradicted_control=control,
         misfit=np.nan if misfit is None else misfit,
         first_photo=None if first is None else names[first],
         messages=[
             *mirrored,
             *orienting,
+            *_of_control(block, control, aside),
             *_messages(block, sources, missing, aside, None if first is None else names[first], kept=kept),
         ],
     )
@@ -204,6 +217,7 @@ def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
         contradicted=(),
         point_positions=np.full(block.point_positions.shape, np.nan),
         set_aside=np.zeros(len(block.image_xy), dtype=bool),
+        contradicted_control=(),
         misfit=np.nan,
         first_photo=None,
         messages=[moving],
@@ -231,6 +245,7 @@ def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
         contradicted=own.contradicted,
         point_positions=own.point_positions,
         set_aside=_with(found.set_aside, ~timed[block.image_photos], own.set_aside),
+        contradicted_control=own.contradicted_control,
         misfit=own.misfit,
         messages=[*own.messages, moving],
     )
@@ -241,6 +256,74 @@ def _with(values: _Array, rows: Bools, others: _Array) -> _Array:
     found = values.copy()
     found[rows] = others
     return found
+
+
+def _searched(block: Block, known: Known, axes: Cartesian) -> tuple[Floats, _photocore.FoundRow]:
+    """Search with the cameras as they are given, and again with the cameras that the photos estimate.
+
+    Images and photos that fit only estimated cameras are not set aside for the start values of cameras. If
+    photos or control still do not fit, cameras are estimated without control.
+    """
+    given = image_directions(block)
+    best = _improved(block, known, axes, given)
+    _, _, how, _, _, against, _, _ = best[1]
+    control = np.isfinite(block.point_sd).any(axis=1)
+    whole = all(why[0] in SOURCES for why in how) and against.sum() <= DOUBTFUL * control.sum()
+    if whole or not control.any() or all(each.is_held for each in block.cameras):
+        return best
+    alone = block.replace(point_sd=np.inf)
+    directions, _ = _improved(alone, Known.of(alone, axes), axes, given)
+    return max(best, _improved(block, known, axes, directions), key=lambda each: _fitting(each[1]))
+
+
+def _improved(
+    block: Block, known: Known, axes: Cartesian, directions: Floats
+) -> tuple[Floats, _photocore.FoundRow]:
+    """Search, and again with estimated cameras as long as more fits; returns the directions of the best."""
+    best = directions, _found(block, known, directions)
+    for _ in range(ESTIMATES):
+        before, search = best
+        calibrated = _calibrated(block, axes, search)
+        if calibrated is None:
+            break
+        directions = image_directions(calibrated)
+        again = _found(block, known, directions)
+        if _fitting(again) <= _fitting(search):
+            break
+        best = directions, again
+        turned = np.linalg.norm(directions - before, axis=1)
+        if np.nanmedian(turned) < direction_deviations(block).mean():
+            break
+    return best
+
+
+def _fitting(search: _photocore.FoundRow) -> tuple[int, int, int]:
+    """Return how many photos have a pose, how many images fit, and minus how much control does not."""
+    _, _, how, _, aside, against, _, _ = search
+    return sum(why[0] in SOURCES for why in how), -int(aside.sum()), -int(against.sum())
+
+
+def _calibrated(block: Block, axes: Cartesian, search: _photocore.FoundRow) -> Block | None:
+    """Return the block with cameras that are adjusted with the poses of a search.
+
+    None if all images fit, no camera is free or the adjustment fails.
+    """
+    positions, attitudes, how, _, aside, against, _, _ = search
+    posed = np.array([why[0] in SOURCES for why in how])
+    free = not all(each.is_held for each in block.cameras)
+    if not free or not posed.any() or (posed.all() and not aside.any() and not against.any()):
+        return None
+    start = _started(block, axes, positions, attitudes, how)
+    # What is left of contradicted control and of images may not suffice for a datum, or for the cameras.
+    fewer = start.replace(point_sd=np.where(against[:, np.newaxis], np.inf, block.point_sd))
+    for each, kept in ((fewer, ~aside), (start, ~aside), (start, np.ones_like(aside))):
+        try:
+            result = adjust(of_photos(kept_images(each, kept), posed), covariance=False)
+        except (AdjustmentError, InputError):
+            continue
+        if result.converged and result.cameras:
+            return block.replace(cameras=[each.camera for each in result.cameras])
+    return None
 
 
 def _found(block: Block, known: Known, directions: Floats) -> _photocore.FoundRow:
@@ -275,7 +358,7 @@ def _on_nominal(
         points=np.full_like(known.points, np.nan),
         point_sd=np.full_like(known.point_sd, np.inf),
     )
-    positions, attitudes, how, points, aside, first, misfit = _found(block, free, directions)
+    positions, attitudes, how, points, aside, against, first, misfit = _found(block, free, directions)
     given = axes.positions(block.point_positions)
     rows = np.flatnonzero(np.isfinite(given).all(axis=1) & np.isfinite(points).all(axis=1))
     if first is None or len(rows) < IN_COMMON:
@@ -288,24 +371,24 @@ def _on_nominal(
         f"the photos are oriented by nominal coordinates of {counted(len(rows), 'point')}: {names}"
     )
     carried = scale * positions @ turn.T + shift, turn @ attitudes, how, scale * points @ turn.T + shift
-    return (*carried, aside, None, misfit), [said]
+    return (*carried, aside, against, None, misfit), [said]
 
 
-def _mirrored(block: Block, known: Known, directions: Floats, started: int, aside: Bools) -> list[Message]:
+def _mirrored(block: Block, known: Known, directions: Floats, started: int, against: Bools) -> list[Message]:
     """Say where control does not fit, and whether it would if photos were mirrored.
 
     Relative orientation does not see a mirrored photo; control that is not in a plane does.
     """
     control = np.asarray(np.isfinite(known.point_sd).all(axis=1))
     of_control = control[block.image_points]
-    against = int(np.count_nonzero(aside & of_control))
-    doubtful = DOUBTFUL * np.count_nonzero(of_control) < against
+    misses = int(np.count_nonzero(against & of_control))
+    doubtful = DOUBTFUL * np.count_nonzero(of_control) < misses
     if np.count_nonzero(control) < NEEDED or not (doubtful or started < len(block.photo_ids)):
         return []
     found = _found(block, known, directions * [-1.0, 1.0, 1.0])
     others = sum(why[0] in SOURCES for why in found[2])
-    still = int(np.count_nonzero(found[4] & of_control))
-    if others >= max(started, len(block.photo_ids) // 2) and (others > 2 * started or 5 * still < against):
+    still = int(np.count_nonzero((found[4] | found[5][block.image_points]) & of_control))
+    if others >= max(started, len(block.photo_ids) // 2) and (others > 2 * started or 5 * still < misses):
         return [
             Message(
                 "probably the photos are mirrored: with the other sign of x (or of y) they fit the control,"
@@ -315,7 +398,26 @@ def _mirrored(block: Block, known: Known, directions: Floats, started: int, asid
     if not doubtful:
         return []
     count = np.count_nonzero(of_control)
-    return [Message(f"{against} of {count} images of control points do not fit: look at the control")]
+    return [Message(f"{misses} of {count} images of control points do not fit: look at the control")]
+
+
+def _of_control(block: Block, contradicted: tuple[str, ...], aside: Bools) -> list[Message]:
+    """Report control points that their images contradict, and those without an image that fits."""
+    messages = []
+    if contradicted:
+        text = (
+            f"control points {listed(list(contradicted))}: the image observations agree with each other but"
+            " not with the coordinates; they take part, and the adjustment tests them"
+        )
+        messages.append(Message(text))
+    held = np.asarray(np.isfinite(block.point_sd).any(axis=1))
+    lost = np.setdiff1d(block.image_points[aside & held[block.image_points]], block.image_points[~aside])
+    if lost.size:
+        names = listed([block.point_ids[point] for point in lost.tolist()])
+        messages.append(
+            Message(f"control points {names}: no image observation fits; check points and images")
+        )
+    return messages
 
 
 def _started(

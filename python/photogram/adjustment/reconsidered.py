@@ -1,9 +1,9 @@
 """What was left out before an adjustment, judged again by what it has found: its cameras, poses and points.
 
-First values come of cameras as they are given, and set aside what does not fit these: of a lens whose
-distortion is still unknown, images in the corners. Once cameras are calibrated, they are looked at again,
-until nothing returns. (What leaves an adjustment itself, points whose rays do not meet, is judged by cameras
-that are being calibrated, and anew in each of these adjustments.)
+First values estimate cameras from a part of the images, and set aside what does not fit these. Once cameras
+are calibrated, these images are looked at again, until nothing returns. (What leaves an adjustment itself,
+points whose rays do not meet, is judged by cameras that are being calibrated, and anew in each of these
+adjustments.)
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ from photogram.diagnosis.trajectories import flown_checked
 from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.messages import counted, listed
 from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import as_seen
 from photogram.network.observations import Position
@@ -169,6 +170,16 @@ def _started(block: Block) -> tuple[Block | None, Section]:
     for photo, why in found.missing.items():
         text = f"photo {photo} could not be started: {why}"
         note(section, "no-first-values", "grave", text, [photo])
+    aside = found.set_aside
+    if aside.any():
+        points = sorted({block.point_ids[point] for point in block.image_points[aside]})
+        photos = sorted({block.photo_ids[photo] for photo in block.image_photos[aside]})
+        text = (
+            f"{counted(int(aside.sum()), 'image observation')} of {counted(len(points), 'point')} on"
+            f" {counted(len(photos), 'photo')} do not fit the first values; the check leaves them out:"
+            f" points {listed(points)}"
+        )
+        note(section, "set-aside", "look", text, photos, points)
     return usable, section
 
 

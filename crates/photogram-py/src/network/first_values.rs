@@ -14,12 +14,14 @@ use crate::arrays::{
 };
 use crate::work::{Workers, watched};
 
-/// Positions, attitudes, sources and what is missing of photos; positions of points; images set aside; the frame; the misfit.
+/// Positions, attitudes, sources and what is missing of photos; positions of points; images set aside; control that images contradict;
+/// the frame; the misfit.
 type FoundRow<'py> = (
     Matrix<'py>,
     Blocks<'py>,
     Vec<(&'static str, usize, usize)>,
     Matrix<'py>,
+    Bound<'py, PyArray1<bool>>,
     Bound<'py, PyArray1<bool>>,
     Option<usize>,
     Option<f64>,
@@ -130,6 +132,7 @@ fn row(py: Python<'_>, found: Found) -> PyResult<FoundRow<'_>> {
         sources,
         table(py, found.points.iter().map(point).collect())?,
         PyArray1::from_vec(py, found.set_aside),
+        PyArray1::from_vec(py, found.contradicted),
         frame,
         found.misfit,
     ))

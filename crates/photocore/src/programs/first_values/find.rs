@@ -11,6 +11,8 @@ use crate::network::median;
 
 /// Directions further than this from the plane of the projection centre are seen in front (radians).
 const SIDE: f64 = 0.02;
+/// Adjustments at the end, at the most.
+const ROUNDS: usize = 6;
 
 impl FirstValues {
     /// Finds first values of photos and points.
@@ -81,10 +83,10 @@ impl Search<'_> {
         object.intersect(self);
     }
 
-    /// Everything together, robustly: twice, since what fits shows after the first time.
+    /// Everything together, robustly: twice, since what fits shows after the first time; more often while images contradict control.
     fn finish(&mut self, object: &mut Model) -> Result<(), FirstValuesError> {
-        for _ in 0..2 {
-            if !object.is_empty() {
+        for round in 0..ROUNDS {
+            if !object.is_empty() && (round < 2 || object.contradicted.contains(&true)) {
                 self.adjust(object)?;
             }
         }
@@ -117,6 +119,7 @@ impl Search<'_> {
             poses: poses.map(|(photo, pose)| pose.ok_or_else(|| missing(photo))).collect(),
             points: object.points,
             set_aside: object.aside,
+            contradicted: object.contradicted,
             frame,
             misfit,
         }

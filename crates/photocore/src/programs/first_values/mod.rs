@@ -48,6 +48,13 @@ impl KnownPoint {
         let full = self.sd.iter().chain(&self.coordinates).all(|value| value.is_finite());
         full.then(|| self.coordinates.into())
     }
+
+    /// A position with the components that are held, and the standard deviation of these.
+    pub(super) fn at(&self, position: &Vector3) -> (Vector3, f64) {
+        let held = |k: usize| self.sd[k].is_finite() && self.coordinates[k].is_finite();
+        let own = Vector3::from_fn(|k, _| if held(k) { self.coordinates[k] } else { position[k] });
+        (own, (0..3).filter(|&k| held(k)).map(|k| self.sd[k] * self.sd[k]).sum::<f64>().sqrt())
+    }
 }
 
 /// The image of a point.
@@ -121,6 +128,8 @@ pub struct Found {
     pub points: Vec<Option<Vector3>>,
     /// Whether an image does not fit the poses and was set aside.
     pub set_aside: Vec<bool>,
+    /// Whether the images of a control point agree with each other but not with its coordinates.
+    pub contradicted: Vec<bool>,
     /// What coordinates refer to.
     pub frame: Frame,
     /// Median of the angles between observed and computed directions, radians; None without any.

@@ -2,7 +2,7 @@
 //!
 //! The adjustments in between: the network engine on images in the plane at unit distance, with a robust loss.
 
-use super::{FirstValues, FirstValuesError, Search, Sighting, Source};
+use super::{FirstValues, FirstValuesError, KnownPoint, Search, Sighting, Source};
 use crate::adjustment::{Loss, Method, Options as AdjustmentOptions, Stop};
 use crate::geometry::{Matrix3, Perspective, Pose, Ray, Vector3, rotation_angles};
 use crate::network::{
@@ -15,6 +15,8 @@ const LEAST_ANGLE: f64 = 0.01;
 /// An image fits within this multiple of the standard deviation that the median of all says, and of its own.
 pub(super) const FITS: f64 = 6.0;
 const FITS_OWN: f64 = 4.0;
+/// Control further from its rays than this, radians, does not count.
+const NEAR: f64 = 0.1;
 /// Pairs of rays that are tried where not all rays of a point meet, at the most.
 const PAIRS: usize = 45;
 /// The length of a vector with two components of standard deviation 1 has this median.
@@ -27,6 +29,8 @@ pub struct Model {
     pub points: Vec<Option<Vector3>>,
     /// The images that do not fit.
     pub aside: Vec<bool>,
+    /// The control points whose images agree with each other but not with the coordinates.
+    pub contradicted: Vec<bool>,
     /// Angle within which an image fits, radians.
     pub tolerance: f64,
     /// Whether control belongs to it.
@@ -40,6 +44,7 @@ impl Model {
             poses: vec![None; given.photos.len()],
             points: vec![None; given.points.len()],
             aside: vec![false; given.sightings.len()],
+            contradicted: vec![false; given.points.len()],
             tolerance: 0.0,
             object: false,
         }
@@ -87,6 +92,13 @@ impl Model {
         misfit(ray, at) <= self.tolerance.max(FITS_OWN * search.given.sightings[*image].sd)
     }
 
+    /// Whether a ray fits a position with a standard deviation.
+    fn reaches(&self, search: &Search<'_>, at: &Vector3, sd: f64, ray: &(usize, Ray)) -> bool {
+        let towards = at - ray.1.origin;
+        let least = misfit(&ray.1, at) - FITS * sd / towards.norm();
+        least <= self.tolerance.max(FITS_OWN * search.given.sightings[ray.0].sd)
+    }
+
     /// Intersects all points anew: first to see how well rays meet, then with those that fit.
     pub fn intersect(&mut self, search: &Search<'_>) {
         if self.tolerance == 0.0 {
@@ -112,21 +124,39 @@ impl Model {
         (0..self.aside.len()).filter(|&image| !self.aside[image]).filter_map(of).collect()
     }
 
-    /// Puts a point where its rays meet; control of the object stays where it is. Rays that do not fit are set aside.
+    /// Puts a point where its rays meet, or at its control coordinates if as many rays meet there. Sets rays aside that do not fit.
     pub fn place(&mut self, search: &Search<'_>, point: usize) {
         let rays = self.rays(search, point);
-        let control = search.given.points[point].position().filter(|_| self.object);
+        let known = Some(&search.given.points[point]).filter(|_| self.object);
+        let control = known.and_then(KnownPoint::position);
         let all: Vec<Ray> = rays.iter().map(|(_, ray)| *ray).collect();
+        let fitting = |at: &Vector3| rays.iter().filter(|ray| self.fits(search, at, ray)).count();
         let met = || {
-            let at = meet(&all).filter(|at| rays.iter().all(|ray| self.fits(search, at, ray)));
+            let at = meet(&all).filter(|at| fitting(at) == rays.len());
             at.or_else(|| self.consensus(search, &rays))
         };
-        let placed = control.or_else(met);
+        let at_control = control.map(|at| fitting(&at));
+        let placed = if at_control == Some(rays.len()) {
+            control
+        } else {
+            met().filter(|at| at_control.is_none_or(|count| fitting(at) > count)).or(control)
+        };
+        // Control counts with its standard deviation, and only in the components that it has.
+        let contradicted = known.zip(placed).is_some_and(|(known, at)| {
+            let (own, sd) = known.at(&at);
+            rays.iter().filter(|ray| self.reaches(search, &own, sd, ray)).count() < fitting(&at)
+        });
         for ray in &rays {
             let fits = placed.is_some_and(|at| self.fits(search, &at, ray));
             self.aside[ray.0] = !fits && (rays.len() > 1 || control.is_some());
         }
+        self.contradicted[point] = contradicted;
         self.points[point] = placed.filter(|_| control.is_some() || widest(&all) > LEAST_ANGLE);
+    }
+
+    /// Whether all rays of a point pass near a position.
+    fn is_near(&self, search: &Search<'_>, point: usize, at: &Vector3) -> bool {
+        self.rays(search, point).iter().all(|(_, ray)| misfit(ray, at) < NEAR)
     }
 
     /// Where most rays meet, of three or more: pairs propose places.
@@ -215,10 +245,16 @@ impl Search<'_> {
         let weighted = |point: usize| {
             let known = &self.given.points[point];
             let at = model.points[point].unwrap_or_default();
-            let held: [bool; 3] = std::array::from_fn(|k| model.object && known.sd[k].is_finite());
+            // Control that its images contradict pulls with one standard deviation; far from its rays it does not count.
+            let (control, _) = known.at(&at);
+            let (counts, least) = match model.contradicted[point] {
+                true => (model.is_near(self, point, &control), (control - at).norm()),
+                false => (true, 0.0),
+            };
+            let held: [bool; 3] = std::array::from_fn(|k| model.object && counts && known.sd[k].is_finite());
             Point {
                 coordinates: std::array::from_fn(|k| if held[k] { known.coordinates[k] } else { at[k] }),
-                sd: std::array::from_fn(|k| if held[k] { known.sd[k] } else { f64::INFINITY }),
+                sd: std::array::from_fn(|k| if held[k] { known.sd[k].max(least) } else { f64::INFINITY }),
             }
         };
         let poses: Vec<Pose> = photos.iter().filter_map(|&photo| Some(model.poses[photo]?.0)).collect();
