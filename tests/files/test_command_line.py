@@ -66,7 +66,11 @@ def test_names_that_are_no_text(tmp_path):
     )
     assert made.returncode == 0, made.stderr
     assert b"written: o" in made.stdout
-    assert {os.fsencode(path.name) for path in tmp_path.iterdir()} == {b"o\xff.csv", b"\xfe", b"example-oriented"}
+    assert {os.fsencode(path.name) for path in tmp_path.iterdir()} == {
+        b"o\xff.csv",
+        b"\xfe",
+        b"example-oriented",
+    }
     points = tmp_path / os.fsdecode(b"p\xff.csv")
     points.write_bytes((SOURCES / "examples" / "absolute_orientation" / "points.csv").read_bytes())
     again = subprocess.run(
