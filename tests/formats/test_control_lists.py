@@ -324,7 +324,7 @@ def test_an_excel_sheet_is_a_table(tmp_path):
         project.block.point_positions[project.block.point_ids.index("103")], ROWS[2][1:]
     )
     (tmp_path / "damaged.xlsx").write_bytes((tmp_path / "list.xlsx").read_bytes()[:200])
-    with pytest.raises(InputError, match="no workbook"):
+    with pytest.raises(InputError, match="cannot be read as a workbook"):
         with_control(block(), tmp_path / "damaged.xlsx", {}, None)
 
 
