@@ -6,7 +6,8 @@ import json
 import re
 from collections.abc import Iterable, Iterator
 
-from photogram.show.page import Facts, Layers, Page, Part, Remarks, Table, Text
+from photogram.show.cells import written
+from photogram.show.page import Document, Facts, Layers, Part, Remarks, Table, Text
 from photogram.show.sections import verdict_sections
 from photogram.statistics.verdict import Verdict
 
@@ -92,7 +93,7 @@ def contradictions(sentences: Iterable[str]) -> list[tuple[str, str]]:
     return [(one, other) for a, b in EXCLUSIVE for one in claim[a] for other in claim[b]]
 
 
-def sentences_of(verdict: Verdict, page: Page | None, report: str, document: bytes | None) -> list[str]:
+def sentences_of(verdict: Verdict, page: Document | None, report: str, document: bytes | None) -> list[str]:
     """Return what a command ends by, and all that its page, its text and its document say."""
     told = [f"exit code {verdict.exit}", verdict.headline, *verdict.lines, *verdict.next]
     told += [f"test {test.name.partition(':')[0]} {'passes' if test.accepted else 'rejects'}"
@@ -105,7 +106,7 @@ def sentences_of(verdict: Verdict, page: Page | None, report: str, document: byt
     return told
 
 
-def _of_page(page: Page) -> Iterator[str]:
+def _of_page(page: Document) -> Iterator[str]:
     for each in page.judgements:
         yield from (f"mark {each.mark}", each.headline, *each.lines)
     yield from page.advice
@@ -119,6 +120,7 @@ def _of_page(page: Page) -> Iterator[str]:
 
 
 def _of_part(part: Part) -> Iterator[str]:
+    part = written(part)
     if isinstance(part, Facts):
         for fact in part.facts:
             yield f"{fact.name} {fact.value} {fact.unit}"
@@ -155,7 +157,9 @@ def _of_document(members: dict) -> Iterator[str]:
     yield from (f"problems: {each}" for each in members.get("problems", ()))
 
 
-def assert_one_judgement(verdict: Verdict, page: Page | None, report: str, document: bytes | None) -> None:
+def assert_one_judgement(
+    verdict: Verdict, page: Document | None, report: str, document: bytes | None
+) -> None:
     """See that page, text and document say the same, and that no two sentences contradict each other."""
     found = contradictions(sentences_of(verdict, page, report, document))
     assert not found, f"{verdict}: {found}"

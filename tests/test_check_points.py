@@ -134,7 +134,7 @@ def test_all_outputs_have_them():
     np.testing.assert_allclose([each["given_sd"] for each in document], result.check_points.given_sd)
     np.testing.assert_allclose([each["p"] for each in document], table["probability"])
     assert re.search(r"\n +sd given +0\.01000 +0\.02000 +0\.03000\n", result.report())
-    rows = next(each for each in page_of(result).sections if each.id == "check-points").parts[1].rows
+    rows = next(each for each in page_of(result).sections if each.key == "check-points").parts[1].rows
     assert {float(row[-2]) for row in rows} == {0.01, 0.02, 0.03}
 
 

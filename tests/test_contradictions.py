@@ -20,8 +20,8 @@ from photogram.comparator import Grid, compare, listing, simulate_calibration, t
 from photogram.comparator import calibrate as calibrate_comparator
 from photogram.giant import Project, write_project
 from photogram.perspective_center import run_deck
-from photogram.perspective_center.report import summary
-from photogram.perspective_center.report import to_json as run_to_json
+from photogram.perspective_center.document import set_document
+from photogram.show.forms import summary
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import page_of
 
@@ -275,10 +275,11 @@ def test_projectors(tmp_path, options, broken):
     run = run_deck(deck, **options)
     for each in run.results:
         alone = replace(run, results=[each])
-        assert_one_judgement(each.verdict, page_of(alone), "\n".join(summary(each)), None)
-        document = json.loads(run_to_json(alone))["sets"][0]
+        text = "\n".join(summary(set_document(each), "parameters"))
+        assert_one_judgement(each.verdict, alone.document(), text, None)
+        document = json.loads(alone.to_json())["sets"][0]
         assert document["verdict"]["next"] == list(each.verdict.next)
-    assert page_of(run).advice == list(dict.fromkeys(s for each in run.results for s in each.verdict.next))
+    assert run.document().advice == list(dict.fromkeys(s for each in run.results for s in each.verdict.next))
     assert options or any(each.verdict.warning for each in run.results) == broken
 
 

@@ -19,7 +19,7 @@ def test_the_page_says_what_the_verdict_says(feet):
     assert judgement.headline == found.verdict.headline
     assert judgement.tone == ("bad" if feet else "look" if found.verdict.warning else "good")
     assert (found.verdict.exit == 3) == feet
-    (tests,) = [section for section in page.sections if section.id == "tests"]
+    (tests,) = [section for section in page.sections if section.key == "tests"]
     (table,) = tests.parts
     assert isinstance(table, Table)
     assert len(table.rows) == len(found.verdict.tests) > 3

@@ -15,7 +15,6 @@ from photogram import InputError
 from photogram.perspective_center import read_deck, run_deck
 from photogram.perspective_center.listing import listing
 from photogram.perspective_center.plot import draw
-from photogram.perspective_center.report import to_json
 
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = files("photogram") / "examples" / "perspective_center" / "grid.deck"
@@ -72,7 +71,8 @@ def test_the_example_is_what_its_script_makes():
 def test_everything_is_written(run, tmp_path):
     result = run("--example", "--json", "out.json", "--out", "o", "--plots")
     assert result.exit_code == 0, result.output
-    assert "data set 2: 25 points, 60 readings, least squares" in result.output
+    assert "Set 2, Z = 60\n" in result.output
+    assert "25 points, 60 readings, least squares" in result.output
     assert "written: out.json, o/listing.txt, o/residuals.png" in result.output
     document = json.loads(Path("out.json").read_text())
     assert document["error"] is None
@@ -119,7 +119,7 @@ def test_a_deck_without_a_solution_leaves_no_directory(run, tmp_path):
 
 def test_the_document_agrees_with_the_result():
     done = run_deck(Path(str(EXAMPLE)))
-    document = json.loads(to_json(done))
+    document = json.loads(done.to_json())
     for each, result in zip(document["sets"], done.results, strict=True):
         assert each["perspective_center"] == result.position.tolist()
         errors = np.array(list(each["standard_errors"].values()))

@@ -91,7 +91,7 @@ def test_sets_at_several_heights_in_one_solution():
 def test_the_command_calibrates(run, tmp_path):
     done = run("perspective-center", EXAMPLE, "--calibrate", "c,xp,yp", "--json", "out.json", "--out", "out")
     assert done.exit_code == 0, done.output
-    assert re.search(r"^  c mm +150\.0\d+ +0\.0\d+$", done.output, re.MULTILINE)
+    assert re.search(r"^  c, mm +150\.0\d+ +0\.0\d+$", done.output, re.MULTILINE)
     (found,) = json.loads((tmp_path / "out.json").read_text())["sets"]
     errors = found["interior_standard_errors"]
     assert found["interior"]["c"] == pytest.approx(150.0, abs=3 * errors["c"])

@@ -7,7 +7,8 @@ import pytest
 
 from photogram import InputError
 from photogram.perspective_center import Grid, Run, determine
-from photogram.perspective_center.report import summary, to_json
+from photogram.perspective_center.document import set_document
+from photogram.show.forms import summary
 
 
 @pytest.fixture
@@ -35,9 +36,10 @@ def test_a_blunder_on_a_plate_of_eight_points_is_named(eight):
     (message,) = result.messages
     assert "data set 1: readings beyond the limit 4.00" in str(message)
     assert "point 3 Y (t " in str(message)
-    assert summary(result)[-1].startswith("  studentized residuals beyond 4.00")
-    assert "3 Y (+" in summary(result)[-1]
-    document = json.loads(to_json(Run([result], result.messages)))
+    last = summary(set_document(result), "parameters")[-1]
+    assert f" {len(result.outliers)} (studentized residuals beyond 4.00: " in last
+    assert "3 Y (+" in last
+    document = json.loads(Run([result], result.messages).to_json())
     (each,) = document["sets"]
     assert each["test"]["outliers"][0] == [3, "Y"]
     assert each["points"][2]["studentized"][1] == pytest.approx(result.studentized[2, 1])
@@ -56,7 +58,7 @@ def test_without_redundancy_nothing_is_tested(make_grid):
     assert np.isnan(result.studentized).all()
     assert result.limit == np.inf
     assert not result.outliers
-    assert json.loads(to_json(Run([result])))["sets"][0]["test"]["limit"] is None
+    assert json.loads(Run([result]).to_json())["sets"][0]["test"]["limit"] is None
 
 
 @pytest.mark.parametrize(

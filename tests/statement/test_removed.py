@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from golden_statement import block_path
+from golden_statement import BLOCK
 
 import photogram
 from photogram.collection import simulate
@@ -19,7 +19,7 @@ from photogram.show.methods import page_of
 @pytest.fixture(scope="module")
 def snooped():
     """Return the golden block after data snooping, with 1 m added to y of one control point."""
-    block = read(block_path()).block
+    block = read(BLOCK).block
     positions = block.point_positions.copy()
     positions[block.point_ids.index("G03"), 1] += 1.0
     return photogram.snoop(block.replace(point_positions=positions), unit_variance="unity")
@@ -27,7 +27,7 @@ def snooped():
 
 def listed(stated, table="table.removed"):
     """Return the rows of the table of removed observations on the page."""
-    (annex,) = [each for each in page_of(stated).sections if each.id == "annex-e"]
+    (annex,) = [each for each in page_of(stated).sections if each.key == "annex-e"]
     found = [part for part in annex.parts if getattr(part, "caption", "") == stated.texts(table)]
     return found[0].rows if found else []
 
@@ -83,7 +83,7 @@ def test_every_removed_observation_has_its_row(snooped, monkeypatch):
 
 
 def test_adjust_writes_all_files_and_a_saved_result_is_stated_alike(run, tmp_path):
-    shutil.copytree(block_path(), "site")
+    shutil.copytree(BLOCK, "site")
     for path in Path("site").iterdir():
         path.chmod(0o644)
     control = Path("site/control.csv")

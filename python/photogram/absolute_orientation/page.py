@@ -21,7 +21,7 @@ from photogram.absolute_orientation.tables import (
 from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.methods import page_of
-from photogram.show.page import Drawing, Fact, Facts, Page, Part, Section, significant
+from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
 from photogram.show.quantity import chosen, long
 
 LISTED = 300
@@ -29,7 +29,7 @@ LISTED = 300
 
 
 @page_of.register(Orientation)
-def orientation_page(result: Orientation) -> Page:
+def orientation_page(result: Orientation) -> Document:
     """Return the report of an orientation for the browser."""
     stations, (much, good) = result.stations, facts(result)
     own = parameters(result)
@@ -50,7 +50,7 @@ def orientation_page(result: Orientation) -> Page:
         remarks_section(result.problems),
     ]
     unit = f"{stations.model_unit} / {stations.ground_unit}"
-    return Page(
+    return Document(
         what="Absolute orientation of a model",
         title="",
         judgements=[judged(result.verdict)],

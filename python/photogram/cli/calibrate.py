@@ -21,7 +21,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
-    from photogram.show.page import Page
+    from photogram.show.page import Document
     from photogram.targets import Board, Calibrated, Calibration, ViewPlan
 
 EXAMPLE = ("board",)
@@ -290,7 +290,7 @@ def _weights(
         return corner_components(found, by, threads=threads, progress=progress)
 
 
-def _page(found: Calibrated, weights: VarianceComponents | None) -> Page:
+def _page(found: Calibrated, weights: VarianceComponents | None) -> Document:
     from photogram.results.page.cleaning import components_section
     from photogram.show.methods import page_of
 

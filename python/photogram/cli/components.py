@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from photogram.results.components import VarianceComponents
     from photogram.results.network import AdjustedNetwork
     from photogram.results.snooping_result import Snooped
-    from photogram.show.page import Page
+    from photogram.show.page import Document
     from photogram.show.sections import Section
     from photogram.statistics.verdict import Verdict
 
@@ -112,7 +112,7 @@ class Found(Generic[Network]):
         weights = self.made or self.components
         return {} if weights is None else {out / COMPONENTS: weights.report().encode()}
 
-    def page(self) -> Page:
+    def page(self) -> Document:
         """Return the report for the browser, with what components say."""
         from photogram.results.page.cleaning import reweighed_page, weighed_page
         from photogram.show.methods import page_of

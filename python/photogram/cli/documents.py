@@ -19,7 +19,7 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from photogram.io.writing import Content
     from photogram.results.network import AdjustedNetwork
-    from photogram.show.page import Drawing, Page
+    from photogram.show.page import Document, Drawing
     from photogram.show.sections import Section
 
 TEXT, HTML = "report.txt", "report.html"
@@ -109,7 +109,7 @@ class Documents:
         return drawn
 
     def page(
-        self, job: Job, command: str, out: Path | None, make: Callable[[], Page], mark: str = ""
+        self, job: Job, command: str, out: Path | None, make: Callable[[], Document], mark: str = ""
     ) -> dict[Path, bytes]:
         """Return the report for the browser; see :func:`html_files`."""
         return html_files(job, command, self.place(out), self.html is not None, make, mark)
@@ -203,7 +203,7 @@ PageAndJson = Annotated[Documents, Without("plots", "plot_format", *OF_NETWORKS)
 
 
 def html_files(
-    job: Job, command: str, place: Path | None, asked: bool, make: Callable[[], Page], mark: str = ""
+    job: Job, command: str, place: Path | None, asked: bool, make: Callable[[], Document], mark: str = ""
 ) -> dict[Path, bytes]:
     """Return the report of a run; nothing, with a remark, where what makes it is absent and nobody asked.
 

@@ -98,9 +98,7 @@ def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> d
     """Make all files but the report for the browser, before anything is written."""
     made = {}
     if json is not None:
-        from photogram.perspective_center.report import to_json
-
-        made[json] = to_json(run)
+        made[json] = run.to_json()
     if run.results:
         from photogram.perspective_center.listing import listing
 
@@ -113,10 +111,11 @@ def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> d
 
 
 def _summarize(run: Run) -> None:
-    from photogram.perspective_center.report import summary
+    from photogram.perspective_center.document import set_document
+    from photogram.show.forms import summary
 
     for result in run.results:
-        for line in summary(result):
+        for line in summary(set_document(result), "parameters"):
             output.print(escape(line))
     for message in run.messages:
         print_remark(message)

@@ -9,12 +9,12 @@ from photogram.collection.result import AdjustedCollection
 from photogram.results.page.network import drawings, network_page, size_section
 from photogram.results.page.tables import control_section, stations_section
 from photogram.show.methods import page_of
-from photogram.show.page import Fact, Page, Section, significant
+from photogram.show.page import Document, Fact, Section, significant
 
 
 @page_of.register(AdjustedCollection)
 @np.errstate(over="ignore", invalid="ignore")
-def collection_page(result: AdjustedCollection) -> Page:
+def collection_page(result: AdjustedCollection) -> Document:
     """Return the report of an adjusted collection for the browser."""
     pictures = drawings(result)
     cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])

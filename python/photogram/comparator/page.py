@@ -22,11 +22,11 @@ from photogram.show.cells import page_table
 from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.methods import page_of
 from photogram.show.page import (
+    Document,
     Drawing,
     Fact,
     Facts,
     Layers,
-    Page,
     Part,
     Section,
     Table,
@@ -38,7 +38,7 @@ UM = "µm"
 
 
 @page_of.register(Calibration)
-def calibration_page(calibration: Calibration) -> Page:
+def calibration_page(calibration: Calibration) -> Document:
     """Return the report of a calibration for the browser."""
     session = calibration.session
     date = f", {session.date}" if session.date else ""
@@ -55,7 +55,7 @@ def calibration_page(calibration: Calibration) -> Page:
         tests_section(calibration.verdict),
         remarks_section(calibration.messages),
     ]
-    return Page(
+    return Document(
         what="Calibration of a comparator",
         title=f"Comparator {session.comparator}, {len(calibration.cases)} cases{date}",
         judgements=[judged(calibration.verdict)],

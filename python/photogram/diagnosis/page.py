@@ -11,7 +11,7 @@ from photogram.diagnosis.findings import Diagnosis, Figure, Finding, Listing, Na
 from photogram.results.page.network import drawings
 from photogram.show.judgement import judged, verdict_table
 from photogram.show.methods import page_of
-from photogram.show.page import Cell, Column, Fact, Facts, Page, Part, Remarks, Row, Table, Text
+from photogram.show.page import Cell, Column, Document, Fact, Facts, Part, Remarks, Row, Table, Text
 from photogram.show.page import Section as Chapter
 
 _TESTS = (
@@ -23,7 +23,7 @@ NAMED = 6
 
 
 @page_of.register(Diagnosis)
-def check_page(found: Diagnosis) -> Page:
+def check_page(found: Diagnosis) -> Document:
     """Return the report of a check for the browser."""
     grave, look = len(found.grave), len(found.findings) - len(found.grave)
     verdict = found.verdict
@@ -34,7 +34,7 @@ def check_page(found: Diagnosis) -> Page:
         *(_chapter(number, section) for number, section in enumerate(found.sections)),
         Chapter("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [], _TESTS),
     ]
-    return Page(
+    return Document(
         what="Check of a network before its adjustment",
         title=found.title,
         judgements=[replace(judged(verdict), lines=())],  # the table of findings has them

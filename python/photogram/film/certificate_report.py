@@ -28,7 +28,7 @@ from photogram.show.judgement import judged, tests_section
 from photogram.show.lines import fact_lines, field, padded, table_lines
 from photogram.show.lines import marks as marked
 from photogram.show.methods import document_of, page_of, report_of
-from photogram.show.page import Drawing, Facts, Page, Part, Section
+from photogram.show.page import Document, Drawing, Facts, Part, Section
 from photogram.show.quantity import Quantity, records
 from photogram.show.sections import Section as Lines
 from photogram.show.sections import composed, headline, verdict_sections
@@ -207,7 +207,7 @@ def _camera_members(camera: Camera) -> dict[str, Any]:
 
 
 @page_of.register(Certificate)
-def certificate_page(certificate: Certificate) -> Page:
+def certificate_page(certificate: Certificate) -> Document:
     """Return the report of a certificate for the browser."""
     named = facts(certificate)
     sections = [
@@ -225,7 +225,7 @@ def certificate_page(certificate: Certificate) -> Page:
         tests_section(certificate.verdict),
         Section("certificate", "Certificate", [Facts("Certificate", named)]),
     ]
-    return Page(
+    return Document(
         what="Certificate of a camera",
         title=certificate.name,
         judgements=[judged(certificate.verdict)],

@@ -16,7 +16,7 @@ from photogram.show.cells import page_table
 from photogram.show.judgement import judged
 from photogram.show.lines import fact_lines, field, table_lines
 from photogram.show.methods import Paged, document_of, page_of, report_of
-from photogram.show.page import Fact, Page, Section
+from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, records
 from photogram.show.sections import composed, headline, verdict_sections
 from photogram.show.summary import Brief, Rows
@@ -191,10 +191,10 @@ def steps_document(found: StepsCompared) -> bytes:
 
 
 @page_of.register(StepsCompared)
-def steps_page(found: StepsCompared) -> Page:
+def steps_page(found: StepsCompared) -> Document:
     """Return the comparison for the browser."""
     verdict = found.inside.verdict
-    return Page(
+    return Document(
         what=WHAT,
         title=found.inside.block.title,
         judgements=[judged(verdict, "films inside the adjustment")],

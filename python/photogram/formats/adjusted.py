@@ -14,7 +14,7 @@ from photogram.io.sheets import workbook
 from photogram.results.features import Features
 from photogram.results.result import Result
 from photogram.results.tables import TABLES
-from photogram.show.quantity import Table, frame, units
+from photogram.show.quantity import frame, unit_comments
 
 _TABLES = {
     "photos": "photo",
@@ -45,7 +45,7 @@ def table_files(result: Result) -> Mapping[str, bytes]:
         table = TABLES[kind](result)
         columns = frame(table)
         if len(next(iter(columns.values()))):
-            files[f"{file}.csv"] = csv_text(columns, _units(table))
+            files[f"{file}.csv"] = csv_text(columns, unit_comments(table))
     if result.films:
         files["refined.csv"] = _refined(result)
     if np.isfinite(result.photo_cofactors).any():
@@ -71,12 +71,8 @@ def excel_file(result: Result) -> bytes:
     tables = {file: TABLES[kind](result) for file, kind in _TABLES.items()}
     sheets = {file: frame(table) for file, table in tables.items()}
     filled = {file: columns for file, columns in sheets.items() if len(next(iter(columns.values())))}
-    notes = {file: "; ".join(_units(tables[file])) for file in filled}
+    notes = {file: "; ".join(unit_comments(tables[file])) for file in filled}
     return workbook(filled, {file: note for file, note in notes.items() if note})
-
-
-def _units(table: Table) -> list[str]:
-    return [f"unit of {', '.join(names)}: {unit}" for unit, names in units(table).items()]
 
 
 def _refined(result: Result) -> bytes:

@@ -21,6 +21,3 @@ __all__ = [
 ]
 
 check_arguments(globals(), set(__all__) - {"Cycle", "PerspectiveCenter", "Run", "Stop"})
-
-WAYS = {"findings_of": ("report",), "page_of": ("page",)}
-"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

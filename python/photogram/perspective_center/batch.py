@@ -11,7 +11,8 @@ from photogram.messages import Message
 from photogram.perspective_center.deck import Deck
 from photogram.perspective_center.grid import Grid, joined
 from photogram.perspective_center.solution import PerspectiveCenter, Weights, determine
-from photogram.show.methods import Paged
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Judgement
 from photogram.show.summary import Brief
 
 __all__ = ["Run", "Stop", "run_deck"]
@@ -38,7 +39,7 @@ class Stop:
 
 
 @dataclass(repr=False)
-class Run(Paged, Brief):
+class Run(Documented, Brief):
     """What a run through a deck gave.
 
     Attributes
@@ -59,6 +60,14 @@ class Run(Paged, Brief):
     def converged(self) -> bool:
         """Whether all sets of the deck were solved and converged."""
         return self.stop is None and all(result.converged for result in self.results)
+
+    def document(self) -> Document:
+        """Return the document of the run: each set is a layer of its sections."""
+        from photogram.perspective_center.document import run_document
+
+        stop = self.stop
+        end = None if stop is None else Judgement("Stopped", str(stop.error), (), "bad", f"set {stop.number}")
+        return run_document(self.results, self.messages, end)
 
 
 def run_deck(

@@ -7,175 +7,142 @@ record begins here with its second.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from typing import Any
 
 import fortranformat
 import numpy as np
 
 from photogram.errors import RankError
-from photogram.perspective_center.batch import Run, Stop
+from photogram.perspective_center.batch import Run
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
-from photogram.perspective_center.solution import INTERIOR, SINGULAR, PerspectiveCenter
+from photogram.perspective_center.solution import INTERIOR, NOT_CONVERGED, SINGULAR, PerspectiveCenter
 
-NEW_PAGE = "\f"
-NOT_CONVERGED = "SORRY - SOLUTION DOES NOT CONVERGE"
+_FIRST = "\f                                            PERSPECTIVE CENTER DETERMINATION\n\n    {}\n"
+_FURTHER = "\fDATA SET{:3d}\n"
+_CORRECTED = "\n     COORDINATOGRAPH ERRORS CORRECTED\n"
+_INPUT = """
+     THE NUMBER OF POINTS USED ON THIS PLATE IS{:4d}
+    THE ASSUMED PRINCIPAL DISTANCE USED IN THESE COMPUTATIONS IS{:15.3}
+
+     COORDINATES OF INPUT DATA
+        NO. OF      CALIBRATED GRID COORD            PROJECTED GRID COORDINATES
+PT NO READINGS           X           Y      MEAN X  X STD DEV      MEAN Y  Y STD DEV          Z
+"""
+_POINT = "{!s:>5}{:9d}{:12.3}{:12.3}{:12.3}{:11.3}{:12.3}{:11.3}{:11.3}\n"
+_ITERATIONS = (
+    "\nITER         X          Y          Z        DX        DY        DZ     OMEGA       PHI     KAPPA\n"
+)
+_CYCLE = "{:3d}{:11.2}{:11.2}{:11.2}" + 6 * "{:10.4}" + "\n"
+_START = "  0{:11.2}{:11.2}{:11.2}" + 30 * " " + 3 * "{:10.4}" + "\n"
+_SHORT = "\n     WITH THIS ITERATION THE SQUARE ROOT OF DX2+DY2+DZ2 IS LESS THAN{:10.3}\n"
+_NEGLIGIBLE = "\n     THE CORRECTIONS ARE A NEGLIGIBLE PART OF THE STANDARD ERRORS\n"
+_POSITION = """
+             COORDINATES OF THE PERSPECTIVE CENTER
+
+          X          Y          Z
+   {:11.2}{:11.2}{:11.2}
+\f                                          STEREOPLOTTER CALIBRATION INFORMATION
+"""
+_RESIDUALS = """
+     RESIDUAL AND DISTORTION VALUES
+
+POINT  PROJECTED            PROJECTED                 OBSERVED        FIXED          RADIAL
+ NO.       X          VX        Y          VY            RADIUS        RADIUS        DISTORTION
+"""
+_RESIDUAL = "{!s:>4}{:12.3}{:9.3}{:12.3}{:9.3}     {:9.3}     {:9.3}     {:9.3}\n"
+_UNIT_WEIGHT = """
+ STANDARD ERROR OF UNIT WEIGHT OF PLATE GRID COORDINATES ={:8.5}
+
+     VARIANCE-COVARIANCE MATRIX
+"""
 _MATRIX_ROW = fortranformat.FortranRecordWriter("(I3,3X,9D15.8)")
+_ERRORS = """
+ STANDARD ERRORS OF THE PERSPECTIVE CENTER PARAMETERS
+
+             X COORDINATE ={:8.5}
+             Y COORDINATE ={:8.5}
+             Z COORDINATE ={:8.5}
+             OMEGA (MINUTES) ={:8.5}
+             PHI (MINUTES) ={:8.5}
+             KAPPA (MINUTES) ={:8.5}
+             STANDARD ERROR OF PROJECTED COORDINATES IN THE MODEL SPACE ={:8.5}
+"""
+_VALUE = "             {} ={:11.5}{:11.5}\n"
+_DETERMINED = "\n INTERIOR THAT WAS DETERMINED, AND ITS STANDARD ERRORS\n\n"
 _INTERIOR = {"c": "PRINCIPAL DISTANCE (MM)", "xp": "PRINCIPAL POINT X (MM)", "yp": "PRINCIPAL POINT Y (MM)"}
 
 
 def listing(run: Run) -> str:
     """Return the listing of a run: pages begin with a form feed, lines end with a newline.
 
-    Where there is no redundancy, the items that divide by the degrees of freedom say so instead.
+    Without redundancy, a sentence replaces the items that divide by the degrees of freedom.
     """
-    lines = []
-    for result in run.results:
-        lines += _head(result.grid.title, result.grid.number)
-        lines += [*_input(result.grid), *_iteration(result), *_residuals(result), *_errors(result)]
-    if run.stop is not None:
-        lines += _stop(run.stop)
-    return "".join(f"{line}\n" for line in lines)
-
-
-def _head(title: str | None, number: int) -> list[str]:
-    """Items 1 and 11: the title on the first set of a job, the number on the others."""
-    if number > 1:
-        return [f"{NEW_PAGE}DATA SET{number:3d}"]
-    return [f"{NEW_PAGE}{'':44}PERSPECTIVE CENTER DETERMINATION", "", f"{'':4}{title or ''}"]
-
-
-def _input(grid: Grid) -> list[str]:
-    """Items 2 to 4, and line 0 of item 5."""
-    lines = ["", f"{'':5}COORDINATOGRAPH ERRORS CORRECTED"] if grid.corrected else []
-    lines += [
-        "",
-        f"{'':5}THE NUMBER OF POINTS USED ON THIS PLATE IS{len(grid.ids):4d}",
-        f"{'':4}THE ASSUMED PRINCIPAL DISTANCE USED IN THESE COMPUTATIONS IS"
-        f"{_f(grid.principal_distance, 15)}",
-        "",
-        f"{'':5}COORDINATES OF INPUT DATA",
-        f"{'':8}NO. OF{'CALIBRATED GRID COORD':>27}{'PROJECTED GRID COORDINATES':>38}",
-        "PT NO READINGS"
-        f"{'X':>12}{'Y':>12}{'MEAN X':>12}{'X STD DEV':>11}{'MEAN Y':>12}{'Y STD DEV':>11}{'Z':>11}",
-    ]
-    rows = zip(grid.ids, grid.readings, grid.plate_xy, grid.model, grid.reading_sd, strict=True)
-    for name, readings, (x, y), (mean_x, mean_y, z), (sd_x, sd_y) in rows:
-        lines.append(
-            f"{name!s:>5}{readings:9d}{_f(x, 12)}{_f(y, 12)}{_f(mean_x, 12)}{_f(sd_x, 11)}{_f(mean_y, 12)}"
-            f"{_f(sd_y, 11)}{_f(z, 11)}"
-        )
-    heads = "".join(f"{name:>10}" for name in ("DX", "DY", "DZ", "OMEGA", "PHI", "KAPPA"))
-    lines += ["", f"ITER{'X':>10}{'Y':>11}{'Z':>11}{heads}"]
-    if grid.initial is not None:
-        lines.append(
-            f"  0{_f(grid.initial[:3], 11, 2)}{'':30}{_f(grid.initial[3:] * MINUTES_PER_RADIAN, 10, 4)}"
-        )
-    return lines
-
-
-def _iteration(result: PerspectiveCenter) -> list[str]:
-    """Items 5 and 6."""
-    lines = [
-        f"{number:3d}{_f(cycle.position, 11, 2)}{_f(cycle.correction, 10, 4)}"
-        f"{_f(cycle.attitude_minutes, 10, 4)}"
-        for number, cycle in enumerate(result.cycles, 1)
-    ]
-    if not result.converged:
-        return [*lines, "", NOT_CONVERGED]
-    if result.as_published:
-        lines += [
-            "",
-            f"{'':5}WITH THIS ITERATION THE SQUARE ROOT OF DX2+DY2+DZ2 IS LESS THAN"
-            f"{_f(result.grid.tolerance, 10)}",
-        ]
-    else:
-        lines += ["", f"{'':5}THE CORRECTIONS ARE A NEGLIGIBLE PART OF THE STANDARD ERRORS"]
-    return [
-        *lines,
-        "",
-        f"{'':13}COORDINATES OF THE PERSPECTIVE CENTER",
-        "",
-        f"{'X':>11}{'Y':>11}{'Z':>11}",
-        f"{'':3}{_f(result.position, 11, 2)}",
-        f"{NEW_PAGE}{'':42}STEREOPLOTTER CALIBRATION INFORMATION",
-    ]
-
-
-def _residuals(result: PerspectiveCenter) -> list[str]:
-    """Item 7."""
-    lines = [
-        "",
-        f"{'':5}RESIDUAL AND DISTORTION VALUES",
-        "",
-        f"POINT{'PROJECTED':>11}{'PROJECTED':>21}{'OBSERVED':>25}{'FIXED':>13}{'RADIAL':>16}",
-        f" NO.{'X':>8}{'VX':>12}{'Y':>9}{'VY':>12}{'RADIUS':>18}{'RADIUS':>14}{'DISTORTION':>18}",
-    ]
-    rows = zip(
-        result.grid.ids,
-        result.projected,
-        result.residual,
-        np.column_stack([result.observed_radius, result.fixed_radius, result.radial_distortion]),
-        strict=True,
+    text = "".join(
+        _head(each.grid.title, each.grid.number) + _input(each.grid) + _solution(each) for each in run.results
     )
-    for name, (x, y), (vx, vy), radii in rows:
-        on_plate = "".join(f"{_f(value, 9)}{'':5}" for value in radii).rstrip()
-        lines.append(f"{name!s:>4}{_f(x, 12)}{_f(vx, 9)}{_f(y, 12)}{_f(vy, 9)}{'':5}{on_plate}")
-    return lines
+    if (stop := run.stop) is None:
+        return text
+    text += "" if stop.title is None else _head(stop.title, stop.number)
+    text += "" if stop.grid is None else _input(stop.grid)
+    error = SINGULAR if isinstance(stop.error, RankError) else getattr(stop.error, "message", str(stop.error))
+    return f"{text}\n     {error}\n"
 
 
-def _errors(result: PerspectiveCenter) -> list[str]:
-    """Items 8 to 10."""
-    covariance, errors = result.covariance, result.standard_errors
-    if covariance is None or errors is None or result.sigma0_plate is None or result.sigma0_model is None:
-        return ["", " NO REDUNDANCY - THERE ARE NO STANDARD ERRORS"]
-    names = ["X COORDINATE", "Y COORDINATE", "Z COORDINATE"]
-    names += ["OMEGA (MINUTES)", "PHI (MINUTES)", "KAPPA (MINUTES)"]
-    names.append("STANDARD ERROR OF PROJECTED COORDINATES IN THE MODEL SPACE")
-    return [
-        "",
-        f" STANDARD ERROR OF UNIT WEIGHT OF PLATE GRID COORDINATES ={_f(result.sigma0_plate, 8, 5)}",
-        "",
-        f"{'':5}VARIANCE-COVARIANCE MATRIX",
-        *(_MATRIX_ROW.write([number, *row.tolist()]) for number, row in enumerate(covariance, 1)),
-        "",
-        " STANDARD ERRORS OF THE PERSPECTIVE CENTER PARAMETERS",
-        "",
-        *(
-            f"{'':13}{name} ={_f(value, 8, 5)}"
-            for name, value in zip(names, [*errors, result.sigma0_model], strict=True)
-        ),
-        *_interior(result),
-    ]
+def _head(title: str | None, number: int) -> str:
+    """Items 1 and 11: the title on the first set of a job, the number on the others."""
+    return _FURTHER.format(number) if number > 1 else _FIRST.format(title or "")
 
 
-def _interior(result: PerspectiveCenter) -> list[str]:
-    """Say what of the interior, which the program holds, was unknown, with its standard errors."""
-    if result.interior_errors is None or not result.unknown:
-        return []
-    values = dict(zip(INTERIOR, result.interior.tolist(), strict=True))
-    return [
-        "",
-        " INTERIOR THAT WAS DETERMINED, AND ITS STANDARD ERRORS",
-        "",
-        *(
-            f"{'':13}{_INTERIOR[name]} ={_f(values[name], 11, 5)}{_f(error, 11, 5)}"
-            for name, error in zip(result.unknown, result.interior_errors.tolist(), strict=True)
-        ),
-    ]
+def _input(grid: Grid) -> str:
+    """Items 2 to 4, and line 0 of item 5."""
+    (x, y, z), (sd_x, sd_y) = grid.model.T, grid.reading_sd.T
+    text = (_CORRECTED if grid.corrected else "") + _written(_INPUT, len(grid.ids), grid.principal_distance)
+    text += _rows(_POINT, grid.ids, grid.readings, grid.plate_xy, x, sd_x, y, sd_y, z) + _ITERATIONS
+    if grid.initial is None:
+        return text
+    return text + _written(_START, grid.initial[:3], grid.initial[3:] * MINUTES_PER_RADIAN)
 
 
-def _stop(stop: Stop) -> list[str]:
-    """Return what was printed before the program stopped, and its message."""
-    error = stop.error
-    text = SINGULAR if isinstance(error, RankError) else getattr(error, "message", str(error))
-    lines = _head(stop.title, stop.number) if stop.title is not None else []
-    return [*lines, *(_input(stop.grid) if stop.grid is not None else []), "", f"{'':5}{text}"]
+def _solution(result: PerspectiveCenter) -> str:
+    """Items 5 to 10."""
+    cycles = enumerate(result.cycles, 1)
+    text = "".join(
+        _written(_CYCLE, k, each.position, each.correction, each.attitude_minutes) for k, each in cycles
+    )
+    if not result.converged:
+        text += f"\n{NOT_CONVERGED}\n"
+    else:
+        text += _written(_SHORT, result.grid.tolerance) if result.as_published else _NEGLIGIBLE
+        text += _written(_POSITION, result.position)
+    (x, y), (vx, vy) = result.projected.T, result.residual.T
+    radii = result.observed_radius, result.fixed_radius, result.radial_distortion
+    text += _RESIDUALS + _rows(_RESIDUAL, result.grid.ids, x, vx, y, vy, *radii)
+    covariance, errors = result.covariance, result.interior_errors
+    if covariance is None or errors is None:
+        return f"{text}\n NO REDUNDANCY - THERE ARE NO STANDARD ERRORS\n"
+    text += _written(_UNIT_WEIGHT, result.sigma0_plate)
+    text += "".join(f"{_MATRIX_ROW.write([k, *row.tolist()])}\n" for k, row in enumerate(covariance, 1))
+    text += _written(_ERRORS, result.standard_errors, result.sigma0_model)
+    names = [_INTERIOR[name] for name in result.unknown]
+    values = result.interior[[INTERIOR.index(name) for name in result.unknown]]
+    return text + (_DETERMINED if names else "") + _rows(_VALUE, names, values, errors)
 
 
-def _f(values: float | np.floating | Sequence[float] | np.ndarray, width: int, decimals: int = 3) -> str:
-    """Write numbers as IBM's Fw.d did: an exact zero is 0.0, a small negative number keeps its sign."""
-    text = ""
-    for value in np.atleast_1d(values):
-        number = f"{'0.0' if value == 0 else f'{value:.{decimals}f}':>{width}}"
-        text += number if len(number) == width else "*" * width
-    return text
+def _rows(form: str, *columns: Iterable[Any]) -> str:
+    return "".join(_written(form, *row) for row in zip(*columns, strict=True))
+
+
+def _written(form: str, *values: Any) -> str:
+    """Fill a form with numbers, arrays and names."""
+    flat = [one for each in values for one in (each.tolist() if isinstance(each, np.ndarray) else [each])]
+    return form.format(*(_Fixed(one) if isinstance(one, float) else one for one in flat))
+
+
+class _Fixed(float):
+    """A number in the form of IBM's Fw.d: 0.0 for an exact zero, stars for a number that is too long."""
+
+    def __format__(self, form: str) -> str:
+        width, decimals = map(int, form.split("."))
+        text = "0.0" if not self else f"{float(self):.{decimals}f}"
+        return f"{text:>{width}}" if len(text) <= width else "*" * width

@@ -26,7 +26,9 @@ from photogram.network.geometry import rotation_matrix
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid, single
 from photogram.show.methods import Judged
 from photogram.show.summary import Brief
+from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import externally_studentized, studentized_limit
+from photogram.statistics.reliability import ROUNDING, TESTABLE
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
 
@@ -39,14 +41,13 @@ STRICT_FRACTION = 1e-9
 """Of the standard deviations of the unknowns for a unit weight of a millimetre: far below those of a real
 plate."""
 SINGULAR = "NORMAL EQUATIONS MATRIX IS SINGULAR"
+NOT_CONVERGED = "SORRY - SOLUTION DOES NOT CONVERGE"
 REPORT_ORDER = [3, 4, 5, 0, 1, 2]
 """Omega, phi, kappa before X, Y, Z."""
 INTERIOR = ("c", "xp", "yp")
 """Principal distance and principal point."""
 STEEPEST = 1e-10
 """Ratio of singular values of scaled columns below which they are dependent."""
-TESTABLE = 1e-10
-"""A redundancy number below this is the rounding error of zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +165,16 @@ class PerspectiveCenter(Judged, Brief):
     def interior_errors(self) -> Floats | None:
         """(k,) standard errors of what was determined of the interior, mm; None without redundancy."""
         return None if self.covariance is None else np.sqrt(np.diagonal(self.covariance)[6:])
+
+    def _findings(self) -> Findings:
+        """Return the tests: residuals are tested by t, since no standard deviation is given."""
+        freedom, status = self.degrees_of_freedom, "converged" if self.converged else "not converged"
+        values = np.where(self.redundancy >= TESTABLE, self.studentized, np.nan)
+        names = [[f"{axis} of point {name}" for axis in "XY"] for name in self.grid.ids]
+        kind, second = "readings of the grid", max(freedom - 1, 1)
+        tests = [Tested(kind, values, lambda at: names[at[0]][at[1]], "t", second=second)]
+        why = "no standard deviations are given"
+        return Findings(status=status, observations=tests, degrees_of_freedom=freedom, untested=why)
 
 
 def determine(
@@ -497,4 +508,4 @@ def _tests(
     turned = [to_model @ each @ to_model.transpose(0, 2, 1) for each in (residuals, observed)]
     of_residuals, of_observed = (np.diagonal(each, axis1=1, axis2=2) for each in turned)
     redundancy: Floats = of_residuals / of_observed
-    return redundancy, residual / np.sqrt(np.where(redundancy > TESTABLE, of_residuals, np.nan))
+    return redundancy, residual / np.sqrt(np.where(redundancy > ROUNDING, of_residuals, np.nan))

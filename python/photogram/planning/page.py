@@ -15,11 +15,11 @@ from photogram.show.judgement import remarks_section
 from photogram.show.methods import page_of
 from photogram.show.page import (
     Column,
+    Document,
     Drawing,
     Fact,
     Judgement,
     Layers,
-    Page,
     Part,
     Row,
     Section,
@@ -32,7 +32,7 @@ NOTICED = 1.05
 
 
 @page_of.register(Plan)
-def plan_page(made: Plan) -> Page:
+def plan_page(made: Plan) -> Document:
     """Return the report of a plan for the browser."""
     patterns = made.patterns
     drawn = [_drawing(patterns)] if any(pattern.new_points.any() for pattern in patterns) else []
@@ -46,7 +46,7 @@ def plan_page(made: Plan) -> Page:
         _layers("control", "Control", patterns, _control, _CONTROL),
         remarks_section(remarks(patterns)),
     ]
-    return Page(
+    return Document(
         what="Prediction of a network before it is flown",
         title=patterns[0].block.title,
         judgements=[_judgement(patterns)],

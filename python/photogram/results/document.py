@@ -19,7 +19,7 @@ from photogram.results.result import Result
 from photogram.results.tables import camera_parameters, check_points, observations
 from photogram.results.weakest import weakest_photos, weakest_points
 from photogram.show.methods import document_of
-from photogram.show.quantity import Quantity, Table, chosen, members, records
+from photogram.show.quantity import Quantities, Quantity, chosen, members, records
 
 
 @document_of.register(Result)
@@ -28,7 +28,7 @@ def to_json(result: Result) -> bytes:
     return json.to_json(block_members(result))
 
 
-def network_members(result: AdjustedNetwork, photo_members: Table = ()) -> dict[str, Any]:
+def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> dict[str, Any]:
     """Return what the documents of all networks have, with more members of photos."""
     summary = result.reliability_summary
     called = int if terms_of(result).identity == "number" else str

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.results.iteration import Iteration
 from photogram.show.lines import field, table_lines
-from photogram.show.quantity import Quantity, Table
+from photogram.show.quantity import Quantities, Quantity
 
 
 def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
@@ -24,7 +24,7 @@ def iteration_table(iterations: Sequence[Iteration], start: float | None = None)
     ]
 
 
-def iteration_lines(table: Table, form: str) -> list[str]:
+def iteration_lines(table: Quantities, form: str) -> list[str]:
     """Return the iterations as text, sums of squares in a form."""
     number, squares, change, damping = table
     return table_lines(

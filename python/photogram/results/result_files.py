@@ -26,7 +26,7 @@ from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.frame import Frame
 from photogram.results.network import AdjustedNetwork
-from photogram.show.quantity import Table
+from photogram.show.quantity import Quantities
 
 FORMAT = 2
 SUMMARY = "summary.json"
@@ -211,7 +211,7 @@ _RENAMED = {"standardized": "test", "d": "difference"}
 """What is called otherwise in Parquet."""
 
 
-def sheet(table: Table) -> list[Column]:
+def sheet(table: Quantities) -> list[Column]:
     """Return the columns of Parquet: angles in radians, names in small letters, units beside them."""
     found = []
     for each in table:

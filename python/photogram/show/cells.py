@@ -6,14 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
+from photogram.show import quantity
 from photogram.show.lines import degrees_written, unit_of
 from photogram.show.page import Cell, Column, Table, decimals_of, fixed, significant
-from photogram.show.quantity import Axis, Quantity, long
-from photogram.show.quantity import Table as Quantities
+from photogram.show.quantity import Axis, Quantities, Quantity, long
 
 LISTED = 120
 """Rows of a table with a row for each component at most."""
@@ -47,6 +48,13 @@ def page_table(caption: str, table: Quantities, note: str = "", by: Floats | Non
     written = [pair for each in table if each.head for pair in _columns(each, by)]
     rows = zip(*(cells for _, cells in written), strict=True)
     return Table(caption, [column for column, _ in written], [*rows], note)
+
+
+def written(part: Any) -> Any:
+    """Return a part of a document; a declared table becomes a table of cells."""
+    if isinstance(part, quantity.Table):
+        return page_table(part.title, part.columns, part.note, part.deviations)
+    return part
 
 
 def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Written]]]:

@@ -11,9 +11,8 @@ import numpy as np
 from photogram.show.cells import page_table, unit_written
 from photogram.show.judgement import judged, tests_section
 from photogram.show.lines import Field, field, table_lines
-from photogram.show.page import Drawing, Fact, Page, Part, Section, Table, decimals_of
-from photogram.show.quantity import Axis, Quantity, component, members, of_each, records
-from photogram.show.quantity import Table as Quantities
+from photogram.show.page import Document, Drawing, Fact, Part, Section, Table, decimals_of
+from photogram.show.quantity import Axis, Quantities, Quantity, component, members, of_each, records
 from photogram.show.sketch.declared import Panel, Sketch, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers, Segments, error_bars
 from photogram.show.style import FAINT, INK, MARKED
@@ -90,7 +89,7 @@ def history_page(
     *,
     intro: str = "",
     more: Sequence[Section] = (),
-) -> Page:
+) -> Document:
     """Return the page of calibrations in the order of their days, with what changed and `more` sections."""
     days = next(each.values for each in calibrations if each.member == "day")
     named = histories.items()
@@ -102,7 +101,7 @@ def history_page(
         Section("values", "All values", [values_table(own, name) for name, own in named]),
         tests_section(verdict),
     ]
-    return Page(
+    return Document(
         what=what,
         title=f"{len(days)} calibrations, {days[0]} to {days[-1]}",
         judgements=[judged(verdict)],

@@ -10,7 +10,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
-from photogram.show.page import Cell, Column, Drawing, Layers, Page, Part, Picture, Section, Table
+from photogram.show.cells import written
+from photogram.show.page import Cell, Column, Document, Drawing, Layers, Part, Picture, Section, Table
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -20,7 +21,7 @@ LONG = 16
 """Characters of a word that a table may break; shorter ones give the least width of their column."""
 
 
-def page_html(page: Page) -> bytes:
+def page_html(page: Document) -> bytes:
     """Return a page as an HTML file (UTF-8) that needs no network and no other file.
 
     It takes jinja2 (`pip install 'photogram[report]'`).
@@ -116,11 +117,11 @@ def _drawn(section: Section) -> Section:
         if isinstance(part, Drawing):
             parts += [found] if (found := inlined(part)) else []
         elif isinstance(part, Layers):
-            layers = [inlined(each) if isinstance(each, Drawing) else each for each in part.parts]
+            layers = [inlined(each) if isinstance(each, Drawing) else written(each) for each in part.parts]
             own = [each for each in layers if each is not None]
             parts += own if len(own) < 2 else [Layers(part.name, own)]
         else:
-            parts.append(part)
+            parts.append(written(part))
     return replace(section, parts=parts)
 
 

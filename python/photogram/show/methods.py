@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Generic, NoReturn, ParamSpec, T
 if TYPE_CHECKING:
     import pandas as pd
 
-    from photogram.show.page import Page
+    from photogram.show.page import Document
     from photogram.statistics.findings import Findings
     from photogram.statistics.verdict import Verdict
 
@@ -98,9 +98,11 @@ def axes_of(result: object, ax: Any = None) -> Any:
 
 
 @Way
-def page_of(result: object) -> Page:
-    """Return the report of a result for the browser, without its last section."""
-    _undefined(result, "page")
+def page_of(result: object) -> Document:
+    """Return the document of a result: its own, or what is defined for its class."""
+    if not isinstance(result, Documented):
+        _undefined(result, "page")
+    return result.document()
 
 
 @Way
@@ -127,7 +129,10 @@ class Judged:
         """Whether the result can be used, and if not, what is wrong; see `docs/tests.md`."""
         from photogram.statistics.verdict import verdict  # what is only adjusted is not judged
 
-        return verdict(findings_of(self))
+        return verdict(self._findings())
+
+    def _findings(self) -> Findings:
+        return findings_of(self)
 
 
 class Paged:
@@ -143,6 +148,20 @@ class Paged:
 
         page = page_of(self)
         return page_html(page.with_sections(reproducibility(None, page.phases)))
+
+
+class Documented(Paged):
+    """A result that is one document, from which all its forms are written."""
+
+    def document(self) -> Document:
+        """Return the document: judgement, sections, tables."""
+        raise NotImplementedError
+
+    def to_json(self) -> bytes:
+        """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
+        from photogram.show.forms import to_json
+
+        return to_json(self.document())
 
 
 class Shown(Judged, Paged):

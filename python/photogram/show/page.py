@@ -1,18 +1,20 @@
-"""What a report for the browser consists of: one page of sections with tables, figures and facts.
+"""What a document consists of: a judgement, and sections with tables, figures and facts.
 
-Programs fill these classes from their results; `show.html` makes the file. None of them knows HTML.
+Programs compose documents from their results and know no HTML; `show.html`, `show.pdf` and `show.forms` write
+documents.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.show import quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -193,7 +195,7 @@ class Layers:
     """Parts of which one is shown at a time: all of them on paper, and where no script runs."""
 
     name: str
-    parts: Sequence[Drawing | Picture | Table]
+    parts: Sequence[Drawing | Picture | Table | quantity.Table]
     kind: str = field(default="layers", init=False)
 
     def titles(self) -> list[str]:
@@ -218,18 +220,23 @@ class Remarks:
     kind: str = field(default="remarks", init=False)
 
 
-Part = Table | Facts | Drawing | Picture | Layers | Text | Remarks
+Part = Table | quantity.Table | Facts | Drawing | Picture | Layers | Text | Remarks
 
 
 @dataclass(frozen=True)
 class Section:
     """A section; one without parts is left out. An annex begins on a sheet of its own."""
 
-    id: str
+    key: str
     title: str
     parts: Sequence[Part]
     intro: str = ""
     annex: bool = False
+
+    @classmethod
+    def of(cls, table: quantity.Table) -> Section:
+        """Return a section that consists of a table."""
+        return cls(table.key, table.title, [table], table.about)
 
 
 @dataclass(frozen=True)
@@ -256,8 +263,8 @@ class Judgement:
 
 
 @dataclass(frozen=True)
-class Page:
-    """A report.
+class Document:
+    """What people and programs read of a result: its report, and its JSON document.
 
     Attributes
     ----------
@@ -271,6 +278,8 @@ class Page:
         Few figures that a reader wants first.
     sections
         The others.
+    members
+        Of the JSON document, beside the tables.
     phases
         Seconds that the engine spent in its phases.
     head
@@ -286,6 +295,7 @@ class Page:
     advice: Sequence[str]
     highlights: Sequence[Fact]
     sections: Sequence[Section]
+    members: Mapping[str, object] = field(default_factory=dict)
     phases: Mapping[str, float] = field(default_factory=dict)
     head: Sequence[Fact] = ()
     language: str = "en"
@@ -293,9 +303,37 @@ class Page:
     contents: str = "Sections"
     more: str = "{} more"
 
-    def with_sections(self, *more: Section) -> Page:
+    def with_sections(self, *more: Section) -> Document:
         """Return the page with more sections at its end."""
         return replace(self, sections=[*self.sections, *more])
+
+    def tables(self) -> list[quantity.Table]:
+        """Return the tables of all sections, without those in layers."""
+        parts = (part for section in self.sections for part in section.parts)
+        return [part for part in parts if isinstance(part, quantity.Table)]
+
+
+def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:
+    """Return one document of several with the same tables: tables of one key are layers of a section.
+
+    Layers, judgements and highlights have the titles of their documents, `more` are further fields.
+    """
+    sections, titles = [], [document.title for document in documents]
+    for tables in zip(*(document.tables() for document in documents), strict=True):
+        layers = [replace(table, title=name) for table, name in zip(tables, titles, strict=True)]
+        key, about = tables[0].key, tables[0].about
+        sections.append(Section(key, tables[0].title, [Layers(f"{key}-layers", layers)], about))
+    return Document(
+        what,
+        title,
+        judgements=[replace(one, on=part.title) for part in documents for one in part.judgements],
+        advice=list(dict.fromkeys(sentence for part in documents for sentence in part.advice)),
+        highlights=[
+            replace(fact, name=f"{fact.name}, {part.title}") for part in documents for fact in part.highlights
+        ],
+        sections=sections,
+        **more,
+    )
 
 
 def fixed(value: float, decimals: int) -> str:

@@ -22,7 +22,8 @@ from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import BaseDocTemplate, Frame, LongTable, PageBreak, PageTemplate, Paragraph, Spacer
 from reportlab.platypus import Table as Grid
 
-from photogram.show.page import Drawing, Facts, Judgement, Layers, Page, Part, Remarks, Section, Table, Text
+from photogram.show.cells import written
+from photogram.show.page import Document, Drawing, Facts, Judgement, Layers, Remarks, Section, Table, Text
 from photogram.show.style import styled
 from photogram.show.vectors import FigureFlowable
 
@@ -46,7 +47,7 @@ HIGHEST, FRONT = 300.0, 215.0
 """Points of a picture, and of one before the annexes."""
 
 
-def page_pdf(page: Page, *, author: str = "") -> bytes:
+def page_pdf(page: Document, *, author: str = "") -> bytes:
     """Return a page as a PDF document."""
     _fonts(Path(mpl.get_data_path()) / "fonts" / "ttf")
     content = io.BytesIO()
@@ -76,7 +77,7 @@ def _fonts(folder: Path) -> None:
     registerFontFamily(FONT, normal=FONT, bold=BOLD, italic=FONT, boldItalic=BOLD)
 
 
-def _foot(page: Page) -> Any:
+def _foot(page: Document) -> Any:
     def draw(canvas: Any, document: Any) -> None:
         canvas.saveState()
         canvas.setFont(FONT, 7)
@@ -126,7 +127,7 @@ def _heading(text: str, style: Any, key: str) -> Paragraph:
 class _Flow:
     """The page as what flows over sheets."""
 
-    def __init__(self, page: Page, width: float) -> None:
+    def __init__(self, page: Document, width: float) -> None:
         self._page, self._width, self._front = page, width, True
 
         def style(size: float, **more: Any) -> Any:
@@ -185,7 +186,7 @@ class _Flow:
         if not section.parts:
             return
         if section.title:
-            yield _heading(escape(section.title), self._head, section.id)
+            yield _heading(escape(section.title), self._head, section.key)
         if section.intro:
             yield Paragraph(escape(section.intro), self._small)
         if self._front and [type(part) for part in section.parts] == [Remarks, Drawing]:
@@ -207,7 +208,8 @@ class _Flow:
         grid.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), *nothing])
         return grid
 
-    def _part(self, part: Part, within: str) -> Iterator[Any]:
+    def _part(self, part: Any, within: str) -> Iterator[Any]:
+        part = written(part)
         if isinstance(part, Table):
             yield from self._table(part, within)
         elif isinstance(part, Facts):

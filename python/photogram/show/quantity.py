@@ -9,13 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from operator import attrgetter
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.angles import ARCSEC
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Kind = Literal["value", "deviation", "difference", "number", "name"]
 
@@ -143,8 +147,30 @@ class Quantity:
         return values
 
 
-Table = Sequence[Quantity]
+Quantities = Sequence[Quantity]
 """Quantities of the same things."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of a result, declared once: all forms of a document are written from it."""
+
+    key: str  # name in JSON documents, and key of its section
+    title: str
+    columns: Quantities
+    note: str = ""  # a remark on this table
+    about: str = ""  # the meaning of the columns
+    deviations: Floats | None = None  # (n,) or (n, k): the decimals of values follow from them
+
+    def frame(self) -> pd.DataFrame:
+        """Return the columns that have a name as a data frame."""
+        import pandas as pd
+
+        return pd.DataFrame(frame(self.columns))
+
+    def csv(self) -> bytes:
+        """Return the columns that have a name as text of commas, below their units."""
+        return csv_text(frame(self.columns), unit_comments(self.columns))
 
 
 def of_each(
@@ -156,12 +182,19 @@ def of_each(
     return Quantity(values, axes, kind, **{"member": attribute, **more})
 
 
-def labelled(table: Table, label: str) -> Quantity:
+def attribute(
+    thing: object, name: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
+) -> Quantity:
+    """Return an attribute of a result, an array with n rows, as a quantity with the name of the attribute."""
+    return Quantity(attrgetter(name)(thing), axes, kind, **{"name": name, "member": name, **more})
+
+
+def labelled(table: Quantities, label: str) -> Quantity:
     """Return the quantity that has a label."""
     return next(each for each in table if each.label == label)
 
 
-def chosen(table: Table, rows: Indices) -> list[Quantity]:
+def chosen(table: Quantities, rows: Indices) -> list[Quantity]:
     """Return the table of some of its things."""
     return [
         replace(
@@ -180,7 +213,7 @@ def _picked(part: Any, places: Any) -> Any:
     return None if part is None else part[places]
 
 
-def long(table: Table, places: Indices) -> list[Quantity]:
+def long(table: Quantities, places: Indices) -> list[Quantity]:
     """Return a table with a row for each of some components: (r, 2) of which thing, and of which axis."""
     rows, axis = places[:, 0], places[:, 1]
     axes = next(each.axes for each in table if not each.single)
@@ -206,7 +239,7 @@ def component(axes: tuple[Axis, ...], of: Indices) -> list[Quantity]:
     ]
 
 
-def joined(tables: Sequence[Table]) -> list[Quantity]:
+def joined(tables: Sequence[Quantities]) -> list[Quantity]:
     """Return tables of the same quantities, one under the other."""
     found = []
     for parts in zip(*tables, strict=True):
@@ -220,12 +253,12 @@ def joined(tables: Sequence[Table]) -> list[Quantity]:
     return found
 
 
-def frame(table: Table) -> dict[str, Any]:
+def frame(table: Quantities) -> dict[str, Any]:
     """Return the columns of files and data frames: angles in degrees, names that say other units."""
     return {name: values for name, _, values in _columns(table)}
 
 
-def units(table: Table) -> dict[str, list[str]]:
+def units(table: Quantities) -> dict[str, list[str]]:
     """Return the names of the columns of `frame` by their units, if the names do not have the unit."""
     names: dict[str, list[str]] = {}
     for name, unit, _ in _columns(table):
@@ -234,7 +267,12 @@ def units(table: Table) -> dict[str, list[str]]:
     return names
 
 
-def _columns(table: Table) -> Iterator[tuple[str, str, Any]]:
+def unit_comments(table: Quantities) -> list[str]:
+    """Return a line for each unit of the columns of `frame`."""
+    return [f"unit of {', '.join(names)}: {unit}" for unit, names in units(table).items()]
+
+
+def _columns(table: Quantities) -> Iterator[tuple[str, str, Any]]:
     """Return the names of columns, their units without those in the names, and their values."""
     for each in table:
         if each.name is None:
@@ -258,7 +296,7 @@ def members(thing: object, *names: str, **others: str) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 
-def records(table: Table) -> list[dict[str, Any]]:
+def records(table: Quantities) -> list[dict[str, Any]]:
     """Return the rows of a JSON document: longitudes and latitudes in degrees, other angles in radians."""
     columns: dict[str, Any] = {}
     for each in table:

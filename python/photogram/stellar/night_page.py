@@ -12,10 +12,10 @@ from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
+    Document,
     Fact,
     Facts,
     Layers,
-    Page,
     Part,
     Row,
     Section,
@@ -45,7 +45,7 @@ LISTED = 200
 
 
 @page_of.register(CalibratedNight)
-def night_page(result: CalibratedNight) -> Page:
+def night_page(result: CalibratedNight) -> Document:
     """Return the report of a night for the browser."""
     much, good = facts(result)
     sections = [
@@ -65,7 +65,7 @@ def night_page(result: CalibratedNight) -> Page:
         tests_section(result.verdict),
         remarks_section(result.messages),
     ]
-    return Page(
+    return Document(
         what="Calibration of a camera by exposures of the sky",
         title=result.night.title,
         judgements=[judged(result.verdict)],

@@ -13,7 +13,7 @@ from photogram import _photocore
 from photogram.io import json
 from photogram.show.angles import ARCSEC
 from photogram.show.lines import Field, fact_lines, field, table_lines
-from photogram.show.quantity import Table, chosen, records
+from photogram.show.quantity import Quantities, chosen, records
 from photogram.show.sections import Section, composed, headline, problems_or_none, verdict_sections
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE, LensTest
 from photogram.stellar.night_result import CalibratedNight
@@ -268,7 +268,7 @@ def _correlations(result: CalibratedNight) -> list[str]:
     return lines
 
 
-def _images(table: Table) -> list[str]:
+def _images(table: Quantities) -> list[str]:
     exposures, stars_, xy, residuals, _, tests, probabilities = table
     return table_lines(
         [

@@ -13,11 +13,11 @@ from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
+    Document,
     Drawing,
     Fact,
     Facts,
     Layers,
-    Page,
     Part,
     Row,
     Section,
@@ -39,7 +39,7 @@ WORST = 25
 
 
 @page_of.register(Result)
-def plate_page(result: Result) -> Page:
+def plate_page(result: Result) -> Document:
     """Return the report of a plate for the browser."""
     sections = [
         Section(
@@ -56,7 +56,7 @@ def plate_page(result: Result) -> Page:
         Section("movement", "Movement of the camera", _movement(result), _MOVEMENT),
         remarks_section(result.messages),
     ]
-    return Page(
+    return Document(
         what="Calibration of a camera by a plate with stars",
         title=result.problem.labels.get("title", ""),
         judgements=[judged(result.verdict)],

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.show.cells import page_table
 from photogram.show.methods import page_of
-from photogram.show.page import Drawing, Fact, Facts, Layers, Page, Part, Remarks, Section
+from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.calibration_result import Calibrated, Worth
 from photogram.targets.drawing import cross_validation_sketch, difference_sketch, uncertainty_sketch
@@ -21,7 +21,7 @@ from photogram.targets.tables import board_facts, prior_shift, spline_lines, vie
 
 @page_of.register(Calibrated)
 @np.errstate(over="ignore", invalid="ignore")
-def calibration_page(calibrated: Calibrated) -> Page:
+def calibration_page(calibrated: Calibrated) -> Document:
     """Return the report of a calibration for the browser."""
     page = page_of(calibrated.snooped or calibrated.result)
     board: list[Part] = [Facts("The board", board_facts(calibrated))]

@@ -13,7 +13,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.show.cells import page_table
 from photogram.show.lines import field, table_lines
 from photogram.show.methods import document_of, page_of, report_of
-from photogram.show.page import Drawing, Judgement, Layers, Page, Section, Tone
+from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
 from photogram.show.quantity import Axis, Quantity, frame, records
 from photogram.show.sections import Section as Lines
 from photogram.show.sections import composed, headline
@@ -80,12 +80,12 @@ def views(plan: ViewPlan) -> list[Quantity]:
 
 
 @page_of.register(ViewPlan)
-def page(plan: ViewPlan) -> Page:
+def page(plan: ViewPlan) -> Document:
     """Return the plan for the browser."""
     worth = plan.calibrated.worth
     assert worth is not None
     tone: Tone = "good" if plan.need and plan.enough else "" if plan.enough else "bad"
-    return Page(
+    return Document(
         what="Plan of views of a board",
         title="",
         judgements=[Judgement("Plan", plan.headline, [NOTHING, *plan.assumed], tone)],

@@ -12,7 +12,7 @@ from photogram.show.cells import page_table
 from photogram.show.history import history_document, history_page, history_text
 from photogram.show.lines import field
 from photogram.show.methods import document_of, findings_of, page_of, report_of
-from photogram.show.page import Fact, Page, Section, significant
+from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity, of_each, records
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.history import changed_of, unchanged_of
@@ -157,7 +157,7 @@ def comparison_text(comparison: Comparison) -> str:
 
 
 @page_of.register(Comparison)
-def comparison_page(comparison: Comparison) -> Page:
+def comparison_page(comparison: Comparison) -> Document:
     """Return the report of a comparison for the browser."""
     grids = [
         page_table(f"Grid {plate}, {grid.adopted}", points(comparison, plate))

@@ -12,7 +12,7 @@ from photogram.io import json
 from photogram.show.history import history_document, history_page, history_text
 from photogram.show.lines import field
 from photogram.show.methods import document_of, findings_of, page_of, report_of
-from photogram.show.page import Fact, Page
+from photogram.show.page import Document, Fact
 from photogram.show.quantity import Axis, Quantity, records
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.history import changed_of, unchanged_of
@@ -99,7 +99,7 @@ def comparison_text(comparison: CameraComparison) -> str:
 
 
 @page_of.register(CameraComparison)
-def comparison_page(comparison: CameraComparison) -> Page:
+def comparison_page(comparison: CameraComparison) -> Document:
     """Return the report of a comparison for the browser."""
     return history_page(
         "Calibrations of cameras over years",

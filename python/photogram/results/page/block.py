@@ -25,11 +25,11 @@ from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
+    Document,
     Drawing,
     Fact,
     Facts,
     Layers,
-    Page,
     Part,
     Remarks,
     Row,
@@ -44,7 +44,7 @@ from photogram.show.page import (
 
 @page_of.register(Result)
 @np.errstate(over="ignore", invalid="ignore")
-def block_page(result: Result) -> Page:
+def block_page(result: Result) -> Document:
     """Return the report of an adjusted block for the browser."""
     pictures = drawings(result)
     given = [

@@ -12,17 +12,17 @@ from photogram.results.components_picture import components_sketch
 from photogram.results.snooping_result import LN10, Snooped, estimated_errors, rivals_of
 from photogram.show.judgement import judged
 from photogram.show.methods import page_of
-from photogram.show.page import Column, Drawing, Fact, Page, Part, Remarks, Section, Table
+from photogram.show.page import Column, Document, Drawing, Fact, Part, Remarks, Section, Table
 from photogram.statistics.snooping.log import Removal
 
 
 @page_of.register(VarianceComponents)
-def components_page(found: VarianceComponents) -> Page:
+def components_page(found: VarianceComponents) -> Document:
     """Return the page of the adjustment with the given weights, and what is wrong about these."""
     return weighed_page(found, page_of(found.first))
 
 
-def weighed_page(found: VarianceComponents, page: Page) -> Page:
+def weighed_page(found: VarianceComponents, page: Document) -> Document:
     """Return the page of the adjustment with the given weights, `page`, judged by the components."""
     return replace(
         page,
@@ -37,7 +37,7 @@ def components_section(found: VarianceComponents) -> Section:
     return Section("components", "Variance components", _parts(found), _INTRO)
 
 
-def reweighed_page(changes: Sequence[str], left: VarianceComponents | None, page: Page) -> Page:
+def reweighed_page(changes: Sequence[str], left: VarianceComponents | None, page: Document) -> Document:
     """Return the page of a network whose gross errors were taken out and weights estimated in turn.
 
     `changes` were made to the weights, `left` are the components of those that it has now, where they were
@@ -99,7 +99,7 @@ def _of_sd(factor: float) -> float:
 
 
 @page_of.register(Snooped)
-def snooped_page(found: Snooped) -> Page:
+def snooped_page(found: Snooped) -> Document:
     """Return the page of the network without what was taken out."""
     page = page_of(found.result)
     gone = Fact("Taken out", f"{len(found.removed)}", note=f"of {len(found.suspects)} groups of observations")

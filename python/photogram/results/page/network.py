@@ -21,10 +21,10 @@ from photogram.show.judgement import judged, remarks_section, verdict_table
 from photogram.show.page import (
     Cell,
     Column,
+    Document,
     Drawing,
     Fact,
     Facts,
-    Page,
     Part,
     Row,
     Section,
@@ -50,7 +50,7 @@ def network_page(
     beside: Sequence[Section] = (),
     datum: str = "",
     poses: str = "",
-) -> Page:
+) -> Document:
     """Return the page of a network: its number of `photos`, sections on its `size` and on what was `given`.
 
     `more` is what a reader wants first besides; `redundancy` stands beside the picture of redundancy numbers,
@@ -64,7 +64,7 @@ def network_page(
         " residual; the rest"
         " goes into the unknowns. Their sum is the number of observations beyond what is needed."
     )
-    return Page(
+    return Document(
         what=what,
         title=title,
         judgements=[judged(result.verdict)],

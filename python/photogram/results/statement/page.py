@@ -30,10 +30,10 @@ from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
+    Document,
     Drawing,
     Fact,
     Judgement,
-    Page,
     Part,
     Remarks,
     Row,
@@ -49,7 +49,7 @@ _CLASSES = {"h": "v", "plan": "h", "all": "3d"}
 
 @page_of.register(Statement)
 @np.errstate(over="ignore", invalid="ignore")
-def statement_page(found: Statement) -> Page:
+def statement_page(found: Statement) -> Document:
     """Return the page of a statement, for the browser and for paper."""
     texts, asked, judged = found.texts, found.asked, found.judged
     names = ("project", "client", "firm", "surveyor")
@@ -60,7 +60,7 @@ def statement_page(found: Statement) -> Page:
     mark = texts(f"mark.{tone or 'good'}")
     assumed = Remarks([text for _, text in judged.assumptions], 40)
     remarks = [Remarks(judged.remarks, 40)] if judged.remarks else []
-    return Page(
+    return Document(
         what=texts("page.what"),
         title=asked.title or found.result.block.title,
         judgements=[Judgement(mark, found.headline, [text for _, text in judged.sentences], tone)],

@@ -1,0 +1,125 @@
+"""Documents: a table that is declared once, in all forms, and documents of several things in layers."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from photogram.io import json as json_files
+from photogram.show import html
+from photogram.show.cells import page_table
+from photogram.show.forms import record, summary, table_text, to_json
+from photogram.show.methods import Documented, page_of
+from photogram.show.page import Document, Fact, Judgement, Layers, Section, layered
+from photogram.show.quantity import Axis, Quantity, Table, records
+
+AXES = (Axis.of("x", "m"), Axis.of("y", "m"))
+VALUES = np.array([[1.25, -2.5], [3.0, 4.0]])
+DEVIATIONS = np.array([[0.01, 0.02], [0.01, np.nan]])
+
+
+def table(values=VALUES):
+    """Return points with standard deviations and tests; that of the second point is marked."""
+    columns = [
+        Quantity(np.array(["P1", "P2"], dtype=object), (), "name", "id", "id", head="Point"),
+        Quantity(values, AXES, "value", "position", "position", head="{}"),
+        Quantity(DEVIATIONS, AXES, "deviation", "sd", "sd", head="sd {}"),
+        Quantity(np.array([0.5, 9.0]), head="t", decimals=1, marked=np.array([False, True])),
+    ]
+    return Table("points", "Points", columns, "Two points.", "In metres.", DEVIATIONS)
+
+
+def document(name="A", values=VALUES, tone="good"):
+    return Document(
+        "Survey",
+        name,
+        [Judgement("Usable", f"{name} can be used", (), tone)],
+        ["Measure again.", f"Look at {name}."],
+        [Fact("rms", "3", "µm")],
+        [Section.of(table(values))],
+        {"name": name, "values": values, "limit": np.inf},
+    )
+
+
+def test_a_table_is_declared_once_for_all_forms():
+    declared = table()
+    rows = records(declared.columns)
+    assert rows[0] == {"id": "P1", "position": [1.25, -2.5], "sd": [0.01, 0.02]}
+    frame = declared.frame()
+    assert list(frame.columns) == ["id", "position_x", "position_y", "sd_x", "sd_y"]
+    np.testing.assert_array_equal(frame[["position_x", "position_y"]], VALUES)
+    comment, *lines = declared.csv().decode().splitlines()
+    assert comment == "# unit of position_x, position_y, sd_x, sd_y: m"
+    (_, second) = csv.DictReader(lines)
+    assert second == {"id": "P2", "position_x": "3.0", "position_y": "4.0", "sd_x": "0.01", "sd_y": ""}
+
+
+def test_text_and_page_write_the_same_cells():
+    declared = table()
+    written = page_table(declared.title, declared.columns, declared.note, declared.deviations)
+    heads, *rows = table_text(written)
+    assert heads.split() == ["Point", "x", "m", "y", "m", "sd", "x", "m", "sd", "y", "m", "t"]
+    assert [row.split() for row in rows] == [
+        ["P1", "1.250", "-2.500", "0.010", "0.020", "0.5"],
+        ["P2", "3.000", "4.000", "0.010", "-", "9.0*"],
+    ]
+    by_hand = Document("Survey", "A", [], [], [], [Section("points", "Points", [written], "In metres.")])
+    by_key = Document("Survey", "A", [], [], [], [Section.of(declared)])
+    pytest.importorskip("jinja2")
+    assert html.page_html(by_hand) == html.page_html(by_key)
+
+
+def test_a_pdf_document_has_declared_tables():
+    pytest.importorskip("reportlab")
+    from photogram.show.pdf import page_pdf
+
+    declared = table()
+    written = page_table(declared.title, declared.columns, declared.note, declared.deviations)
+    by_hand = Document("Survey", "A", [], [], [], [Section("points", "Points", [written], "In metres.")])
+    by_key = Document("Survey", "A", [], [], [], [Section.of(declared)])
+    assert page_pdf(by_hand) == page_pdf(by_key)
+
+
+def test_a_json_document_has_members_and_tables():
+    made = json.loads(to_json(document()))
+    assert set(made) == {"program", "name", "values", "limit", "points"}
+    assert made["limit"] is None
+    assert made["points"] == json.loads(json_files.to_json(records(table().columns)))
+
+
+def test_a_summary_has_judgement_advice_tables_by_key_and_highlights():
+    head, *lines = summary(document(), "points")
+    assert head == "Survey: A"
+    assert lines[:3] == ["  verdict: A can be used", "  next: Measure again.", "  next: Look at A."]
+    assert lines[3] == "  Two points."
+    assert lines[-1].split() == ["rms", "3", "um"]
+    assert len(summary(document())) == len(lines) + 1 - 4
+
+
+def test_documents_of_several_things_are_layers_of_one():
+    parts = [document("A"), document("B", 2 * VALUES, "bad")]
+    whole = layered("Surveys", "both", parts, members={"all": [record(each) for each in parts]})
+    (section,) = whole.sections
+    (layers,) = section.parts
+    assert isinstance(layers, Layers)
+    assert (section.key, section.intro, layers.titles()) == ("points", "In metres.", ["A", "B"])
+    assert [(each.on, each.tone) for each in whole.judgements] == [("A", "good"), ("B", "bad")]
+    assert whole.advice == ["Measure again.", "Look at A.", "Look at B."]
+    assert [fact.name for fact in whole.highlights] == ["rms, A", "rms, B"]
+    assert [each["points"][1]["position"] for each in record(whole)["all"]] == [[3.0, 4.0], [6.0, 8.0]]
+    assert not whole.tables()
+    assert not layered("Surveys", "none", []).sections
+
+
+def test_a_result_with_a_document_needs_no_other_definition():
+    class Survey(Documented):
+        """A result outside the package."""
+
+        def document(self):
+            return document()
+
+    assert page_of(Survey()).sections[0].key == "points"
+    assert json.loads(Survey().to_json())["name"] == "A"
+    pytest.importorskip("jinja2")
+    assert b"Points" in Survey().to_html()
