@@ -39,6 +39,10 @@ NAMELESS = "?"
 Spelling = Callable[[Sequence[str]], Sequence[str]]
 _SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)
 """What Excel writes before a table."""
+_WHOLE = re.compile("0|[1-9][0-9]*")
+"""A whole number as Python writes it."""
+_FEW = 8
+"""Rows to a name from which pandas makes categories of a column faster than objects."""
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
 
@@ -301,17 +305,13 @@ def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[s
 
 def _by_pandas(path: Path, encoding: str, header: _Header, numbers: Collection[str]) -> ColumnTable | None:
     """Read a large table; None if anything is not as it should be: `_by_lines` then names the place."""
-    import pandas as pd
-
     head, own, columns, delimiter = header
     assert head.record is not None
     if delimiter == " " or not all(columns):
         return None
     most = _line_ends(path) + 1
     values = {each: np.empty(most) for each in columns if each in numbers}
-    codes = {each: np.empty(most, dtype=np.int64) for each in columns if each not in numbers}
-    # A name that is new has the next number.
-    places = {each: defaultdict[str, int](itertools.count().__next__) for each in codes}
+    names = {each: _NameColumn(most) for each in columns if each not in numbers}
     count = 0
     for piece, frame in _parsed(path, encoding, header, numbers):
         lines = piece.count("\n") + 1
@@ -328,20 +328,61 @@ def _by_pandas(path: Path, encoding: str, header: _Header, numbers: Collection[s
             empty = empty or bool(np.isnan(column[rows]).any())
         if empty and not _empty_cells(piece, delimiter, lines, len(columns)):
             return None
-        for each, named in codes.items():
-            own_codes, texts = pd.factorize(frame[each])
-            if (own_codes < 0).any():
-                return None
-            own_rows = map(places[each].__getitem__, map(str.strip, texts.tolist()))
-            named[rows] = np.fromiter(own_rows, np.int64, len(texts))[own_codes]
+        if not all(each.add(rows, frame[name]) for name, each in names.items()):
+            return None
         count += lines
     if not count:
         return None
-    for whole in (*values.values(), *codes.values()):
+    for whole in values.values():
         whole.resize(count, refcheck=False)
-    names = {each: Names(list(places.pop(each)), named) for each, named in codes.items()}
+    ready: dict[str, Floats | Names] = {**values}
+    while names:
+        name, own_names = names.popitem()
+        ready[name] = own_names.names(count)
     records = range(head.record + 1, head.record + 1 + count)
-    return ColumnTable(path, head, columns, count, {}, records, delimiter, {**values, **names}, own=own)
+    return ColumnTable(path, head, columns, count, {}, records, delimiter, ready, own=own)
+
+
+class _NameColumn:
+    """A column of names, built from pieces. Whole numbers are compared as numbers, all of them at once."""
+
+    def __init__(self, most: int) -> None:
+        self._rows = np.empty(most, dtype=np.int64)
+        # The rows before this one have whole numbers, the rows after it places of names.
+        self._whole = 0
+        # A new name has the next number.
+        self._places = defaultdict[str, int](itertools.count().__next__)
+
+    def add(self, rows: slice, cells: Any) -> bool:
+        """Append the cells of a piece. Return False if a cell is empty."""
+        import pandas as pd
+
+        if cells.dtype == np.int64:
+            self._rows[rows] = cells
+            self._whole = rows.stop
+            return True
+        if self._whole:
+            before = self.names(self._whole)
+            self._rows[: self._whole] = before.rows
+            for name in before.names:
+                self._places[name]
+            self._whole = 0
+        codes, texts = pd.factorize(cells)
+        if (codes < 0).any():
+            return False
+        places = map(self._places.__getitem__, map(str.strip, texts.tolist()))
+        self._rows[rows] = np.fromiter(places, np.int64, len(texts))[codes]
+        return True
+
+    def names(self, count: int) -> Names:
+        """Return the names of all rows."""
+        import pandas as pd
+
+        if self._whole:
+            codes, whole = pd.factorize(self._rows[:count])
+            return Names(list(map(str, whole.tolist())), codes)
+        self._rows.resize(count, refcheck=False)
+        return Names(list(self._places), self._rows)
 
 
 def _line_ends(path: Path) -> int:
@@ -401,7 +442,6 @@ def _parser(
     form: dict[str, Any] = {
         "sep": delimiter,
         "names": list(columns),
-        "dtype": {each: float if each in numbers else str for each in columns},
         "header": None,
         "index_col": False,
         "decimal": "," if comma else ".",
@@ -409,17 +449,58 @@ def _parser(
         "na_values": [""],
         "skipinitialspace": True,
         "skip_blank_lines": False,
+        "low_memory": False,
         "engine": "c",
         **exact,
     }
 
-    def parsed(text: str) -> Any:
+    kinds = {
+        each: "float64" if each in numbers else "int64" if _WHOLE.fullmatch(cell) else "category"
+        for each, cell in itertools.zip_longest(columns, sample[: len(columns)], fillvalue="")
+    }
+
+    def frame_of(cells: bytes) -> Any:
         try:
-            return pd.read_csv(io.BytesIO(text.encode()), **form)
+            return pd.read_csv(io.BytesIO(cells), dtype=kinds, **form)
         except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning):
             return None
 
+    def parsed(text: str) -> Any:
+        cells = text.encode()
+        frame = frame_of(cells)
+        whole = [each for each, kind in kinds.items() if kind == "int64"]
+        if whole and (frame is None or not _as_written(frame, whole, cells, delimiter)):
+            kinds.update(dict.fromkeys(whole, "category"))
+            frame = frame_of(cells)
+        for each in columns if frame is not None else ():
+            if kinds[each] == "category" and len(frame[each].cat.categories) > len(frame) // _FEW:
+                kinds[each] = "object"
+        return frame
+
     return parsed
+
+
+def _as_written(frame: Any, columns: Sequence[str], cells: bytes, delimiter: str) -> bool:
+    """Whether whole numbers of a frame are all that their cells have: digits alone, without a leading 0."""
+    signs = np.frombuffer(cells, dtype=np.uint8)
+    bounds = np.flatnonzero((signs == ord(delimiter)) | (signs == ord("\n")))
+    shape = frame.shape
+    if b'"' in cells or len(bounds) + 1 != frame.size:
+        return False
+    starts = np.append(0, bounds + 1).reshape(shape)
+    if (signs[starts[1:, 0] - 1] != ord("\n")).any():
+        return False
+    zero = ord("0")
+    for each in columns:
+        first = starts[:, frame.columns.get_loc(each)]
+        # A blank and a sign come before 0.
+        if frame[each].dtype != np.int64 or (signs[first] < zero).any():
+            return False
+        leading = first[signs[first] == zero] + 1
+        following = signs[leading[leading < len(signs)]]
+        if ((following >= zero) & (following <= ord("9"))).any():
+            return False
+    return True
 
 
 def _empty_cells(body: str, delimiter: str, count: int, width: int) -> bool:
