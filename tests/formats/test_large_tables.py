@@ -21,8 +21,8 @@ def written(path, rows, encoding="utf-8", end="\n"):
     return path
 
 
-def read(path):
-    return read_columns(path, known=("photo",), numbers=("column", "row"))
+def read(path, known=("photo",)):
+    return read_columns(path, known=known, numbers=("column", "row"))
 
 
 def content(table):
@@ -71,6 +71,50 @@ def test_blank_lines_and_comments_keep_the_numbers_of_records(tmp_path, pieces, 
     path = written(tmp_path / "images.csv", [*lines(300), extra, *lines(10), "", ""])
     table = read(path)
     assert (table.count, table.records[-1]) == (310, 313 + extra.count("\n"))
+
+
+WHOLE = [f"{7 * row % 997}" for row in range(300)]
+LARGEST = [str(2**63 - 1), str(2**63), "-3", "18446744073709551616"]
+
+
+@pytest.mark.parametrize(
+    ("names", "count"),
+    [
+        (WHOLE, 300),
+        ([*WHOLE, "point", *WHOLE, "7"], 301),
+        ([*WHOLE, "007", *WHOLE], 301),
+        (["007", *WHOLE, "7 ", " 7"], 301),
+        ([*WHOLE, "+7", "-0", "00", "0", "-7"], 304),
+        ([*WHOLE, "  7", "\t7", "7  ", '"7"', '" 7 "'], 300),
+        ([*WHOLE, "7.0", "7e0", "1_4", "true", "Inf"], 305),
+        ([*WHOLE, *LARGEST, *WHOLE], 304),
+        (["point a", *WHOLE], 301),
+    ],
+)
+@pytest.mark.parametrize(
+    ("head", "row"), [("name,column,row", "{},1.5,-0.5"), ("column,row,name", "01,0,{}")]
+)
+def test_names_of_whole_numbers_are_texts(tmp_path, monkeypatch, pieces, names, count, head, row):
+    path = tmp_path / "images.csv"
+    path.write_text("\n".join([head, *map(row.format, names), ""]))
+    fast = read(path, known=("name",))
+    assert fast.ready["name"].whole == (names is WHOLE)
+    monkeypatch.setattr(delimited, "LARGE", 1 << 30)
+    slow = read(path, known=("name",))
+    assert slow.cells
+    assert len(fast.names("name").names) == count
+    assert fast.texts("name") == slow.texts("name")
+    assert fast.names("name").names == slow.names("name").names
+    assert fast.names("name").rows.tolist() == slow.names("name").rows.tolist()
+    assert fast.numbers("row").tolist() == slow.numbers("row").tolist()
+
+
+@pytest.mark.parametrize(("cell", "said"), [("", "is empty"), ("nan", "is no name"), ("  ", "is empty")])
+def test_a_cell_without_a_name_below_whole_numbers_has_its_record(tmp_path, pieces, cell, said):
+    path = written(tmp_path / "images.csv", [*(f"a,{name},1,2" for name in WHOLE), f"a,{cell},1,2"])
+    with pytest.raises(InputError, match=said) as found:
+        read(path).names("point")
+    assert (found.value.file, found.value.record) == (path, len(WHOLE) + 3)
 
 
 def test_memory_is_less_than_twice_the_file(tmp_path, monkeypatch):

@@ -56,7 +56,7 @@ def shaped(
     """
     array = numbers(name, value, missing=missing)
     if array.ndim == 0:
-        array = np.full(shape, array)
+        array = np.broadcast_to(array, shape)
     if array.shape != shape:
         raise InputError(f"{name} has the shape {array.shape}, not {shape}")
     return frozen(array)

@@ -25,10 +25,14 @@ TRUE, FALSE = (
 
 @dataclass(frozen=True)
 class Names:
-    """A column of names: each name once, in the order in which they come, and which one each row has."""
+    """A column of names: each name once, in the order in which they come, and which one each row has.
+
+    `whole` is whether all names are whole numbers: none is empty, none differs by blanks or case alone.
+    """
 
     names: list[str]
     rows: Indices
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,7 @@ class ColumnTable:
         """Return the table with some of its rows, in this order."""
         cells = {column: [own[row] for row in rows] for column, own in self.cells.items()}
         ready = {
-            column: Names(own.names, own.rows[rows]) if isinstance(own, Names) else own[rows]
+            column: replace(own, rows=own.rows[rows]) if isinstance(own, Names) else own[rows]
             for column, own in self.ready.items()
         }
         records = [self.records[row] for row in rows]
@@ -140,7 +144,7 @@ class ColumnTable:
         found = self.ready.get(column)
         if not isinstance(found, Names):
             found = factorised(self._cells(column))
-        if _all_apart(found.names):
+        if found.whole or _all_apart(found.names):
             return found
         for name in found.names:
             if not name or name.lower() == "nan":

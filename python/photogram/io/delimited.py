@@ -41,8 +41,6 @@ _SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)
 """What Excel writes before a table."""
 _WHOLE = re.compile("0|[1-9][0-9]*")
 """A whole number as Python writes it."""
-_FEW = 8
-"""Rows to a name from which pandas makes categories of a column faster than objects."""
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
 
@@ -380,7 +378,7 @@ class _NameColumn:
 
         if self._whole:
             codes, whole = pd.factorize(self._rows[:count])
-            return Names(list(map(str, whole.tolist())), codes)
+            return Names(list(map(str, whole.tolist())), codes, whole=True)
         self._rows.resize(count, refcheck=False)
         return Names(list(self._places), self._rows)
 
@@ -455,7 +453,7 @@ def _parser(
     }
 
     kinds = {
-        each: "float64" if each in numbers else "int64" if _WHOLE.fullmatch(cell) else "category"
+        each: "float64" if each in numbers else "int64" if _WHOLE.fullmatch(cell) else "object"
         for each, cell in itertools.zip_longest(columns, sample[: len(columns)], fillvalue="")
     }
 
@@ -470,11 +468,8 @@ def _parser(
         frame = frame_of(cells)
         whole = [each for each, kind in kinds.items() if kind == "int64"]
         if whole and (frame is None or not _as_written(frame, whole, cells, delimiter)):
-            kinds.update(dict.fromkeys(whole, "category"))
+            kinds.update(dict.fromkeys(whole, "object"))
             frame = frame_of(cells)
-        for each in columns if frame is not None else ():
-            if kinds[each] == "category" and len(frame[each].cat.categories) > len(frame) // _FEW:
-                kinds[each] = "object"
         return frame
 
     return parsed
