@@ -131,7 +131,8 @@ def freeze_fields(owner: Any) -> None:
 
 def repeated_pairs(first: NDArray[np.int64], second: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Return the rows whose pair of indices is in an earlier row, too; `second` are below `count`."""
-    pairs = np.asarray(first, dtype=np.int64) * max(count, 1) + second
+    pairs = np.asarray(first, dtype=np.int64) * max(count, 1)
+    pairs += second
     if (pairs[1:] > pairs[:-1]).all():  # sorted, as most blocks are
         return np.zeros(0, dtype=np.int64)
     ordered = np.sort(pairs)
