@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -250,8 +251,6 @@ def assembled(
     place, found = Place(path), list(messages)
     if not photo_ids:
         raise place.error("has no photos")
-    _different(place, "photo", photo_ids)
-    _different(place, "point", point_ids)
     left = repeated_pairs(image_photos, image_points, len(point_ids))
     repeated = Repeated(
         tuple(photo_ids[row] for row in image_photos[left].tolist()),
@@ -284,7 +283,7 @@ def assembled(
         angles[known] = Attitudes(matrices[known]).values(
             "omega_phi_kappa_photo_to_ground" if photo_to_ground else "omega_phi_kappa"
         )
-    with at_place(place):
+    with _names_at(place, photo=photo_ids, point=point_ids), at_place(place):
         block = Block(
             photo_ids=photo_ids,
             photo_positions=centres,
@@ -328,7 +327,14 @@ def assembled(
     )
 
 
-def _different(place: Place, kind: str, names: Sequence[str]) -> None:
-    if len(set(names)) < len(names):
-        twice = next(name for name, count in Counter(names).items() if count > 1)
-        raise place.error(f"the {kind} {twice} is there more than once")
+@contextmanager
+def _names_at(place: Place, **names: Sequence[str]) -> Iterator[None]:
+    """Give a refusal of repeated names its place: a block compares its names itself."""
+    try:
+        yield
+    except InputError:
+        for kind, own in names.items():
+            if len(set(own)) < len(own):
+                twice = next(name for name, count in Counter(own).items() if count > 1)
+                raise place.error(f"the {kind} {twice} is there more than once") from None
+        raise
