@@ -11,6 +11,7 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.directions import image_directions
 from photogram.network.motion import on_shared
+from photogram.network.subset import kept_images
 
 STEEPEST = 1e12
 """Condition of the normal equations of a point beyond which its rays are parallel."""
@@ -27,12 +28,7 @@ def intersected(project: Project, points: Indices) -> Floats:
     # On a trajectory the pose of a photo only tells where it is about.
     placed = ~on_shared(block)[block.image_photos]
     rows = np.flatnonzero((places[block.image_points] >= 0) & placed)
-    own = block.replace(
-        image_photos=block.image_photos[rows],
-        image_points=block.image_points[rows],
-        image_xy=block.image_xy[rows],
-        image_sd=block.image_sd[rows],
-    )
+    own = kept_images(block, rows)
     photos = own.image_photos
     rays = np.einsum("nij,nj->ni", attitude_matrices(block)[photos], image_directions(own))
     centres = block.photo_positions[photos]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Bools, Indices
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness
@@ -25,8 +26,11 @@ def image_rows(network: object, kept: Indices | Bools) -> dict[str, Any]:
 
 
 def kept_images(block: Block, kept: Indices | Bools) -> Block:
-    """Return a block with some of its images, by their rows or a mask."""
-    return block.replace(**image_rows(block, kept))
+    """Return a block with some of its images, by different rows or a mask: all checks stay fulfilled."""
+    own = block.kept()
+    for name, values in image_rows(block, kept).items():
+        object.__setattr__(own, name, frozen(values))
+    return own
 
 
 def of_photos(block: Block, kept: Bools) -> Block:
