@@ -92,12 +92,6 @@ class Message:
 
 @dataclass(frozen=True)
 class Undetermined(Message):
-    """A remark on unknowns that adjusted values leave undetermined, or so nearly that others fit as well.
+    """A remark on unknowns that adjusted values leave undetermined, or so nearly that others fit as well."""
 
-    Attributes
-    ----------
-    what
-        The unknowns, and what that is.
-    """
-
-    what: str = ""
+    what: str = ""  # The unknowns, and what that is

@@ -100,7 +100,7 @@ def test_rejected_points_differ_from_points_that_were_never_photographed():
     tie_points = np.flatnonzero(~np.isfinite(block.point_sd).any(axis=1))
     point = next(row for row in tie_points.tolist() if (block.image_points == row).sum() == 3)
     rows, xy = np.flatnonzero(block.image_points == point), block.image_xy.copy()
-    xy[rows] += 200 * block.image_sd[rows] * [[1, 1], [-1, 1], [1, -1]]
+    xy[rows] += 1000 * block.image_sd[rows] * [[1, 1], [-1, 1], [1, -1]]
     result = adjust_started(first_values(block.replace(image_xy=xy)))
     reasons = {block.point_ids[point]: REJECTED, "UNSEEN": NOT_PHOTOGRAPHED}
     assert {name: reason for name, reason in result.dropped.items() if name in reasons} == reasons

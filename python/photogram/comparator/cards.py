@@ -25,40 +25,19 @@ CASES = 20
 
 @dataclass(frozen=True)
 class Header:
-    """The header card, FORMAT (5I1,I2,A1,1X,20I3,2X,A8,I1).
+    """The header card, FORMAT (5I1,I2,A1,1X,20I3,2X,A8,I1)."""
 
-    Attributes
-    ----------
-    left_handed, sorted_input
-        Columns 1 and 2.
-    other_least_count
-        Column 3: the least count is not one micrometre (on comparator 11, unit digits are read apart).
-    skip_card
-        Column 4: one card is passed over before the data.
-    plot_each_case
-        Column 5, as the text has it (the listing does the reverse).
-    comparator
-        Columns 6-7; 0 ends the job.
-    secondary
-        Column 8 holds R: the right stage of a stereocomparator.
-    operators
-        Columns 10-69: operator of each case, 0 for none.
-    date
-        Columns 72-79.
-    master
-        Column 80: 0 grid 773, 1 grid 1320, 2 grid 778, 3 special coordinates follow.
-    """
-
-    left_handed: bool
+    left_handed: bool  # Columns 1 and 2
     sorted_input: bool
+    # Column 3: the least count is not one micrometre (on comparator 11, unit digits are read apart)
     other_least_count: bool
-    skip_card: bool
-    plot_each_case: bool
-    comparator: int
-    secondary: bool
-    operators: tuple[int, ...]
-    date: str
-    master: int
+    skip_card: bool  # Column 4: one card is passed over before the data
+    plot_each_case: bool  # Column 5, as the text has it (the listing does the reverse)
+    comparator: int  # Columns 6-7; 0 ends the job
+    secondary: bool  # Column 8 holds R: the right stage of a stereocomparator
+    operators: tuple[int, ...]  # Columns 10-69: operator of each case, 0 for none
+    date: str  # Columns 72-79
+    master: int  # Column 80: 0 grid 773, 1 grid 1320, 2 grid 778, 3 special coordinates follow
 
     @property
     def special_grid_number(self) -> int:

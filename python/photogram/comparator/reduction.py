@@ -27,25 +27,13 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True, eq=False)
 class GridErrors:
-    """Errors e of the coordinates of one plate and their effect on comparator residuals, v = E e.
+    """Errors e of the coordinates of one plate and their effect on comparator residuals, v = E e."""
 
-    Attributes
-    ----------
-    cases
-        Indices of the cases on the plate.
-    rows, columns
-        (n,) the measured point and the point of the plate of each non-zero block of E.
-    turns
-        (n, 2, 2) the blocks: rotations, mirrored where the comparator is left-handed.
-    counts
-        (l,) in how many cases each point was measured.
-    """
-
-    cases: Indices
-    rows: Indices
+    cases: Indices  # Indices of the cases on the plate
+    rows: Indices  # (n,) the measured point and the point of the plate of each non-zero block of E
     columns: Indices
-    turns: Floats
-    counts: Indices
+    turns: Floats  # (n, 2, 2) the blocks: rotations, mirrored where the comparator is left-handed
+    counts: Indices  # (l,) in how many cases each point was measured
 
     @classmethod
     def of(
@@ -86,21 +74,11 @@ class GridErrors:
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """R, for m measured points in the order of the cases; columns have the shape (m, 2).
+    """R, for m measured points in the order of the cases; columns have the shape (m, 2)."""
 
-    Attributes
-    ----------
-    starts
-        First row of each case.
-    rigid
-        (m, 2, 3) the columns of P, each on the rows of its case.
-    left, right
-        (m, 2, k) U and W.
-    """
-
-    starts: Indices
-    rigid: Floats
-    left: Floats
+    starts: Indices  # First row of each case
+    rigid: Floats  # (m, 2, 3) the columns of P, each on the rows of its case
+    left: Floats  # (m, 2, k) U and W
     right: Floats
 
     @classmethod

@@ -98,36 +98,16 @@ SAME_BUT_SCALE = {"metres in heights", "feet in X and Y"}
 
 @dataclass(frozen=True, eq=False)
 class FreeModel:
-    """Control points in the model that is free of them.
+    """Control points in the model that is free of them."""
 
-    Attributes
-    ----------
-    block
-        The block with its control.
-    axes
-        Its metric axes.
-    points
-        (k,) the control points.
-    held
-        (k, 3) which of their components are held.
-    model
-        (k, 3) their positions in the model, in the axes.
-    given
-        (k, 3) the same in the block's own coordinates.
-    covariance
-        (3k, 3k) of `model`.
-    per_unit
-        (3,) units of the axes of a unit of each coordinate, about.
-    """
-
-    block: Block
-    axes: LocalAxes
-    points: Indices
-    held: Bools
-    model: Floats
-    given: Floats
-    covariance: Floats
-    per_unit: Floats
+    block: Block  # The block with its control
+    axes: LocalAxes  # Its metric axes
+    points: Indices  # (k,) the control points
+    held: Bools  # (k, 3) which of their components are held
+    model: Floats  # (k, 3) their positions in the model, in the axes
+    given: Floats  # (k, 3) the same in the block's own coordinates
+    covariance: Floats  # (3k, 3k) of `model`
+    per_unit: Floats  # (3,) units of the axes of a unit of each coordinate, about
 
     @property
     def degrees_of_freedom(self) -> int:

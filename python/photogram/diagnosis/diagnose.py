@@ -59,21 +59,11 @@ MOST_SETS = 5
 
 @dataclass(frozen=True)
 class Manner:
-    """How a block is checked.
+    """How a block is checked."""
 
-    Attributes
-    ----------
-    options
-        Of :func:`photogram.adjust`.
-    words
-        What things are called.
-    intersect_only
-        Why stations are kept as they are; empty where they are adjusted.
-    """
-
-    options: dict[str, Any] = field(default_factory=dict)
-    words: Words = field(default_factory=Words)
-    intersect_only: str = ""
+    options: dict[str, Any] = field(default_factory=dict)  # Of :func:`photogram.adjust`
+    words: Words = field(default_factory=Words)  # What things are called
+    intersect_only: str = ""  # Why stations are kept as they are; empty where they are adjusted
 
 
 def diagnose(

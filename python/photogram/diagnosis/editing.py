@@ -64,37 +64,20 @@ RETURNS = 10
 
 @dataclass
 class Edited:
-    """The adjustment and what was taken out of it.
+    """The adjustment and what was taken out of it."""
 
-    Attributes
-    ----------
-    first, last
-        The first and the last adjustment; None where it cannot be done.
-    reason
-        Why it cannot.
-    spread
-        Robust standard deviation of the last test values: 1 when the weights are right.
-    section
-        The blunder list.
-    control
-        Findings on control, by point: which components were taken out.
-    exchanged
-        Pairs of control points that had each other's coordinates.
-    cleared
-        Control points that were left out as suspects and agree with their predictions.
-    asked
-        Whether an adjustment was wanted.
-    """
-
-    first: Result | None
+    first: Result | None  # The first and the last adjustment; None where it cannot be done
     last: Result | None
-    reason: str
-    spread: float
-    section: Section
+    reason: str  # Why it cannot
+    spread: float  # Robust standard deviation of the last test values: 1 when the weights are right
+    section: Section  # The blunder list
+    # Findings on control, by point: which components were taken out
     control: dict[str, list[Finding]] = field(default_factory=dict)
+    # Pairs of control points that had each other's coordinates
     exchanged: list[tuple[str, str]] = field(default_factory=list)
+    # Control points that were left out as suspects and agree with their predictions
     cleared: list[str] = field(default_factory=list)
-    asked: bool = True
+    asked: bool = True  # Whether an adjustment was wanted
 
     @property
     def taken_out(self) -> int:

@@ -37,19 +37,11 @@ TAKEN_UP = 1e-6
 
 @dataclass(frozen=True)
 class _Fall:
-    """What the sum of squares falls by where something else is known of a camera.
+    """What the sum of squares falls by where something else is known of a camera."""
 
-    Attributes
-    ----------
-    value, freedom
-        T, in the unit weight that is left, and its degrees of freedom.
-    moved, sd
-        (k,) a, and its standard deviations.
-    """
-
-    value: float
+    value: float  # T, in the unit weight that is left, and its degrees of freedom
     freedom: int
-    moved: Floats
+    moved: Floats  # (k,) a, and its standard deviations
     sd: Floats
 
     @classmethod

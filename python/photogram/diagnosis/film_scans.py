@@ -167,23 +167,13 @@ def _of_scanner(result: Result, rows: list[int]) -> Iterator[_Found]:
 
 @dataclass(frozen=True, eq=False)
 class _Images:
-    """Images of a scanner, photo by photo.
+    """Images of a scanner, photo by photo."""
 
-    Attributes
-    ----------
-    photos, xy
-        (m,) and (m, 2): their photos and readings.
-    values, redundancy
-        (m, 2) residuals in standard deviations, free of what is smooth, and redundancy numbers.
-    sd
-        The median standard deviation of a reading.
-    """
-
-    photos: Indices
+    photos: Indices  # (m,) and (m, 2): their photos and readings
     xy: Floats
-    values: Floats
+    values: Floats  # (m, 2) residuals in standard deviations, free of what is smooth, and redundancy numbers
     redundancy: Floats
-    sd: float
+    sd: float  # The median standard deviation of a reading
 
 
 def _of_photos(result: Result, rows: list[int]) -> _Images | None:

@@ -107,24 +107,12 @@ class Words:
 
 @dataclass(frozen=True)
 class Explained:
-    """What is wrong with the control, or the observed positions, as a whole.
+    """What is wrong with the control, or the observed positions, as a whole."""
 
-    Attributes
-    ----------
-    kind
-        In a word or two.
-    text
-        In a sentence.
-    judged
-        How sure it is.
-    change
-        Makes of the block what was meant.
-    """
-
-    kind: str
-    text: str
-    judged: Judged
-    change: Callable[[Block], Block]
+    kind: str  # In a word or two
+    text: str  # In a sentence
+    judged: Judged  # How sure it is
+    change: Callable[[Block], Block]  # Makes of the block what was meant
 
 
 @dataclass(frozen=True)
@@ -173,18 +161,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class Listing:
-    """A small table.
+    """A small table."""
 
-    Attributes
-    ----------
-    columns
-        Heads with their units, and how values stand in text, as for `format`: `>12.2f`.
-    rows
-        The values.
-    """
-
+    # Heads with their units, and how values stand in text, as for `format`: `>12.2f`
     columns: Sequence[tuple[str, str]]
-    rows: Sequence[Sequence[str | float]]
+    rows: Sequence[Sequence[str | float]]  # The values
 
     def lines(self) -> list[str]:
         """Return it as text."""

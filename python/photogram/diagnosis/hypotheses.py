@@ -74,23 +74,12 @@ def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A mistake that may have been made.
+    """A mistake that may have been made."""
 
-    Attributes
-    ----------
-    name
-        In a word or two.
-    text
-        In a sentence, without its full stop.
-    change
-        Makes of a block, or of a part of its photos, what was meant.
-    exact
-        Whether that is exactly what was meant: a size of pixels and an origin are only known about.
-    """
-
-    name: str
-    text: str
-    change: Change
+    name: str  # In a word or two
+    text: str  # In a sentence, without its full stop
+    change: Change  # Makes of a block, or of a part of its photos, what was meant
+    # Whether that is exactly what was meant: a size of pixels and an origin are only known about
     exact: bool = True
 
 

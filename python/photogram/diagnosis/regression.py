@@ -25,27 +25,13 @@ UNKNOWN = 1e6
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Observed on predicted images of k photos.
+    """Observed on predicted images of k photos."""
 
-    Attributes
-    ----------
-    misfit
-        (k,) m.
-    scale
-        (k,) k.
-    turn
-        (k, 2, 2) V.
-    shift
-        (k, 2) t, millimetres.
-    rest
-        (k,) e.
-    """
-
-    misfit: Floats
-    scale: Floats
-    turn: Floats
-    shift: Floats
-    rest: Floats
+    misfit: Floats  # (k,) m
+    scale: Floats  # (k,) k
+    turn: Floats  # (k, 2, 2) V
+    shift: Floats  # (k, 2) t, millimetres
+    rest: Floats  # (k,) e
 
 
 def view(block: Block, photos: Indices) -> Block:

@@ -28,25 +28,14 @@ _SHARED = (
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A block, and what its cameras would have seen without their lenses.
+    """A block, and what its cameras would have seen without their lenses."""
 
-    Attributes
-    ----------
-    block
-        What is adjusted: images that no camera can have seen are left out.
-    seen
-        Without distortion, and without the images of photos on frames, which have no poses of their own.
-        Photos and points are those of `block`.
-    rows
-        (k,) rows of the images of `seen` among those of `block`.
-    unseen
-        How many images no camera can have seen.
-    """
-
-    block: Block
+    block: Block  # What is adjusted: images that no camera can have seen are left out
+    # Without distortion, and without the images of photos on frames, which have no poses of their own.
+    # Photos and points are those of `block`
     seen: Block
-    rows: Indices
-    unseen: int = 0
+    rows: Indices  # (k,) rows of the images of `seen` among those of `block`
+    unseen: int = 0  # How many images no camera can have seen
 
     @classmethod
     def of(cls, block: Block) -> Self:

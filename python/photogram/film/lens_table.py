@@ -276,22 +276,13 @@ class SemiDiagonals:
 
     Opposite ones differ by what lies to one side, h = u o + d r^2 with the direction u: decentring, and the
     place o of the point of symmetry, as seen from the point about which radii count.
-
-    Attributes
-    ----------
-    mean, sd
-        (n,) of the four, free of that; its standard deviation (mm).
-    centre, sd_centre
-        (2,) o, the data strip at the left; its standard deviation (mm).
-    decentring
-        The largest half difference of opposite ones, but for o (mm).
     """
 
-    mean: Floats
+    mean: Floats  # (n,) of the four, free of that; its standard deviation (mm)
     sd: float
-    centre: Floats
+    centre: Floats  # (2,) o, the data strip at the left; its standard deviation (mm)
     sd_centre: float
-    decentring: float
+    decentring: float  # The largest half difference of opposite ones, but for o (mm)
 
     @property
     def sd_half_difference(self) -> float:

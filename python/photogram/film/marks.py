@@ -62,19 +62,12 @@ _SIGNS = {
 
 @dataclass(frozen=True)
 class UsualPlaces:
-    """Where the marks of a type of camera are.
+    """Where the marks of a type of camera are."""
 
-    Attributes
-    ----------
-    corner, middle
-        Distance of the marks from the axes (mm): corners at (corner, corner), middles at (middle, 0).
-    sd_corner, sd_middle
-        What single marks differ from that (mm): robust standard deviations of public reports.
-    """
-
+    # Distance of the marks from the axes (mm): corners at (corner, corner), middles at (middle, 0)
     corner: float
     middle: float
-    sd_corner: float
+    sd_corner: float  # What single marks differ from that (mm): robust standard deviations of public reports
     sd_middle: float
 
     def places(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:

@@ -26,24 +26,12 @@ _IMAGES = ("photo", "point", "column", "row")
 
 @dataclass(frozen=True)
 class ControlList:
-    """Control points in a system of coordinates, and where they were measured.
+    """Control points in a system of coordinates, and where they were measured."""
 
-    Attributes
-    ----------
-    control
-        A table `point, x, y, z`.
-    images
-        A table `photo, point, column, row`, pixels from the corner.
-    crs
-        Of the control.
-    messages
-        Remarks.
-    """
-
-    control: ColumnTable
-    images: ColumnTable
-    crs: str
-    messages: list[Message]
+    control: ColumnTable  # A table `point, x, y, z`
+    images: ColumnTable  # A table `photo, point, column, row`, pixels from the corner
+    crs: str  # Of the control
+    messages: list[Message]  # Remarks
 
 
 def read_control_list(path: Path, project: Project) -> ControlList | None:

@@ -22,21 +22,12 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True)
 class OnDisk:
-    """What the adjustment of a project on disk has come to.
+    """What the adjustment of a project on disk has come to."""
 
-    Attributes
-    ----------
-    outcome
-        History, sums and variance.
-    manifest
-        The tree, and how much is in each node.
-    folders
-        What was found, one folder a node: :func:`photogram.read_result` reads each by itself. Photos of nodes
-        above stand in several, with the same values and covariances.
-    """
-
-    outcome: Outcome
-    manifest: Manifest
+    outcome: Outcome  # History, sums and variance
+    manifest: Manifest  # The tree, and how much is in each node
+    # What was found, one folder a node: :func:`photogram.read_result` reads each by itself. Photos of
+    # nodes above stand in several, with the same values and covariances
     folders: list[Path]
 
     def lines(self) -> list[str]:

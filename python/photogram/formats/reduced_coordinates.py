@@ -34,27 +34,16 @@ SIDE = -0.02
 
 @dataclass
 class Reduced:
-    """What the files of such a block hold.
+    """What the files of such a block hold."""
 
-    Attributes
-    ----------
-    photos
-        Camera of each photo by its name.
-    images
-        Photo, point, x, y in millimetres.
-    poses
-        Centre and attitude A of photos, photo to object.
-    control
-        Position of control points, and which coordinates are held; of check points none.
-    cameras
-        By name.
-    """
-
-    photos: dict[str, str] = field(default_factory=dict)
+    photos: dict[str, str] = field(default_factory=dict)  # Camera of each photo by its name
+    # Photo, point, x, y in millimetres
     images: list[tuple[str, str, float, float]] = field(default_factory=list)
+    # Centre and attitude A of photos, photo to object
     poses: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
+    # Position of control points, and which coordinates are held; of check points none
     control: dict[str, tuple[Floats, Bools]] = field(default_factory=dict)
-    cameras: dict[str, Camera] = field(default_factory=dict)
+    cameras: dict[str, Camera] = field(default_factory=dict)  # By name
 
     def principal_distance(self, c: float, place: Place) -> str:
         """Return the name of the camera of a principal distance in millimetres."""
@@ -172,33 +161,15 @@ def _misfit(project: Project) -> float:
 
 @dataclass(frozen=True)
 class ReducedImages:
-    """What such files say of images.
+    """What such files say of images."""
 
-    Attributes
-    ----------
-    distances
-        Principal distance of each camera, millimetres.
-    names
-        Of the cameras.
-    cameras
-        (P,) which one each photo has.
-    rows
-        Images that a perspective camera has.
-    xy
-        (rows, 2) millimetres from the principal point, y up.
-    posed
-        (P,) photos with a pose.
-    matrices
-        (P, 3, 3) attitudes A, photo to object.
-    """
-
-    distances: Floats
-    names: list[str]
-    cameras: Indices
-    rows: Indices
-    xy: Floats
-    posed: Bools
-    matrices: Floats
+    distances: Floats  # Principal distance of each camera, millimetres
+    names: list[str]  # Of the cameras
+    cameras: Indices  # (P,) which one each photo has
+    rows: Indices  # Images that a perspective camera has
+    xy: Floats  # (rows, 2) millimetres from the principal point, y up
+    posed: Bools  # (P,) photos with a pose
+    matrices: Floats  # (P, 3, 3) attitudes A, photo to object
 
 
 def reduced_images(project: Project, digits: int | None = None) -> ReducedImages:

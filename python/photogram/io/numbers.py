@@ -80,18 +80,10 @@ def number_or_text(text: str) -> int | float | str:
 
 @dataclass(frozen=True)
 class Marks:
-    """How the numbers of a table are written.
+    """How the numbers of a table are written."""
 
-    Attributes
-    ----------
-    decimal
-        What divides decimals, `.` or `,`.
-    thousands
-        Whether a number shows that the other of both divides thousands.
-    """
-
-    decimal: str
-    thousands: bool
+    decimal: str  # What divides decimals, `.` or `,`
+    thousands: bool  # Whether a number shows that the other of both divides thousands
 
     def plain(self, text: str) -> str:
         """Return a number as it is spelled here: a decimal point, no marks of thousands.

@@ -65,20 +65,11 @@ class Sheet:
     """A table that was read: arrays of numbers and lists of names, and what the file says of itself.
 
     A column that is not there, or holds something else than is asked for, is an :class:`InputError`.
-
-    Attributes
-    ----------
-    path
-        The file.
-    columns
-        By name.
-    about
-        Metadata of the table.
     """
 
-    path: Path
-    columns: Mapping[str, Any]
-    about: Mapping[str, str]
+    path: Path  # The file
+    columns: Mapping[str, Any]  # By name
+    about: Mapping[str, str]  # Metadata of the table
 
     @property
     def rows(self) -> int:

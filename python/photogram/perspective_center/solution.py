@@ -263,26 +263,16 @@ def _weights(grid: Grid, weights: Weights, model_sd: ArrayLike | None) -> Floats
 
 @dataclass(frozen=True, eq=False)
 class _Iterated:
-    """The course of an iteration of k cycles, and what holds at its end.
+    """The course of an iteration of k cycles, and what holds at its end."""
 
-    Attributes
-    ----------
-    solution
-        The last solution of the core: cofactors, degrees of freedom, points behind.
-    history, corrections
-        (k + 1, 6) poses, the start first, and (k, 6) what was added to them: X, Y, Z, angles in radians.
-    residuals, partials
-        (n, 2) given minus computed plate coordinates, and (n, 2, 6), at the last pose.
-    converged
-        Whether the criterion was met.
-    """
-
+    # The last solution of the core: cofactors, degrees of freedom, points behind
     solution: _photocore.ResectionSolution
+    # (k + 1, 6) poses, the start first, and (k, 6) what was added to them: X, Y, Z, angles in radians
     history: Floats
     corrections: Floats
-    residuals: Floats
+    residuals: Floats  # (n, 2) given minus computed plate coordinates, and (n, 2, 6), at the last pose
     partials: Floats
-    converged: bool
+    converged: bool  # Whether the criterion was met
 
 
 Solved = tuple[_Iterated, list[Message]]

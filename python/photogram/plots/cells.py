@@ -10,25 +10,13 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of a frame that have image points.
+    """Cells of a frame that have image points."""
 
-    Attributes
-    ----------
-    columns, rows
-        How many cells there are across and up.
-    edges
-        (2, 2) lower left and upper right corner of the frame.
-    own
-        (m,) the cell of each image point, row by row from the lower left.
-    counts
-        (rows columns,) image points of each cell.
-    """
-
-    columns: int
+    columns: int  # How many cells there are across and up
     rows: int
-    edges: Floats
-    own: Indices
-    counts: Indices
+    edges: Floats  # (2, 2) lower left and upper right corner of the frame
+    own: Indices  # (m,) the cell of each image point, row by row from the lower left
+    counts: Indices  # (rows columns,) image points of each cell
 
     @property
     def side(self) -> Floats:

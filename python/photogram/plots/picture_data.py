@@ -96,24 +96,12 @@ class Images:
 
 @dataclass(frozen=True, eq=False)
 class Correlated:
-    """Correlations of the k estimated parameters of a camera.
+    """Correlations of the k estimated parameters of a camera."""
 
-    Attributes
-    ----------
-    camera
-        Its name.
-    names
-        The parameters.
-    coefficients
-        (k, k).
-    remark
-        What the coefficients are, where that is not plain.
-    """
-
-    camera: str
-    names: Sequence[str]
-    coefficients: Floats
-    remark: str = ""
+    camera: str  # Its name
+    names: Sequence[str]  # The parameters
+    coefficients: Floats  # (k, k)
+    remark: str = ""  # What the coefficients are, where that is not plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,29 +125,14 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Radial distortion of a camera over r radii, in the unit of image coordinates.
+    """Radial distortion of a camera over r radii, in the unit of image coordinates."""
 
-    Attributes
-    ----------
-    camera
-        Its name, and what kind of lens it has.
-    unit
-        Of image coordinates: `mm` or `px`.
-    radii
-        (r,) from 0.
-    observed
-        The largest radius with an image; curves beyond are extrapolated.
-    curves
-        The curve as it is, then other forms of it, each in a panel of its own.
-    others
-        (q, r) curves of single photos, drawn faintly.
-    """
-
-    camera: str
-    unit: str
-    radii: Floats
-    observed: float
-    curves: Sequence[Curve]
+    camera: str  # Its name, and what kind of lens it has
+    unit: str  # Of image coordinates: `mm` or `px`
+    radii: Floats  # (r,) from 0
+    observed: float  # The largest radius with an image; curves beyond are extrapolated
+    curves: Sequence[Curve]  # The curve as it is, then other forms of it, each in a panel of its own
+    # (q, r) curves of single photos, drawn faintly
     others: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
@@ -170,27 +143,13 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Distances of n points from a feature that is fitted to them.
+    """Distances of n points from a feature that is fitted to them."""
 
-    Attributes
-    ----------
-    title
-        What the feature is.
-    unit
-        Of lengths.
-    points
-        The names of the points.
-    directions
-        What d deviations of each point are.
-    values, expanded
-        (n, d) deviations, and k times their standard deviations.
-    """
-
-    title: str
-    unit: str
-    points: Sequence[str]
-    directions: Sequence[str]
-    values: Floats
+    title: str  # What the feature is
+    unit: str  # Of lengths
+    points: Sequence[str]  # The names of the points
+    directions: Sequence[str]  # What d deviations of each point are
+    values: Floats  # (n, d) deviations, and k times their standard deviations
     expanded: Floats
 
     @property
@@ -203,22 +162,12 @@ class Deviations:
 
 @dataclass(frozen=True, eq=False)
 class VectorField:
-    """Small vectors over the frame of a camera.
+    """Small vectors over the frame of a camera."""
 
-    Attributes
-    ----------
-    title
-        What they are.
-    places, vectors
-        (n, 2) both, mm.
-    labels
-        What the places are called, or nothing.
-    """
-
-    title: str
-    places: Floats
+    title: str  # What they are
+    places: Floats  # (n, 2) both, mm
     vectors: Floats
-    labels: Sequence[str] = ()
+    labels: Sequence[str] = ()  # What the places are called, or nothing
 
 
 class Pictured(ABC):

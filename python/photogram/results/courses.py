@@ -32,31 +32,18 @@ LISTED = 20
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Positions or rotations of a trajectory after the adjustment.
+    """Positions or rotations of a trajectory after the adjustment."""
 
-    Attributes
-    ----------
-    trajectory, what
-        Its name; `position` or `rotation`.
-    basis, count
-        What its corrections are made of, and of how many coefficients.
-    first, last
-        The span of its table, in seconds.
-    largest, at
-        The length of the largest correction in it, in the linear unit or in radians, and its time.
-    tested
-        The largest of the test values of its coefficients; NaN where none is weighted.
-    """
-
-    trajectory: str
+    trajectory: str  # Its name; `position` or `rotation`
     what: str
-    basis: str
+    basis: str  # What its corrections are made of, and of how many coefficients
     count: int
-    first: float
+    first: float  # The span of its table, in seconds
     last: float
+    # The length of the largest correction in it, in the linear unit or in radians, and its time
     largest: float
     at: float
-    tested: float
+    tested: float  # The largest of the test values of its coefficients; NaN where none is weighted
 
 
 def courses(result: Result) -> list[Course]:

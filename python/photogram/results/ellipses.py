@@ -22,21 +22,12 @@ SHARE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Ellipses:
-    """n error ellipses.
+    """n error ellipses."""
 
-    Attributes
-    ----------
-    major, minor
-        (n,) semi-axes in the unit of the positions.
-    azimuth
-        (n,) of the major axis, clockwise from the second axis (north): radians, -pi/2 to pi/2.
-    confidence
-        The probability that the true position lies within; None: standard ellipses (39 %).
-    """
-
-    major: Floats
+    major: Floats  # (n,) semi-axes in the unit of the positions
     minor: Floats
-    azimuth: Floats
+    azimuth: Floats  # (n,) of the major axis, clockwise from the second axis (north): radians, -pi/2 to pi/2
+    # The probability that the true position lies within; None: standard ellipses (39 %)
     confidence: float | None
 
     def outlines(self, centres: Floats, scale: float = 1.0) -> Floats:

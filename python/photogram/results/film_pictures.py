@@ -21,25 +21,14 @@ STEPS = 9
 
 @dataclass(frozen=True, eq=False)
 class MarkResiduals:
-    """The residuals of k readings of marks, brought back to the frame of the camera, and their tests.
+    """The residuals of k readings of marks, brought back to the frame of the camera, and their tests."""
 
-    Attributes
-    ----------
-    photos
-        (k,) row of the photo of each reading.
-    marks
-        (k,) the name of its mark.
-    xy
-        (k, 2) observed minus computed, mm in the camera's frame: so those of turned and mirrored films are
-        alike.
-    tests
-        (k,) T of both coordinates together; NaN where it was not tested.
-    """
-
-    photos: Indices
-    marks: tuple[str, ...]
+    photos: Indices  # (k,) row of the photo of each reading
+    marks: tuple[str, ...]  # (k,) the name of its mark
+    # (k, 2) observed minus computed, mm in the camera's frame: so those of turned and mirrored films
+    # are alike
     xy: Floats
-    tests: Floats
+    tests: Floats  # (k,) T of both coordinates together; NaN where it was not tested
 
 
 def mark_residuals(result: Result) -> MarkResiduals:

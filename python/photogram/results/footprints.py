@@ -25,29 +25,19 @@ HORIZON = math.radians(80.0)
 
 @dataclass(frozen=True, eq=False)
 class Footprints:
-    """What P photos show of the ground.
+    """What P photos show of the ground."""
 
-    Attributes
-    ----------
-    outlines
-        (P, 17, 3) closed outlines in metric axes, counter-clockwise as the corners of the picture are from
-        the lower left; NaN for photos at or below the ground, where the lens has no ray, and for scanners,
-        which show no picture with one pose.
-    axes
-        The metric axes: those of a rectangular block, else east, north and up amid the stations.
-    grounds
-        (P,) heights in these axes of the level planes on which they lie.
-    size
-        (P,) what a unit of the image covers on the ground along the axis, in the linear unit: the ground
-        sample distance where image coordinates are pixels.
-    cut
-        (P,) whether a picture reaches beyond 80 degrees from the vertical, where its outline is cut off.
-    """
-
+    # (P, 17, 3) closed outlines in metric axes, counter-clockwise as the corners of the picture are
+    # from the lower left; NaN for photos at or below the ground, where the lens has no ray, and for
+    # scanners, which show no picture with one pose
     outlines: Floats
+    # The metric axes: those of a rectangular block, else east, north and up amid the stations
     axes: LocalAxes
-    grounds: Floats
+    grounds: Floats  # (P,) heights in these axes of the level planes on which they lie
+    # (P,) what a unit of the image covers on the ground along the axis, in the linear unit: the ground
+    # sample distance where image coordinates are pixels
     size: Floats
+    # (P,) whether a picture reaches beyond 80 degrees from the vertical, where its outline is cut off
     cut: Bools
 
     def positions(self) -> Floats:

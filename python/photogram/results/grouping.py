@@ -30,37 +30,18 @@ _Labels = NDArray[np.object_]
 
 @dataclass(frozen=True, eq=False)
 class Observables:
-    """What a network of P photos, n points and m images has observations of.
+    """What a network of P photos, n points and m images has observations of."""
 
-    Attributes
-    ----------
-    given
-        The network.
-    photo_cameras, camera_names
-        (P,) the camera of each photo, and their names.
-    strips
-        Tells the strips of the photos.
-    point_classes
-        (n,) `control`, `check` or `pass`.
-    photo_observed
-        (P, k) whether an unknown of a photo is.
-    stations
-        (k,) what the unknowns of a photo are called as observations.
-    commons
-        How many common unknowns there are.
-    records
-        How many times on trajectories the observations are of: the core has them behind the photos, with a
-        camera.
-    """
-
-    given: Given
-    photo_cameras: Indices
+    given: Given  # The network
+    photo_cameras: Indices  # (P,) the camera of each photo, and their names
     camera_names: Sequence[str]
-    strips: Callable[[], list[Indices]]
-    point_classes: NDArray[np.str_]
-    photo_observed: Bools
-    stations: tuple[str, ...]
-    commons: int
+    strips: Callable[[], list[Indices]]  # Tells the strips of the photos
+    point_classes: NDArray[np.str_]  # (n,) `control`, `check` or `pass`
+    photo_observed: Bools  # (P, k) whether an unknown of a photo is
+    stations: tuple[str, ...]  # (k,) what the unknowns of a photo are called as observations
+    commons: int  # How many common unknowns there are
+    # How many times on trajectories the observations are of: the core has them behind the photos, with
+    # a camera
     records: int = 0
 
     @property
@@ -71,26 +52,14 @@ class Observables:
 
 @dataclass(frozen=True, eq=False)
 class Grouping:
-    """Groups of observations, a number for each observation; -1 for none.
+    """Groups of observations, a number for each observation; -1 for none."""
 
-    Attributes
-    ----------
-    groups
-        Their names.
-    images, points, photos
-        (m, 2), (n, 3), (P, k).
-    observations
-        (o,) of those beside images.
-    commons, cameras, records
-        How many there are: they are in no group.
-    """
-
-    groups: GroupsOf
-    images: Indices
+    groups: GroupsOf  # Their names
+    images: Indices  # (m, 2), (n, 3), (P, k)
     points: Indices
     photos: Indices
-    observations: Indices
-    commons: int = 0
+    observations: Indices  # (o,) of those beside images
+    commons: int = 0  # How many there are: they are in no group
     cameras: int = 0
     records: int = 0
 

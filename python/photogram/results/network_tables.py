@@ -20,38 +20,21 @@ _FREE = {np.inf: "free", 0.0: "fixed"}
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """What the photos, points and images of a network are called and measured in.
+    """What the photos, points and images of a network are called and measured in."""
 
-    Attributes
-    ----------
-    photos, points
-        (P,), (n,) names, or numbers from 0.
-    photo_axes, point_axes, image_axes
-        Unknowns of a photo, coordinates of a point, image coordinates.
-    photo_values
-        (P, k) adjusted unknowns.
-    layers, parts
-        What the unknowns of a photo consist of: how people call it, and JSON documents.
-    of_photos, of_points
-        What tables tell first: of photos, of points that took part.
-    kinds
-        Observations beside images.
-    split
-        Whether JSON documents tell differences of positions from those of attitudes.
-    """
-
-    photos: np.ndarray
+    photos: np.ndarray  # (P,), (n,) names, or numbers from 0
     points: np.ndarray
-    photo_axes: tuple[Axis, ...]
+    photo_axes: tuple[Axis, ...]  # Unknowns of a photo, coordinates of a point, image coordinates
     point_axes: tuple[Axis, ...]
     image_axes: tuple[Axis, ...]
-    photo_values: Floats
+    photo_values: Floats  # (P, k) adjusted unknowns
+    # What the unknowns of a photo consist of: how people call it, and JSON documents
     layers: Mapping[str, slice]
     parts: Mapping[str, slice]
-    of_photos: tuple[Quantity, ...] = ()
+    of_photos: tuple[Quantity, ...] = ()  # What tables tell first: of photos, of points that took part
     of_points: tuple[Quantity, ...] = ()
-    kinds: Iterable[ObservedKind] = ()
-    split: bool = False
+    kinds: Iterable[ObservedKind] = ()  # Observations beside images
+    split: bool = False  # Whether JSON documents tell differences of positions from those of attitudes
 
     @property
     def identity(self) -> str:

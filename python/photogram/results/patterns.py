@@ -37,21 +37,11 @@ KURTOSIS = (-0.7, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class CameraImages:
-    """The images of one camera.
+    """The images of one camera."""
 
-    Attributes
-    ----------
-    name
-        Of the camera.
-    photos
-        (P,) which photos have it.
-    estimated
-        How many of its parameters are estimated.
-    """
-
-    name: str
-    photos: Bools
-    estimated: int
+    name: str  # Of the camera
+    photos: Bools  # (P,) which photos have it
+    estimated: int  # How many of its parameters are estimated
 
 
 def patterns(

@@ -155,24 +155,12 @@ def image_parts(given: str, unit: str) -> list[Part]:
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    """A folder that was read.
+    """A folder that was read."""
 
-    Attributes
-    ----------
-    folder
-        Where it is.
-    summary
-        The document.
-    decoder
-        For what it keeps.
-    sheets
-        The tables of photos, points and images.
-    """
-
-    folder: Path
-    summary: Mapping[str, Any]
-    decoder: Decoder
-    sheets: Mapping[str, Sheet]
+    folder: Path  # Where it is
+    summary: Mapping[str, Any]  # The document
+    decoder: Decoder  # For what it keeps
+    sheets: Mapping[str, Sheet]  # The tables of photos, points and images
 
     @property
     def scale(self) -> float:

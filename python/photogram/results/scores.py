@@ -19,21 +19,11 @@ TAKEN_UP = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of unknowns that a network does not have.
+    """Scores of unknowns that a network does not have."""
 
-    Attributes
-    ----------
-    partials
-        (k, m, 2) B, in standard deviations of the images.
-    projected
-        (k, m, 2) R B.
-    residuals
-        (m, 2) v, in standard deviations; zero where an image takes no part.
-    """
-
-    partials: Floats
-    projected: Floats
-    residuals: Floats
+    partials: Floats  # (k, m, 2) B, in standard deviations of the images
+    projected: Floats  # (k, m, 2) R B
+    residuals: Floats  # (m, 2) v, in standard deviations; zero where an image takes no part
 
     @classmethod
     def of(cls, factor: _photocore.BlockCovariances, partials: Floats, residuals: Floats) -> Scores:

@@ -27,25 +27,13 @@ Selection = Item | Sequence[Item]
 
 @dataclass(frozen=True, eq=False)
 class Selected:
-    """What a selection names.
+    """What a selection names."""
 
-    Attributes
-    ----------
-    rows
-        Kind and index of each part, as the core knows them.
-    labels
-        What each unknown is: kind, name, component.
-    values, sd
-        Adjusted values and standard deviations, one after the other.
-    shapes
-        Of each item: (k,) for one name, (n, k) for several.
-    """
-
-    rows: list[tuple[str, int]]
-    labels: list[tuple[str, str, str]]
-    values: Floats
+    rows: list[tuple[str, int]]  # Kind and index of each part, as the core knows them
+    labels: list[tuple[str, str, str]]  # What each unknown is: kind, name, component
+    values: Floats  # Adjusted values and standard deviations, one after the other
     sd: Floats
-    shapes: list[tuple[int, ...]]
+    shapes: list[tuple[int, ...]]  # Of each item: (k,) for one name, (n, k) for several
 
     def arrays(self, values: Floats) -> list[Floats]:
         """Return values item by item."""
@@ -59,40 +47,23 @@ class Selected:
 
 @dataclass(frozen=True, eq=False)
 class Things:
-    """Things of one kind, one after the other.
+    """Things of one kind, one after the other."""
 
-    Attributes
-    ----------
-    ids, components, values, sd
-        Of each its name, the names of its unknowns, their values and standard deviations.
-    parts
-        What the core calls the parts of such a thing; none where it is called as it is.
-    """
-
-    ids: Sequence[str]
+    ids: Sequence[str]  # Of each its name, the names of its unknowns, their values and standard deviations
     components: Sequence[tuple[str, ...]]
     values: Sequence[Floats] | Floats
     sd: Sequence[Floats] | Floats
+    # What the core calls the parts of such a thing; none where it is called as it is
     parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """Adjusted values and standard deviations of a network.
+    """Adjusted values and standard deviations of a network."""
 
-    Attributes
-    ----------
-    network
-        What it is called: a block, or a collection.
-    things
-        By their kinds.
-    numbered
-        Whether they are called by their numbers.
-    """
-
-    network: str
-    things: Mapping[str, Things]
-    numbered: bool = False
+    network: str  # What it is called: a block, or a collection
+    things: Mapping[str, Things]  # By their kinds
+    numbered: bool = False  # Whether they are called by their numbers
 
     def selected(self, selection: Selection) -> Selected:
         """Return what a selection names; refuse a kind or name that is not there, or that is no name."""

@@ -22,72 +22,41 @@ NEAR = 1e-3
 
 @dataclass(frozen=True)
 class WeakestPoint:
-    """A point among those that are determined worst.
+    """A point among those that are determined worst."""
 
-    Attributes
-    ----------
-    point
-        Its name.
-    ratio
-        The largest of its standard deviations over the smallest, in any directions: the root of the ratio of
-        the eigenvalues of its covariance matrix. Rays that meet at right angles give about 1, nearly
-        parallel ones 10,000 and more. 1 where a component is held.
-    distance
-        From the nearest station that sees it, in the median of these distances; NaN where scanners alone do.
-    rays
-        Number of its images.
-    """
-
-    point: str
+    point: str  # Its name
+    # The largest of its standard deviations over the smallest, in any directions: the root of the ratio
+    # of the eigenvalues of its covariance matrix. Rays that meet at right angles give about 1, nearly
+    # parallel ones 10,000 and more. 1 where a component is held
     ratio: float
+    # From the nearest station that sees it, in the median of these distances; NaN where scanners alone
+    # do
     distance: float
-    rays: int
+    rays: int  # Number of its images
 
 
 @dataclass(frozen=True)
 class WeakestPhoto:
-    """A photo among those that are determined worst.
+    """A photo among those that are determined worst."""
 
-    Attributes
-    ----------
-    photo
-        Its name.
-    condition
-        Largest over smallest eigenvalue of the covariance matrix of position and attitude, scaled to a
-        diagonal of ones. Points on a line leave a photo free to turn about it: then it has no bound.
-    images
-        Number of its images.
-    """
-
-    photo: str
+    photo: str  # Its name
+    # Largest over smallest eigenvalue of the covariance matrix of position and attitude, scaled to a
+    # diagonal of ones. Points on a line leave a photo free to turn about it: then it has no bound
     condition: float
-    images: int
+    images: int  # Number of its images
 
 
 @dataclass(frozen=True, eq=False)
 class Determined:
-    """Where the points and photos of an adjusted network are, and how well that is known.
+    """Where the points and photos of an adjusted network are, and how well that is known."""
 
-    Attributes
-    ----------
-    stations, points
-        (P, 3), (n, 3) places, with axes of equal units.
-    poses
-        (P, 6, 6) cofactors of position and attitude.
-    ranks
-        (P,) how many unknowns of a pose are not fixed.
-    point_cofactors
-        (n, 3, 3) with axes of equal units.
-    moving
-        (P,) which photos are no stations: scanners, of which each line is taken from another place; None for
-        none.
-    """
-
-    stations: Floats
+    stations: Floats  # (P, 3), (n, 3) places, with axes of equal units
     points: Floats
-    poses: Floats
-    ranks: Indices
-    point_cofactors: Floats
+    poses: Floats  # (P, 6, 6) cofactors of position and attitude
+    ranks: Indices  # (P,) how many unknowns of a pose are not fixed
+    point_cofactors: Floats  # (n, 3, 3) with axes of equal units
+    # (P,) which photos are no stations: scanners, of which each line is taken from another place; None
+    # for none
     moving: Bools | None = None
 
 

@@ -153,22 +153,12 @@ class Facts:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture that is still to be drawn.
+    """A picture that is still to be drawn."""
 
-    Attributes
-    ----------
-    name
-        Unique on the page; parts of the picture are named after it.
-    title, caption
-        A word for switching, and what is to be seen.
-    sketch
-        Declares the picture; None where there is nothing to draw.
-    """
-
-    name: str
-    title: str
+    name: str  # Unique on the page; parts of the picture are named after it
+    title: str  # A word for switching, and what is to be seen
     caption: str
-    sketch: Callable[[], Sketch | None]
+    sketch: Callable[[], Sketch | None]  # Declares the picture; None where there is nothing to draw
     kind: str = field(default="drawing", init=False)
 
     def draw(self) -> Figure | None:

@@ -72,24 +72,14 @@ class Weighted(Protocol):
 
 @dataclass(frozen=True)
 class GroupsOf:
-    """Groups of observations, by name.
+    """Groups of observations, by name."""
 
-    Attributes
-    ----------
-    names
-        (G,) of the groups.
-    parents
-        (G,) the larger group that each is merged into, with all others of the same name, where its own
-        component cannot be estimated; empty for none.
-    images
-        (G,) whether they are of image coordinates.
-    held
-        Why the component of a group is not estimated, by its number.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # (G,) of the groups
+    # (G,) the larger group that each is merged into, with all others of the same name, where its own
+    # component cannot be estimated; empty for none
     parents: tuple[str, ...] = ()
-    images: tuple[bool, ...] = ()
+    images: tuple[bool, ...] = ()  # (G,) whether they are of image coordinates
+    # Why the component of a group is not estimated, by its number
     held: dict[int, str] = field(default_factory=dict)
 
 

@@ -21,21 +21,11 @@ from photogram.statistics.limits import GlobalTest, externally_studentized
 
 @dataclass(frozen=True)
 class Observations:
-    """Observations of one kind and their test values.
+    """Observations of one kind and their test values."""
 
-    Attributes
-    ----------
-    kind
-        What they are, in the plural.
-    values
-        Test values in any shape, of either sign; NaN where nothing is tested.
-    name
-        Names the observation at an index of `values`.
-    """
-
-    kind: str
-    values: Floats
-    name: Callable[[tuple[int, ...]], str]
+    kind: str  # What they are, in the plural
+    values: Floats  # Test values in any shape, of either sign; NaN where nothing is tested
+    name: Callable[[tuple[int, ...]], str]  # Names the observation at an index of `values`
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,24 +203,12 @@ class Systematic:
 
 @dataclass(frozen=True)
 class GroupFactor:
-    """The estimated variance component of a group of observations.
+    """The estimated variance component of a group of observations."""
 
-    Attributes
-    ----------
-    group
-        Its name.
-    factor
-        By which its standard deviations are too small: the root of the component.
-    interval
-        95 percent, of the factor.
-    significant
-        Whether it differs from 1, and by enough to change weights.
-    """
-
-    group: str
-    factor: float
-    interval: tuple[float, float]
-    significant: bool
+    group: str  # Its name
+    factor: float  # By which its standard deviations are too small: the root of the component
+    interval: tuple[float, float]  # 95 percent, of the factor
+    significant: bool  # Whether it differs from 1, and by enough to change weights
 
 
 @dataclass(frozen=True)
@@ -261,87 +239,47 @@ class Removed:
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """All that the verdict on an adjustment rests on.
+    """All that the verdict on an adjustment rests on."""
 
-    Attributes
-    ----------
-    status
-        `converged`, or what else came of the iteration.
-    observations
-        Tests of single observations or groups of every kind.
-    degrees_of_freedom
-        f.
-    global_test
-        Of all residuals; None where it says nothing.
-    untested
-        Why there is no global test.
-    undetermined
-        Unknowns that the observations do not determine, or hardly.
-    hints
-        Accepted hypotheses of what is wrong with the data, as sentences ("probably ...").
-    exchanged
-        Names that are probably exchanged, as sentences.
-    spoiled
-        Why gross errors make the result unusable, where the program has found that itself; a sentence.
-    doubtful
-        Stars: exposures whose identification is doubtful or rejected.
-    checks
-        How known values that took no part agree with the result; None where there are none, or untested.
-    changed
-        What differs between occasions that should have the same values, as sentences.
-    systematic, components, snooped
-        What further computations have found, where they were made.
-    set_aside
-        What a start has taken out and does not fit the adjusted network either; None for nothing.
-    intersected
-        Whether all photos are held where they are given, so that errors of these are in all residuals.
-    scaled
-        Whether covariances are scaled by the unit variance of the residuals.
-    computed
-        Whether observations could be tested, that is, whether their redundancy numbers were computed.
-    remarks
-        Sentences that stand below the headline.
-    snoop, weigh, calibrate
-        How gross errors are taken out, held control gets a standard deviation and cameras are estimated, with
-        this program; nothing where it cannot.
-    check
-        How the program looks for mistakes of the input, as part of a sentence.
-    take_out
-        How gross errors are taken out, in a sentence of what to do next.
-    iterate
-        How an adjustment that has not converged gets more iterations or fewer unknowns, in such a sentence.
-    if_usable, if_withheld
-        What else is to be done next where nothing forbids the use, and where something does: sentences.
-    level
-        Of the global test, and of all single tests together.
-    """
-
-    status: str
-    observations: Sequence[Tested]
-    degrees_of_freedom: float
-    global_test: GlobalTest | None = None
-    untested: str = "no a-priori unit weight"
-    undetermined: Sequence[str] = ()
+    status: str  # `converged`, or what else came of the iteration
+    observations: Sequence[Tested]  # Tests of single observations or groups of every kind
+    degrees_of_freedom: float  # f
+    global_test: GlobalTest | None = None  # Of all residuals; None where it says nothing
+    untested: str = "no a-priori unit weight"  # Why there is no global test
+    undetermined: Sequence[str] = ()  # Unknowns that the observations do not determine, or hardly
+    # Accepted hypotheses of what is wrong with the data, as sentences ("probably ...")
     hints: Sequence[str] = ()
-    exchanged: Sequence[str] = ()
+    exchanged: Sequence[str] = ()  # Names that are probably exchanged, as sentences
+    # Why gross errors make the result unusable, where the program has found that itself; a sentence
     spoiled: str = ""
-    doubtful: Sequence[str] = ()
+    doubtful: Sequence[str] = ()  # Stars: exposures whose identification is doubtful or rejected
+    # How known values that took no part agree with the result; None where there are none, or untested
     checks: Agreement | None = None
+    # What differs between occasions that should have the same values, as sentences
     changed: Sequence[str] = ()
-    systematic: Sequence[Systematic] = ()
+    systematic: Sequence[Systematic] = ()  # What further computations have found, where they were made
     components: Sequence[GroupFactor] = ()
     snooped: Removed | None = None
+    # What a start has taken out and does not fit the adjusted network either; None for nothing
     set_aside: Removed | None = None
+    # Whether all photos are held where they are given, so that errors of these are in all residuals
     intersected: bool = False
-    scaled: bool = True
+    scaled: bool = True  # Whether covariances are scaled by the unit variance of the residuals
+    # Whether observations could be tested, that is, whether their redundancy numbers were computed
     computed: bool = True
-    remarks: Sequence[str] = ()
+    remarks: Sequence[str] = ()  # Sentences that stand below the headline
+    # How gross errors are taken out, held control gets a standard deviation and cameras are estimated,
+    # with this program; nothing where it cannot
     snoop: str = ""
     weigh: str = ""
     calibrate: str = ""
+    # How the program looks for mistakes of the input, as part of a sentence
     check: str = "look at units, names and signs"
-    take_out: str = ""
+    take_out: str = ""  # How gross errors are taken out, in a sentence of what to do next
+    # How an adjustment that has not converged gets more iterations or fewer unknowns, in such a
+    # sentence
     iterate: str = ""
+    # What else is to be done next where nothing forbids the use, and where something does: sentences
     if_usable: Sequence[str] = ()
     if_withheld: Sequence[str] = ()
-    level: float = LEVEL
+    level: float = LEVEL  # Of the global test, and of all single tests together

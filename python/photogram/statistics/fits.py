@@ -18,24 +18,12 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit of n values by u parameters.
+    """A fit of n values by u parameters."""
 
-    Attributes
-    ----------
-    root
-        (n, n) L.
-    basis
-        (n, u) B.
-    whitened
-        (n,) residuals, observed minus fitted, of unit weight.
-    parameters, cofactors
-        (u,) and (u, u).
-    """
-
-    root: Floats
-    basis: Floats
-    whitened: Floats
-    parameters: Floats
+    root: Floats  # (n, n) L
+    basis: Floats  # (n, u) B
+    whitened: Floats  # (n,) residuals, observed minus fitted, of unit weight
+    parameters: Floats  # (u,) and (u, u)
     cofactors: Floats
 
     @classmethod

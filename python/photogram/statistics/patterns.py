@@ -37,27 +37,16 @@ CELLS = 10
 
 @dataclass(frozen=True)
 class Normality:
-    """How residuals are distributed.
+    """How residuals are distributed."""
 
-    Attributes
-    ----------
-    values
-        How many.
-    excess
-        Excess kurtosis; 0 of the normal distribution.
-    beyond
-        Shares of values beyond 2 and 3 standard deviations: normal are 0.0455 and 0.0027.
-    statistic
-        Anderson and Darling's A^2 with mean and variance estimated, corrected for the number (Stephens 1974).
-    probability
-        Of a value as large, of normal ones.
-    """
-
-    values: int
-    excess: float
+    values: int  # How many
+    excess: float  # Excess kurtosis; 0 of the normal distribution
+    # Shares of values beyond 2 and 3 standard deviations: normal are 0.0455 and 0.0027
     beyond: tuple[float, float]
+    # Anderson and Darling's A^2 with mean and variance estimated, corrected for the number (Stephens
+    # 1974)
     statistic: float
-    probability: float
+    probability: float  # Of a value as large, of normal ones
 
 
 def normality(values: Floats) -> Normality | None:
@@ -100,28 +89,15 @@ def _of_anderson_darling(a: float) -> float:
 
 @dataclass(frozen=True)
 class FramePattern:
-    """Mean residuals over the frame of a camera.
+    """Mean residuals over the frame of a camera."""
 
-    Attributes
-    ----------
-    statistic, dof
-        Sum over bins and axes of (sum of ~v)^2 / (sum of r), and its degrees of freedom (chi-square).
-    probability
-        Of a statistic as large without a pattern.
-    rms
-        Root mean square of the mean vectors of the bins, in standard deviations, x and y together.
-    largest
-        The largest mean vector of a bin, in standard deviations.
-    at
-        Mean image coordinates in that bin.
-    """
-
+    # Sum over bins and axes of (sum of ~v)^2 / (sum of r), and its degrees of freedom (chi-square)
     statistic: float
     dof: float
-    probability: float
-    rms: float
-    largest: tuple[float, float]
-    at: tuple[float, float]
+    probability: float  # Of a statistic as large without a pattern
+    rms: float  # Root mean square of the mean vectors of the bins, in standard deviations, x and y together
+    largest: tuple[float, float]  # The largest mean vector of a bin, in standard deviations
+    at: tuple[float, float]  # Mean image coordinates in that bin
 
 
 def frame_pattern(
@@ -237,22 +213,12 @@ def _quadratic(matrices: Floats, vectors: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Fit:
-    """A regression of test values on other figures.
+    """A regression of test values on other figures."""
 
-    Attributes
-    ----------
-    statistic, dof
-        F, and its degrees of freedom.
-    probability
-        Of a statistic as large without a dependence.
-    rms
-        Root mean square of the fitted values, in standard deviations.
-    """
-
-    statistic: float
+    statistic: float  # F, and its degrees of freedom
     dof: tuple[float, float]
-    probability: float
-    rms: float
+    probability: float  # Of a statistic as large without a dependence
+    rms: float  # Root mean square of the fitted values, in standard deviations
 
 
 def regression(values: Floats, design: Floats, used: Bools | None = None) -> Fit | None:

@@ -35,20 +35,11 @@ _MAGNITUDES = (6.0, 9.0)
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Where an exposure looks.
+    """Where an exposure looks."""
 
-    Attributes
-    ----------
-    attitude
-        (3,) alpha, omega, kappa, radians; NaN where it was not found.
-    field
-        Horizontal field of view, radians; NaN where it was not found.
-    mirrored
-        Whether its images are found only when they are mirrored: then there is no attitude.
-    """
-
-    attitude: Floats
-    field: float
+    attitude: Floats  # (3,) alpha, omega, kappa, radians; NaN where it was not found
+    field: float  # Horizontal field of view, radians; NaN where it was not found
+    # Whether its images are found only when they are mirrored: then there is no attitude
     mirrored: bool = False
 
     @property

@@ -16,25 +16,13 @@ __all__ = ["ComparatorFrame", "comparator_frame"]
 
 @dataclass(frozen=True, eq=False)
 class ComparatorFrame:
-    """The affinity of the plate coordinates along other axes.
+    """The affinity of the plate coordinates along other axes."""
 
-    Attributes
-    ----------
-    angle
-        From the axes of the plate coordinates to these, from x towards y; radians.
-    scale_x, scale_y
-        Principal distances along the axes over their mean.
-    epsilon
-        Nonperpendicularity of the axes, radians; of the calibration itself at the angle zero.
-    covariance
-        (3, 3) of these three.
-    """
-
-    angle: float
-    scale_x: float
+    angle: float  # From the axes of the plate coordinates to these, from x towards y; radians
+    scale_x: float  # Principal distances along the axes over their mean
     scale_y: float
-    epsilon: float
-    covariance: Floats
+    epsilon: float  # Nonperpendicularity of the axes, radians; of the calibration itself at the angle zero
+    covariance: Floats  # (3, 3) of these three
 
     @property
     def mean_errors(self) -> tuple[float, float, float]:

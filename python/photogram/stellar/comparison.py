@@ -130,19 +130,12 @@ _ATTITUDE = 3
 
 @dataclass(frozen=True)
 class HeldOut:
-    """How an exposure fits the camera of the others.
+    """How an exposure fits the camera of the others."""
 
-    Attributes
-    ----------
-    factor
-        Root mean square of its residuals under that camera over what the others' residuals foretell; NaN
-        where that cannot be told.
-    probability
-        Of a sum of squares as large, the unit weight of the others taken as known.
-    """
-
+    # Root mean square of its residuals under that camera over what the others' residuals foretell; NaN
+    # where that cannot be told
     factor: float
-    probability: float
+    probability: float  # Of a sum of squares as large, the unit weight of the others taken as known
 
     def unlike(self, exposures: int) -> bool:
         """Whether one of so many exposures does not fit the others."""

@@ -16,32 +16,19 @@ from photogram.stellar.sky import TAU, refraction
 
 @dataclass(frozen=True, eq=False)
 class DistortionCurves:
-    """Distortion over the distance from its centre; metres.
+    """Distortion over the distance from its centre; metres."""
 
-    Attributes
-    ----------
-    distance
-        (n,) from the centre of distortion.
-    radial, transformed, decentering
-        (n,) radial distortion, the same with the calibrated principal distance (it vanishes at the
-        crossover), and the profile of the decentering distortion.
-    radial_error, transformed_error, decentering_error
-        (n,) their mean errors.
-    scale
-        K0, the linear term of the transformation.
-    calibrated, calibrated_error
-        Calibrated principal distance c (1 - K0) and its mean error.
-    """
-
-    distance: Floats
+    distance: Floats  # (n,) from the centre of distortion
+    # (n,) radial distortion, the same with the calibrated principal distance (it vanishes at the
+    # crossover), and the profile of the decentering distortion
     radial: Floats
     transformed: Floats
     decentering: Floats
-    radial_error: Floats
+    radial_error: Floats  # (n,) their mean errors
     transformed_error: Floats
     decentering_error: Floats
-    scale: float
-    calibrated: float
+    scale: float  # K0, the linear term of the transformation
+    calibrated: float  # Calibrated principal distance c (1 - K0) and its mean error
     calibrated_error: float
 
 
@@ -86,17 +73,10 @@ def _errors(rows: Floats, covariance: Floats, names: list[str]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class RefractionCurves:
-    """Refraction around the axis of an attitude; radians.
+    """Refraction around the axis of an attitude; radians."""
 
-    Attributes
-    ----------
-    zenith_distance
-        (21,) observed, from ten degrees above to ten below the axis; never negative.
-    given, corrected, error
-        (21,) refraction with the given and the estimated coefficients, and the mean error of the latter.
-    """
-
-    zenith_distance: Floats
+    zenith_distance: Floats  # (21,) observed, from ten degrees above to ten below the axis; never negative
+    # (21,) refraction with the given and the estimated coefficients, and the mean error of the latter
     given: Floats
     corrected: Floats
     error: Floats
@@ -121,22 +101,13 @@ def refraction_curves(result: Result, group: int) -> RefractionCurves:
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """A histogram with the normal curve.
+    """A histogram with the normal curve."""
 
-    Attributes
-    ----------
-    edges
-        (k + 1,) of the classes: equal, from 3.25 standard deviations below the mean to as much above.
-    counts, expected
-        (k,) residuals in each class, and as many as the normal distribution puts there.
-    mean, sd
-        Of all residuals.
-    """
-
+    # (k + 1,) of the classes: equal, from 3.25 standard deviations below the mean to as much above
     edges: Floats
-    counts: Indices
+    counts: Indices  # (k,) residuals in each class, and as many as the normal distribution puts there
     expected: Floats
-    mean: float
+    mean: float  # Of all residuals
     sd: float
 
 

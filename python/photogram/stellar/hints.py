@@ -63,18 +63,10 @@ class Setting:
 
 @dataclass(frozen=True)
 class Hint:
-    """A mistake that explains why stars were not found.
+    """A mistake that explains why stars were not found."""
 
-    Attributes
-    ----------
-    text
-        What the input seems to have.
-    exposures
-        Those that show stars when it is mended.
-    """
-
-    text: str
-    exposures: tuple[str, ...]
+    text: str  # What the input seems to have
+    exposures: tuple[str, ...]  # Those that show stars when it is mended
 
 
 @dataclass(frozen=True)

@@ -96,25 +96,14 @@ _FOR_ATTITUDE = 3
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """Stars of the images of an exposure, and what speaks for them.
+    """Stars of the images of an exposure, and what speaks for them."""
 
-    Attributes
-    ----------
-    stars
-        (k,) index in the catalogue; -1 where there is none, and everywhere where chance would have found as
-        much.
-    match
-        The count that was made.
-    found
-        (k,) the stars that the best hypothesis gives, whatever speaks for it.
-    attitude
-        (3,) alpha, omega, kappa that go with them; the given one where there are not enough.
-    """
-
+    # (k,) index in the catalogue; -1 where there is none, and everywhere where chance would have found
+    # as much
     stars: Indices
-    match: Match
-    found: Indices
-    attitude: Floats
+    match: Match  # The count that was made
+    found: Indices  # (k,) the stars that the best hypothesis gives, whatever speaks for it
+    attitude: Floats  # (3,) alpha, omega, kappa that go with them; the given one where there are not enough
 
     @property
     def accepted(self) -> bool:
@@ -220,36 +209,16 @@ def identify(
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Stars of an exposure under a calibrated camera.
+    """Stars of an exposure under a calibrated camera."""
 
-    Attributes
-    ----------
-    stars
-        (k,) catalogue star of each image, -1 for none.
-    off
-        (k,) largest coordinate difference of image and star, pixels; NaN for none.
-    inside
-        Catalogue stars in the frame.
-    predicted
-        (n, 2) where they and those within reach are, pixels.
-    nearest
-        (k,) which of these each image has; -1 for none.
-    area
-        Of the frame that shows the sky, square pixels.
-    xy
-        (k, 2) the images.
-    named
-        Whether the images name their stars.
-    """
-
-    stars: Indices
-    off: Floats
-    inside: int
-    predicted: Floats
-    nearest: Indices
-    area: float
-    xy: Floats
-    named: bool = False
+    stars: Indices  # (k,) catalogue star of each image, -1 for none
+    off: Floats  # (k,) largest coordinate difference of image and star, pixels; NaN for none
+    inside: int  # Catalogue stars in the frame
+    predicted: Floats  # (n, 2) where they and those within reach are, pixels
+    nearest: Indices  # (k,) which of these each image has; -1 for none
+    area: float  # Of the frame that shows the sky, square pixels
+    xy: Floats  # (k, 2) the images
+    named: bool = False  # Whether the images name their stars
 
     @property
     def density(self) -> float:

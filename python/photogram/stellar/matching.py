@@ -29,34 +29,17 @@ STRETCH = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """What was matched, and how likely chance would have done as well.
+    """What was matched, and how likely chance would have done as well."""
 
-    Attributes
-    ----------
-    found
-        (m,) index of the predicted image of each image; -1 where there is none.
-    expected
-        Expected number of equally good matches among all hypotheses if every one of them is wrong.
-    matched, images
-        Of how many images the count was made that this rests on, and how many of them matched.
-    crowded
-        Whether there are so many stars in a tolerance area that counting cannot tell.
-    scale
-        Of the predicted images over the measured ones.
-    hypotheses
-        How many were counted.
-    stars
-        Predicted images that there are to be matched.
-    """
-
-    found: Indices
+    found: Indices  # (m,) index of the predicted image of each image; -1 where there is none
+    # Expected number of equally good matches among all hypotheses if every one of them is wrong
     expected: float
-    matched: int
+    matched: int  # Of how many images the count was made that this rests on, and how many of them matched
     images: int
-    crowded: bool = False
-    scale: float = 1.0
-    hypotheses: float = 0.0
-    stars: int = 0
+    crowded: bool = False  # Whether there are so many stars in a tolerance area that counting cannot tell
+    scale: float = 1.0  # Of the predicted images over the measured ones
+    hypotheses: float = 0.0  # How many were counted
+    stars: int = 0  # Predicted images that there are to be matched
 
     @property
     def accepted(self) -> bool:
@@ -66,31 +49,17 @@ class Match:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Where the images of stars may be.
+    """Where the images of stars may be."""
 
-    Attributes
-    ----------
-    frame
-        Width and height.
-    radius
-        Largest distance between an image and its prediction; where the roll is not known, of their distances
-        from the axis.
-    stretch
-        Share by which the scale may be wrong.
-    axis
-        (2,) the point about which the camera may be turned; None where its roll is known.
-    share
-        What of the frame shows the sky.
-    tried
-        Hypotheses that were counted before in the same exposure.
-    """
-
-    frame: tuple[float, float]
+    frame: tuple[float, float]  # Width and height
+    # Largest distance between an image and its prediction; where the roll is not known, of their
+    # distances from the axis
     radius: float
-    stretch: float = STRETCH
+    stretch: float = STRETCH  # Share by which the scale may be wrong
+    # (2,) the point about which the camera may be turned; None where its roll is known
     axis: Floats | None = None
-    share: float = 1.0
-    tried: float = 0.0
+    share: float = 1.0  # What of the frame shows the sky
+    tried: float = 0.0  # Hypotheses that were counted before in the same exposure
 
     def regions(self, predicted: Floats) -> tuple[Bools, float, float]:
         """Return which predicted images are in the middle, the area of that, and the area of all."""
@@ -115,18 +84,10 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class _Sky:
-    """Predicted images as deep as the measured ones, and their density.
+    """Predicted images as deep as the measured ones, and their density."""
 
-    Attributes
-    ----------
-    predicted
-        (n, 2), the brightest first.
-    density
-        Stars a square pixel: in the frame or around it, whichever is larger.
-    """
-
-    predicted: Floats
-    density: float
+    predicted: Floats  # (n, 2), the brightest first
+    density: float  # Stars a square pixel: in the frame or around it, whichever is larger
 
     @classmethod
     def as_deep(cls, predicted: Floats, images: int, search: Search) -> _Sky:

@@ -35,40 +35,19 @@ _UNEXPLAINED = (
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """An exposure that takes part.
+    """An exposure that takes part."""
 
-    Attributes
-    ----------
-    index
-        Among those of the night.
-    stars
-        (k,) catalogue star of each image, -1 for none.
-    kept
-        (k,) which images take part.
-    attitude
-        (3,) that the stars of the first identification give.
-    first
-        Expected number of chance matches as good as the first identification; NaN where images name their
-        stars.
-    odds
-        Expected number of wrong attitudes that would do as well under the camera.
-    log_odds
-        Of the exposure against chance, as Lang et al. have them.
-    probabilities
-        (k,) of the stars; NaN for none.
-    scale
-        Of predicted images over measured ones.
-    """
-
-    index: int
-    stars: Indices
-    kept: Bools
-    attitude: Floats
+    index: int  # Among those of the night
+    stars: Indices  # (k,) catalogue star of each image, -1 for none
+    kept: Bools  # (k,) which images take part
+    attitude: Floats  # (3,) that the stars of the first identification give
+    # Expected number of chance matches as good as the first identification; NaN where images name their
+    # stars
     first: float = math.nan
-    odds: float = 0.0
-    log_odds: float = math.nan
-    probabilities: Floats = field(default_factory=lambda: np.zeros(0))
-    scale: float = 1.0
+    odds: float = 0.0  # Expected number of wrong attitudes that would do as well under the camera
+    log_odds: float = math.nan  # Of the exposure against chance, as Lang et al. have them
+    probabilities: Floats = field(default_factory=lambda: np.zeros(0))  # (k,) of the stars; NaN for none
+    scale: float = 1.0  # Of predicted images over measured ones
 
     @property
     def expected(self) -> float:

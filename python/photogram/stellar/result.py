@@ -50,28 +50,14 @@ class Movement:
 
 @dataclass(frozen=True, eq=False)
 class FictitiousPoint:
-    """A plate point as a direction under one attitude.
+    """A plate point as a direction under one attitude."""
 
-    Attributes
-    ----------
-    group
-        Of the attitude.
-    xy
-        x = y of the point, metres.
-    place
-        Apparent right ascension and declination, radians.
-    azimuth, elevation
-        Observed (refracted) ones: azimuth from south, positive west; radians.
-    covariance
-        (2, 2) of the place from the orientation, radians squared.
-    """
-
-    group: str
-    xy: float
-    place: tuple[float, float]
-    azimuth: float
+    group: str  # Of the attitude
+    xy: float  # x = y of the point, metres
+    place: tuple[float, float]  # Apparent right ascension and declination, radians
+    azimuth: float  # Observed (refracted) ones: azimuth from south, positive west; radians
     elevation: float
-    covariance: Floats
+    covariance: Floats  # (2, 2) of the place from the orientation, radians squared
 
 
 CORRELATED = 0.95

@@ -25,24 +25,15 @@ TESTED = (12, 8)
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of two calibrations.
+    """One of two calibrations."""
 
-    Attributes
-    ----------
-    name, camera
-        The camera.
-    corners
-        (m, 2) where it has seen the board; none where that is not known.
-    covariance
-        (p, p) of its parameters; None where it is not known.
-    rows
-        (6, p) the datum `corners` (:func:`~photogram.targets.projection.fixed_points`); None as `covariance`.
-    """
-
-    name: str
+    name: str  # The camera
     camera: Camera
+    # (m, 2) where it has seen the board; none where that is not known
     corners: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    covariance: Floats | None = None
+    covariance: Floats | None = None  # (p, p) of its parameters; None where it is not known
+    # (6, p) the datum `corners` (:func:`~photogram.targets.projection.fixed_points`); None as
+    # `covariance`
     rows: Floats | None = None
 
     def covariances(self, points: Floats, finite: bool, rows: Floats | None) -> Floats:

@@ -23,73 +23,35 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What the files of one format hold: n corners in I images.
+    """What the files of one format hold: n corners in I images."""
 
-    Attributes
-    ----------
-    path
-        The file or folder.
-    images
-        I names; the same may be there once for each camera.
-    image, point
-        (n,) the image of each corner, and the number of the board's point.
-    xy, sd, use
-        As of :class:`Corners`, but in the pixels of the file.
-    cameras, views
-        I names; None where the file does not say them.
-    times
-        (I,) seconds.
-    sizes
-        Width and height by the name of a camera, of all by "".
-    picture_sizes
-        I widths and heights, where pictures themselves say them.
-    board
-        The board, where the file says it.
-    messages
-        Remarks.
-    """
-
-    path: Path
-    images: Sequence[str]
-    image: Indices
+    path: Path  # The file or folder
+    images: Sequence[str]  # I names; the same may be there once for each camera
+    image: Indices  # (n,) the image of each corner, and the number of the board's point
     point: Indices
-    xy: Floats
+    xy: Floats  # As of :class:`Corners`, but in the pixels of the file
     sd: Floats
     use: Bools
-    cameras: Sequence[str] | None = None
+    cameras: Sequence[str] | None = None  # I names; None where the file does not say them
     views: Sequence[str] | None = None
-    times: Floats | None = None
+    times: Floats | None = None  # (I,) seconds
+    # Width and height by the name of a camera, of all by ""
     sizes: Mapping[str, Size] = field(default_factory=dict)
-    picture_sizes: Sequence[Size] = ()
-    board: Board | None = None
-    messages: Sequence[Message] = ()
+    picture_sizes: Sequence[Size] = ()  # I widths and heights, where pictures themselves say them
+    board: Board | None = None  # The board, where the file says it
+    messages: Sequence[Message] = ()  # Remarks
 
 
 @dataclass(frozen=True)
 class Grouping:
-    """What a user says of cameras and views, where files or names of images do not.
+    """What a user says of cameras and views, where files or names of images do not."""
 
-    Attributes
-    ----------
-    cameras
-        A pattern (`left*.jpg`) for each camera, which names its images.
-    views
-        Whether images of one view are known by their names or by their times.
-    within
-        Seconds that images of one view are apart at the most.
-    apart
-        Whether every image is a view of its own: they are not synchronised.
-    size
-        Width and height of all pictures.
-    origin
-        What is 0, 0: the `center` or the upper-left `corner` of the first pixel.
-    """
-
-    cameras: Sequence[str] = ()
-    views: ViewBy = "name"
-    within: float = 0.005
-    apart: bool = False
-    size: Size | None = None
+    cameras: Sequence[str] = ()  # A pattern (`left*.jpg`) for each camera, which names its images
+    views: ViewBy = "name"  # Whether images of one view are known by their names or by their times
+    within: float = 0.005  # Seconds that images of one view are apart at the most
+    apart: bool = False  # Whether every image is a view of its own: they are not synchronised
+    size: Size | None = None  # Width and height of all pictures
+    # What is 0, 0: the `center` or the upper-left `corner` of the first pixel
     origin: Literal["center", "corner"] = "center"
 
 

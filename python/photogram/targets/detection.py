@@ -115,25 +115,17 @@ Placed = tuple[Found, float] | None
 
 @dataclass
 class Tags:
-    """How tags of a board are looked for, and what becomes of them.
+    """How tags of a board are looked for, and what becomes of them."""
 
-    Attributes
-    ----------
-    ways
-        Detectors of families of tags that the board may have, and where on it their centres are, by number.
-    corners_of
-        Returns corners from a picture, the way, numbers and corners of tags, the homography of their centres;
-        with them half the window of a corner over the distance between nearest points of the board.
-    places
-        (n, 2) of the points of the board.
-    cv2
-        OpenCV.
-    """
-
+    # Detectors of families of tags that the board may have, and where on it their centres are, by
+    # number
     ways: Sequence[tuple[Any, Floats]]
+    # Returns corners from a picture, the way, numbers and corners of tags, the homography of their
+    # centres; with them half the window of a corner over the distance between nearest points of the
+    # board
     corners_of: Callable[..., Placed]
-    places: Floats
-    cv2: Any
+    places: Floats  # (n, 2) of the points of the board
+    cv2: Any  # OpenCV
     chosen: int | None = field(default=None, init=False)
     """The way of the first picture that showed the board: it has one family of tags."""
 

@@ -34,27 +34,16 @@ NAMED = 6
 
 @dataclass(frozen=True, eq=False)
 class Showing:
-    """How a board was shown to a camera.
+    """How a board was shown to a camera."""
 
-    Attributes
-    ----------
-    camera, unit
-        Its name, and the unit of distances.
-    parts, empty
-        How many of the 5 x 4 parts of its picture show anything through the lens, and the names of those
-        where no corner was; None where nobody knows the size of the picture.
-    distances
-        (n,) of the middle of the board, in the views of the camera.
-    tilts
-        (n,) of the board against the picture, degrees.
-    """
-
-    camera: str
+    camera: str  # Its name, and the unit of distances
     unit: str
+    # How many of the 5 x 4 parts of its picture show anything through the lens, and the names of those
+    # where no corner was; None where nobody knows the size of the picture
     parts: int
     empty: tuple[str, ...] | None
-    distances: Floats
-    tilts: Floats
+    distances: Floats  # (n,) of the middle of the board, in the views of the camera
+    tilts: Floats  # (n,) of the board against the picture, degrees
 
     @property
     def sentence(self) -> str:

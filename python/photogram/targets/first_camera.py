@@ -37,24 +37,12 @@ ROUGHLY = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """A camera with the poses of its views, adjusted.
+    """A camera with the poses of its views, adjusted."""
 
-    Attributes
-    ----------
-    camera
-        The camera; what was free of it is.
-    poses
-        (P, 4, 4) board -> camera.
-    variance
-        The variance of unit weight, px^2.
-    is_whole
-        Whether all that was free was adjusted, converged, and is more than hardly determined.
-    """
-
-    camera: Camera
-    poses: Floats
-    variance: float
-    is_whole: bool
+    camera: Camera  # The camera; what was free of it is
+    poses: Floats  # (P, 4, 4) board -> camera
+    variance: float  # The variance of unit weight, px^2
+    is_whole: bool  # Whether all that was free was adjusted, converged, and is more than hardly determined
 
 
 def adjusted_views(
@@ -131,21 +119,11 @@ FAMILIES: Mapping[str, Callable[[float], float]] = MappingProxyType(
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A lens that was tried.
+    """A lens that was tried."""
 
-    Attributes
-    ----------
-    camera
-        Its focal length and principal point, free.
-    orders
-        (P,) in which order the corners of each picture fit best.
-    misfits
-        (P,) median angles (rad) between rays and the board in each.
-    """
-
-    camera: Camera
-    orders: Indices
-    misfits: Floats
+    camera: Camera  # Its focal length and principal point, free
+    orders: Indices  # (P,) in which order the corners of each picture fit best
+    misfits: Floats  # (P,) median angles (rad) between rays and the board in each
 
     @property
     def angle(self) -> float:

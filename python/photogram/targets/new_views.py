@@ -50,26 +50,15 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Added:
-    """The m images of a view that may be taken, over their standard deviation.
+    """The m images of a view that may be taken, over their standard deviation."""
 
-    Attributes
-    ----------
-    touched, by_cameras
-        (t,) unknowns of cameras and sensors that they touch, and (2 m, t) their partials by these.
-    places, by_place
-        (m, 3) rows of the places of their points, and (m, 2, 3) partials by these.
-    by_pose
-        (2 m, 6).
-    corners
-        (K,) how many are in the picture of each camera.
-    """
-
+    # (t,) unknowns of cameras and sensors that they touch, and (2 m, t) their partials by these
     touched: Indices
     by_cameras: Floats
-    places: Indices
+    places: Indices  # (m, 3) rows of the places of their points, and (m, 2, 3) partials by these
     by_place: Floats
-    by_pose: Floats
-    corners: Indices
+    by_pose: Floats  # (2 m, 6)
+    corners: Indices  # (K,) how many are in the picture of each camera
 
     def gain(self, cofactors: Floats, rows: Indices | slice) -> Floats:
         """Return (k, k) what the cofactors of :func:`placed_cofactors` lose in some rows: G' W G."""

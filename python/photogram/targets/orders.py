@@ -34,27 +34,13 @@ def _rays(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Floats
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """P pictures with the cameras that took them.
+    """P pictures with the cameras that took them."""
 
-    Attributes
-    ----------
-    seen
-        What they show.
-    names
-        P names.
-    of_cameras
-        (P,) which camera took each.
-    cameras
-        The cameras, with their first values.
-    usable
-        (P,) whether a picture has corners enough; others have no rays.
-    """
-
-    seen: Sightings
-    names: list[str]
-    of_cameras: Indices
-    cameras: list[Camera]
-    usable: Bools
+    seen: Sightings  # What they show
+    names: list[str]  # P names
+    of_cameras: Indices  # (P,) which camera took each
+    cameras: list[Camera]  # The cameras, with their first values
+    usable: Bools  # (P,) whether a picture has corners enough; others have no rays
 
     def poses(self, orders: Indices) -> Floats:
         """Return (P, 4, 4) poses board -> camera with corners listed in (P,) orders; NaN where unknown."""

@@ -184,25 +184,15 @@ _SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Listings:
-    """Orders in which the corners of a board may be listed, that of their numbers first.
+    """Orders in which the corners of a board may be listed, that of their numbers first."""
 
-    Attributes
-    ----------
-    points
-        (g, n) of which point of the board the k-th corner of a list is.
-    shapes
-        Of the orders that differ by more than a symmetry of the board, the first ones: homographies tell
-        these apart, and no others.
-    turns
-        Symmetries that turn the board in its plane, by their orders: (4, 4) places as listed -> places.
-    one_sided
-        Whether the board is seen from one side alone, as what is printed is.
-    """
-
-    points: Indices
+    points: Indices  # (g, n) of which point of the board the k-th corner of a list is
+    # Of the orders that differ by more than a symmetry of the board, the first ones: homographies tell
+    # these apart, and no others
     shapes: tuple[int, ...]
+    # Symmetries that turn the board in its plane, by their orders: (4, 4) places as listed -> places
     turns: dict[int, Floats]
-    one_sided: bool
+    one_sided: bool  # Whether the board is seen from one side alone, as what is printed is
 
     @classmethod
     def of(cls, board: Board) -> Self:
@@ -263,27 +253,13 @@ def _is_affine(a: Floats, b: Floats, size: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """A board in P pictures.
+    """A board in P pictures."""
 
-    Attributes
-    ----------
-    places
-        (n, 3) points of the board, in axes whose x and y lie in its plane where it has one.
-    axes
-        (4, 4) board -> these axes; other ones only for points that lie anywhere.
-    listings
-        The orders in which its corners may be listed.
-    xy
-        (P, n, 2) pixels, NaN where a point was not seen.
-    sd
-        (P, n) their standard deviations.
-    """
-
-    places: Floats
-    axes: Floats
-    listings: Listings
-    xy: Floats
-    sd: Floats
+    places: Floats  # (n, 3) points of the board, in axes whose x and y lie in its plane where it has one
+    axes: Floats  # (4, 4) board -> these axes; other ones only for points that lie anywhere
+    listings: Listings  # The orders in which its corners may be listed
+    xy: Floats  # (P, n, 2) pixels, NaN where a point was not seen
+    sd: Floats  # (P, n) their standard deviations
 
     @classmethod
     def of_corners(cls, board: Board, corners: Corners) -> Self:

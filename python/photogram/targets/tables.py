@@ -127,21 +127,12 @@ STRETCHES = ("scale x", "scale y", "shear")
 
 @dataclass(frozen=True, eq=False)
 class BoardFit:
-    """The adjusted points of a board against their nominal places.
+    """The adjusted points of a board against their nominal places."""
 
-    Attributes
-    ----------
-    plane
-        (3,) a, b, c of z = a + b x + c y, fitted to the adjusted points.
-    rms_out_of_plane
-        Of z about it, in the unit of the board.
-    stretch, sd
-        (3,) in ppm, with standard deviations: by how much the spacing along x and along y is longer than it
-        should be, and the sine of what the angle between columns and rows lacks of 90 degrees.
-    """
-
-    plane: Floats
-    rms_out_of_plane: float
+    plane: Floats  # (3,) a, b, c of z = a + b x + c y, fitted to the adjusted points
+    rms_out_of_plane: float  # Of z about it, in the unit of the board
+    # (3,) in ppm, with standard deviations: by how much the spacing along x and along y is longer than
+    # it should be, and the sine of what the angle between columns and rows lacks of 90 degrees
     stretch: Floats
     sd: Floats
 

@@ -100,21 +100,12 @@ TURNED: Floats = np.diag(FLIP)
 
 @dataclass(frozen=True, eq=False)
 class Imaged:
-    """Images of n points with their partials; NaN where a point has none.
+    """Images of n points with their partials; NaN where a point has none."""
 
-    Attributes
-    ----------
-    xy
-        (n, 2) image coordinates.
-    by_point
-        (n, 2, 3) by the point: Pi.
-    by_parameters
-        (n, 2, p) by the parameters of the camera that are unknown, in their order, then by its unknown knots:
-        K.
-    """
-
-    xy: Floats
-    by_point: Floats
+    xy: Floats  # (n, 2) image coordinates
+    by_point: Floats  # (n, 2, 3) by the point: Pi
+    # (n, 2, p) by the parameters of the camera that are unknown, in their order, then by its unknown
+    # knots: K
     by_parameters: Floats
 
 
@@ -126,22 +117,12 @@ def imaged(camera: Camera, points: Floats) -> Imaged:
 
 @dataclass(frozen=True, eq=False)
 class Touched:
-    """Images of n points by a lens of knots, with their partials by the k unknowns that each steps with.
+    """Images of n points by a lens of knots, with their partials by the k unknowns that each steps with."""
 
-    Attributes
-    ----------
-    xy, by_point
-        As of :class:`Imaged`.
-    columns
-        (n, k) which of the p parameters and knots that are unknown.
-    by_columns
-        (n, 2, k) by these.
-    """
-
-    xy: Floats
+    xy: Floats  # As of :class:`Imaged`
     by_point: Floats
-    columns: Indices
-    by_columns: Floats
+    columns: Indices  # (n, k) which of the p parameters and knots that are unknown
+    by_columns: Floats  # (n, 2, k) by these
 
 
 def touched(camera: Camera, points: Floats) -> Touched:

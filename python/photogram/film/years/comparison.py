@@ -45,21 +45,13 @@ _RADIAL = ((0, 1), (-2, 3), (3, -12, 10), (-4, 30, -60, 35))
 
 @dataclass(frozen=True, eq=False)
 class CameraFigures:
-    """Values (k, m) of k calibrations with their covariances (k, m, m), names and units.
+    """Values (k, m) of k calibrations with their covariances (k, m, m), names and units."""
 
-    Attributes
-    ----------
-    values, covariances, names, units
-        Of what all calibrations estimated.
-    held
-        Names of what some calibrations estimated, and others held: it cannot be compared.
-    """
-
-    values: Floats
+    values: Floats  # Of what all calibrations estimated
     covariances: Floats
     names: tuple[str, ...]
     units: tuple[str, ...]
-    held: tuple[str, ...]
+    held: tuple[str, ...]  # Names of what some calibrations estimated, and others held: it cannot be compared
 
 
 def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:

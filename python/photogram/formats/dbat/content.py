@@ -85,37 +85,27 @@ def sensors_of_table(
 
 @dataclass
 class Content:
-    """What the files hold: photos and points are known by their numbers.
-
-    Attributes
-    ----------
-    sensors
-        The cameras by name.
-    photos, cameras, poses
-        Name and camera of each photo; its centre, and omega, phi, kappa in radians.
-    control, checks, check_sd, starts
-        Position and standard deviations of control points, those of check points, and positions of others as
-        they were computed before.
-    pixels, image_sd
-        (m, 2) columns and rows from the corner, and their standard deviations; NaN where none is said.
-    held, free
-        Photos whose pose is held, and parameters of cameras that are unknown.
-    """
+    """What the files hold: photos and points are known by their numbers."""
 
     path: Path
     title: str
-    sensors: dict[str, Sensor] = field(default_factory=dict)
+    sensors: dict[str, Sensor] = field(default_factory=dict)  # The cameras by name
+    # Name and camera of each photo; its centre, and omega, phi, kappa in radians
     photos: dict[int, str] = field(default_factory=dict)
     cameras: dict[int, str] = field(default_factory=dict)
     poses: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
+    # Position and standard deviations of control points, those of check points, and positions of others
+    # as they were computed before
     control: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
     checks: dict[int, Floats] = field(default_factory=dict)
     check_sd: dict[int, Floats] = field(default_factory=dict)
     starts: dict[int, Floats] = field(default_factory=dict)
     image_photos: list[int] = field(default_factory=list)
     image_points: list[int] = field(default_factory=list)
+    # (m, 2) columns and rows from the corner, and their standard deviations; NaN where none is said
     pixels: Floats = field(default_factory=lambda: np.empty((0, 2)))
     image_sd: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    # Photos whose pose is held, and parameters of cameras that are unknown
     held: set[int] = field(default_factory=set)
     free: set[str] = field(default_factory=set)
     options: Options = field(default_factory=Options)

@@ -203,19 +203,13 @@ def definite(tables: Tables, camera: str, xy: Floats, covariance: Floats, file: 
 
 @dataclass(frozen=True)
 class Fiducials:
-    """Marks of cameras by the names of both.
-
-    Attributes
-    ----------
-    places, sd
-        (2,) mm; deviations of those that are known one by one.
-    covariances
-        (2n, 2n) of all marks of a camera, of certificates.
-    """
+    """Marks of cameras by the names of both."""
 
     tables: Tables
+    # (2,) mm; deviations of those that are known one by one
     places: dict[str, dict[str, Floats]] = field(default_factory=dict)
     sd: dict[str, dict[str, Floats]] = field(default_factory=dict)
+    # (2n, 2n) of all marks of a camera, of certificates
     covariances: dict[str, Floats] = field(default_factory=dict)
 
     def known(

@@ -56,20 +56,11 @@ class Laid:
 
 @dataclass(frozen=True)
 class Expected:
-    """Where images of a photo should be in the camera's frame.
+    """Where images of a photo should be in the camera's frame."""
 
-    Attributes
-    ----------
-    rows
-        (m,) of the images of the photo.
-    places
-        (m,) complex, mm.
-    but
-        For what: nothing, a shift and scale, or a rotation with these.
-    """
-
-    rows: np.ndarray
-    places: Floats
+    rows: np.ndarray  # (m,) of the images of the photo
+    places: Floats  # (m,) complex, mm
+    # For what: nothing, a shift and scale, or a rotation with these
     but: Literal["nothing", "shift", "rotation"] = "nothing"
 
     def apart(self, q: Floats) -> float:
@@ -85,16 +76,10 @@ class Expected:
 
 @dataclass(frozen=True)
 class Seen:
-    """Images, and points whose coordinates are known at least nearly.
-
-    Attributes
-    ----------
-    points
-        (n, 3) coordinates; NaN where unknown.
-    """
+    """Images, and points whose coordinates are known at least nearly."""
 
     images: Images
-    points: Floats
+    points: Floats  # (n, 3) coordinates; NaN where unknown
     photos: Photos
     cameras: Cameras
 
@@ -220,21 +205,12 @@ class ScannedPhoto:
 
 @dataclass(frozen=True)
 class MarkReadings:
-    """The readings of the marks of scanned photos.
-
-    Attributes
-    ----------
-    seen
-        The images of all photos.
-    photos
-        Those that are scanned, which get their readings.
-    places
-        (2,) of marks in the frames of their cameras, by the names of both.
-    """
+    """The readings of the marks of scanned photos."""
 
     tables: Tables
-    seen: Seen
-    photos: Sequence[ScannedPhoto]
+    seen: Seen  # The images of all photos
+    photos: Sequence[ScannedPhoto]  # Those that are scanned, which get their readings
+    # (2,) of marks in the frames of their cameras, by the names of both
     places: Mapping[str, Mapping[str, Floats]]
 
     def read(self, photos: Photos) -> None:

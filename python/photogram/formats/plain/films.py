@@ -49,22 +49,13 @@ _START = ("start_t1", "start_t2", "start_theta")
 
 @dataclass(frozen=True)
 class Scanned:
-    """Photos whose images are readings: which they are, what images pass, and what was observed.
+    """Photos whose images are readings: which they are, what images pass, and what was observed."""
 
-    Attributes
-    ----------
-    photos
-        (P,) which they are.
-    scans, observations
-        What images pass, and what was observed.
-    inside
-        For the details of a project whose films are fitted before: the same with all that was read of them,
-        of which tables are written.
-    """
-
-    photos: Bools
-    scans: list[Scan] = field(default_factory=list)
+    photos: Bools  # (P,) which they are
+    scans: list[Scan] = field(default_factory=list)  # What images pass, and what was observed
     observations: list[Observation] = field(default_factory=list)
+    # For the details of a project whose films are fitted before: the same with all that was read of
+    # them, of which tables are written
     inside: dict[str, tuple[list[Scan], list[Observation]]] = field(default_factory=dict)
 
 

@@ -99,25 +99,14 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
 
 @dataclass(frozen=True)
 class _Numbers:
-    """Sx, Sy, alpha and 18 coefficients of a scanner (mm), and what is known of them.
+    """Sx, Sy, alpha and 18 coefficients of a scanner (mm), and what is known of them."""
 
-    Attributes
-    ----------
-    values, sd
-        (21,) of which those are open that have a covariance.
-    half
-        (2,) half ranges of the polynomials, mm.
-    zero
-        (2,) where these count from, mm from the origin of readings.
-    covariance
-        (21, 21); None where there is none.
-    """
-
-    values: Floats
+    values: Floats  # (21,) of which those are open that have a covariance
     sd: Floats
-    half: Floats
+    half: Floats  # (2,) half ranges of the polynomials, mm
+    # (2,) where these count from, mm from the origin of readings
     zero: Floats = field(default_factory=lambda: np.zeros(2))
-    covariance: Floats | None = None
+    covariance: Floats | None = None  # (21, 21); None where there is none
 
 
 def _check_alone(table: ColumnTable, row: int, name: str, covariances: Covariances) -> None:

@@ -53,30 +53,18 @@ def deviation_columns(names: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Schema:
-    """A table.
+    """A table."""
 
-    Attributes
-    ----------
-    required
-        Columns that it must have.
-    texts, numbers
-        All columns that it may have: names and words, and numbers.
-    about
-        What the documentation says of them.
-    deviations
-        How many standard deviations `[sd]` may have for it; none: it has no place there.
-    has_system
-        Whether its coordinates may be in another system than the frame, and its headings be those of others.
-    stands_in
-        The column that may be there in the place of a required one.
-    """
-
-    required: tuple[str, ...]
-    texts: tuple[str, ...]
+    required: tuple[str, ...]  # Columns that it must have
+    texts: tuple[str, ...]  # All columns that it may have: names and words, and numbers
     numbers: tuple[str, ...]
-    about: str
+    about: str  # What the documentation says of them
+    # How many standard deviations `[sd]` may have for it; none: it has no place there
     deviations: tuple[int, ...] = ()
+    # Whether its coordinates may be in another system than the frame, and its headings be those of
+    # others
     has_system: bool = False
+    # The column that may be there in the place of a required one
     stands_in: Mapping[str, str] = field(default_factory=dict)
 
     @property

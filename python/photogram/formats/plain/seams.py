@@ -22,18 +22,10 @@ _LINES = ("column", "row")
 
 @dataclass(frozen=True)
 class Seam:
-    """The line at which a scan was joined.
+    """The line at which a scan was joined."""
 
-    Attributes
-    ----------
-    half
-        What the photo of the second half is called.
-    line, at
-        `column` or `row`, and that from which readings are of the second half.
-    """
-
-    half: str
-    line: str
+    half: str  # What the photo of the second half is called
+    line: str  # `column` or `row`, and that from which readings are of the second half
     at: float
 
 

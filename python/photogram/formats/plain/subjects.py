@@ -21,19 +21,11 @@ _COLUMNS: Mapping[type, tuple[str, str]] = {Clock: ("clock", "time_offset"), Rea
 
 @dataclass(frozen=True)
 class Subjects:
-    """What observations may be of.
+    """What observations may be of."""
 
-    Attributes
-    ----------
-    photos, times
-        Photos by their names, and the times of each in seconds; NaN without.
-    trajectories
-        By their names.
-    """
-
-    photos: Mapping[str, int]
+    photos: Mapping[str, int]  # Photos by their names, and the times of each in seconds; NaN without
     times: Sequence[float]
-    trajectories: Mapping[str, Trajectory]
+    trajectories: Mapping[str, Trajectory]  # By their names
 
     def of(self, tables: Tables, table: ColumnTable) -> list[dict[str, Any] | None]:
         """Return what each row is of, as arguments of its observation; None of those that are left out.

@@ -119,18 +119,10 @@ def attitude_name(photo_to_ground: bool) -> str:
 
 @dataclass(frozen=True)
 class Space:
-    """How coordinates of the object space are named and written.
+    """How coordinates of the object space are named and written."""
 
-    Attributes
-    ----------
-    geographic
-        Longitude, latitude and elevation, or X, Y and Z.
-    unit
-        The linear unit, as a block names it.
-    """
-
-    geographic: bool
-    unit: str = "m"
+    geographic: bool  # Longitude, latitude and elevation, or X, Y and Z
+    unit: str = "m"  # The linear unit, as a block names it
 
     @property
     def names(self) -> tuple[str, str, str]:

@@ -40,52 +40,30 @@ MEAN_SHARE, MOST_TIMES = 0.25, 3.0
 
 @dataclass(frozen=True)
 class Accuracy:
-    """A figure of the standard, with what it is made of, in the linear unit.
+    """A figure of the standard, with what it is made of, in the linear unit."""
 
-    Attributes
-    ----------
-    count
-        Check points.
-    found, survey
-        RMSE of the differences (RMSE_1), and of the check survey as its standard deviations have it (RMSE_2).
-    rmse
-        The figure: the root of the sum of both squares.
-    upper
-        Its upper end: that of the interval of the found RMSE, with the survey's; NaN where there is none.
-    product
-        Estimate for the product alone, the root of the difference of both squares; None where differences are
-        smaller than the survey's standard deviations.
-    """
-
-    count: int
+    count: int  # Check points
+    # RMSE of the differences (RMSE_1), and of the check survey as its standard deviations have it
+    # (RMSE_2)
     found: float
     survey: float
-    rmse: float
+    rmse: float  # The figure: the root of the sum of both squares
+    # Its upper end: that of the interval of the found RMSE, with the survey's; NaN where there is none
     upper: float
+    # Estimate for the product alone, the root of the difference of both squares; None where differences
+    # are smaller than the survey's standard deviations
     product: float | None
 
 
 @dataclass(frozen=True)
 class Remark:
-    """A mean or a difference that is to be investigated before anything is stated.
+    """A mean or a difference that is to be investigated before anything is stated."""
 
-    Attributes
-    ----------
-    kind
-        `mean` or `difference`.
-    component
-        `e`, `n` or `h`.
-    value, limit
-        In the linear unit.
-    point
-        Row of the difference; None for a mean.
-    """
-
-    kind: str
-    component: str
-    value: float
+    kind: str  # `mean` or `difference`
+    component: str  # `e`, `n` or `h`
+    value: float  # In the linear unit
     limit: float
-    point: int | None = None
+    point: int | None = None  # Row of the difference; None for a mean
 
 
 def points_asked_for(area: float | None) -> int:

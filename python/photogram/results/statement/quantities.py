@@ -30,24 +30,12 @@ TOGETHER = 256
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """A quantity f(x).
+    """A quantity f(x)."""
 
-    Attributes
-    ----------
-    name
-        As it was asked for: `point C08 z`.
-    items
-        What it is a function of: see :class:`photogram.results.Covariances`.
-    function
-        Takes an array for each item; complex ones too.
-    unit
-        Of its value; empty for plain numbers.
-    """
-
-    name: str
-    items: tuple[Item, ...]
-    function: Callable[..., Any]
-    unit: str
+    name: str  # As it was asked for: `point C08 z`
+    items: tuple[Item, ...]  # What it is a function of: see :class:`photogram.results.Covariances`
+    function: Callable[..., Any]  # Takes an array for each item; complex ones too
+    unit: str  # Of its value; empty for plain numbers
 
 
 def wanted(result: Result, asked: Any) -> Wanted:

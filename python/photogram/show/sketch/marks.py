@@ -49,27 +49,16 @@ class Shades:
 
 @dataclass(frozen=True, eq=False)
 class Markers(Labelled):
-    """Small signs at (n, 2) places.
-
-    Attributes
-    ----------
-    shape, size
-        As matplotlib has them: `.`, `o`, `+`, `^`, `s`, `D`, `*`, and the markersize.
-    face
-        Colour within the outline; that of the outline where nothing is given.
-    edge
-        Width of the outline.
-    values, shades
-        (n,) values whose colours the markers have, the smallest on top, or the largest where `rising`.
-    """
+    """Small signs at (n, 2) places."""
 
     places: Floats
-    shape: str
+    shape: str  # As matplotlib has them: `.`, `o`, `+`, `^`, `s`, `D`, `*`, and the markersize
     size: float
     colour: str = INK
-    face: str = ""
-    edge: float = 1.0
+    face: str = ""  # Colour within the outline; that of the outline where nothing is given
+    edge: float = 1.0  # Width of the outline
     opacity: float = 1.0
+    # (n,) values whose colours the markers have, the smallest on top, or the largest where `rising`
     values: Floats | None = None
     shades: Shades | None = None
     rising: bool = False
@@ -156,30 +145,16 @@ class Mesh(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Contours(Mark):
-    """Areas between lines of equal value, of a grid.
+    """Areas between lines of equal value, of a grid."""
 
-    Attributes
-    ----------
-    across, up
-        (columns,) and (rows,) places along the axes.
-    values
-        (rows, columns); NaN: none.
-    levels
-        Of the lines, upwards; each is written on its lines.
-    colour, width
-        Of the lines.
-    steps
-        Of colour from one level to the next.
-    """
-
-    across: Floats
+    across: Floats  # (columns,) and (rows,) places along the axes
     up: Floats
-    values: Floats
-    levels: Floats
+    values: Floats  # (rows, columns); NaN: none
+    levels: Floats  # Of the lines, upwards; each is written on its lines
     shades: Shades
-    colour: str = "white"
+    colour: str = "white"  # Of the lines
     width: float = 0.9
-    steps: int = 1
+    steps: int = 1  # Of colour from one level to the next
     layer: float = field(default=1.0, kw_only=True)
 
     @property

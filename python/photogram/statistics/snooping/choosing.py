@@ -55,58 +55,26 @@ class Level:
 
 @dataclass(frozen=True)
 class Choice:
-    """A group that goes in a round.
+    """A group that goes in a round."""
 
-    Attributes
-    ----------
-    group
-        Its number among all.
-    first_statistic
-        T at the start of the round.
-    chosen
-        What its test says; rows and rivals by their numbers among all.
-    limit
-        The level that it was compared with.
-    """
-
-    group: int
-    first_statistic: float
-    chosen: Chosen
-    limit: float
+    group: int  # Its number among all
+    first_statistic: float  # T at the start of the round
+    chosen: Chosen  # What its test says; rows and rivals by their numbers among all
+    limit: float  # The level that it was compared with
 
 
 @dataclass(frozen=True, eq=False)
 class Choosing:
-    """What a round chooses from, and how.
+    """What a round chooses from, and how."""
 
-    Attributes
-    ----------
-    trial
-        The network.
-    tests
-        Of all groups, nothing of this round being out.
-    unit
-        Of all that takes part.
-    scales
-        (G,) k^2 of each group.
-    allowed
-        (G,) which may go.
-    level
-        Which probabilities are too small.
-    out
-        How many groups are out already.
-    ahead
-        Whether to look for groups that hide each other where none is significant.
-    """
-
-    trial: Trial
-    tests: Tests
-    unit: UnitWeight
-    scales: Floats
-    allowed: Bools
-    level: Level
-    out: int
-    ahead: bool
+    trial: Trial  # The network
+    tests: Tests  # Of all groups, nothing of this round being out
+    unit: UnitWeight  # Of all that takes part
+    scales: Floats  # (G,) k^2 of each group
+    allowed: Bools  # (G,) which may go
+    level: Level  # Which probabilities are too small
+    out: int  # How many groups are out already
+    ahead: bool  # Whether to look for groups that hide each other where none is significant
 
     @property
     def suspects(self) -> Suspects:

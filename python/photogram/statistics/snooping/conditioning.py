@@ -26,18 +26,10 @@ the images of a point on two photos, but for what an adjustment that ended early
 
 @dataclass(frozen=True)
 class UnitWeight:
-    """What the tests rest on.
+    """What the tests rest on."""
 
-    Attributes
-    ----------
-    known
-        Whether the unit weight is known: chi-square, else F.
-    weighted_sum_of_squares, degrees_of_freedom
-        Omega and f.
-    """
-
-    known: bool
-    weighted_sum_of_squares: float
+    known: bool  # Whether the unit weight is known: chi-square, else F
+    weighted_sum_of_squares: float  # Omega and f
     degrees_of_freedom: float
 
     def without(self, statistic: float, dimension: int) -> UnitWeight:
@@ -73,30 +65,17 @@ class UnitWeight:
 
 @dataclass(frozen=True)
 class Chosen:
-    """A group, or a part of one, that was chosen.
+    """A group, or a part of one, that was chosen."""
 
-    Attributes
-    ----------
-    group
-        Its place among the groups of the block.
-    rows
-        The rows of the block that go.
-    statistic, dimension, log_probability, fisher
-        Of these rows.
-    error, cofactors
-        Their estimated errors, of unit weight, and the cofactors of these.
-    rivals
-        Places of groups that were significant before and are not after, with T, m' and odds.
-    """
-
-    group: int
-    rows: Indices
-    statistic: float
+    group: int  # Its place among the groups of the block
+    rows: Indices  # The rows of the block that go
+    statistic: float  # Of these rows
     dimension: int
     log_probability: float
     fisher: float
-    error: Floats
+    error: Floats  # Their estimated errors, of unit weight, and the cofactors of these
     cofactors: Floats
+    # Places of groups that were significant before and are not after, with T, m' and odds
     rivals: tuple[tuple[int, float, int, float], ...]
 
 

@@ -193,21 +193,12 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Aside:
-    """What a consensus does without, from which a network was started anew.
+    """What a consensus does without, from which a network was started anew."""
 
-    Attributes
-    ----------
-    images
-        The groups, by their numbers, that do not meet where most of their point and photo do.
-    photos
-        Photos whose images agree with no pose, and why that is said.
-    found_by
-        What the consensus is of.
-    """
-
+    # The groups, by their numbers, that do not meet where most of their point and photo do
     images: tuple[int, ...]
-    photos: dict[int, str]
-    found_by: str = "a consensus of resections and intersections"
+    photos: dict[int, str]  # Photos whose images agree with no pose, and why that is said
+    found_by: str = "a consensus of resections and intersections"  # What the consensus is of
 
 
 class LostSupportError(Exception):

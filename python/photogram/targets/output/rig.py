@@ -33,22 +33,12 @@ _OTHER_NAMES = {"k": "k1"}
 
 @dataclass(frozen=True)
 class Terms:
-    """A lens.
+    """A lens."""
 
-    Attributes
-    ----------
-    fisheye
-        Whether it is equidistant.
-    focal, centre
-        fx, fy and cx, cy.
-    terms
-        By their names; missing ones are 0.
-    """
-
-    fisheye: bool
-    focal: tuple[float, float]
+    fisheye: bool  # Whether it is equidistant
+    focal: tuple[float, float]  # fx, fy and cx, cy
     centre: tuple[float, float]
-    terms: Mapping[str, float]
+    terms: Mapping[str, float]  # By their names; missing ones are 0
 
     @property
     def matrix(self) -> Floats:
