@@ -96,7 +96,7 @@ def test_the_worst_observations_of_every_kind_have_their_numbers():
     observed = block.photo_positions_observed.copy()
     observed[7, 0] += 2.0
     result = adjust(block.replace(photo_positions_observed=observed))
-    section = next(each for each in page_of(result).sections if each.id == "worst")
+    section = next(each for each in page_of(result).sections if each.key == "worst")
     heads = [column.head for column in section.parts[0].columns]
     rows = [dict(zip(heads, row, strict=True)) for row in section.parts[0].rows]
     (row,) = (row for row in rows if row["Observation"] == f"X of photo {block.photo_ids[7]}")

@@ -133,7 +133,8 @@ def test_every_option_is_taken_or_refused_of_a_project_on_disk():
         for each in signature(command.callback).parameters.values()
         if each.name not in of_files | {"path", "example"}
     }
-    assert options == REFUSED.keys() | TAKEN - {"PATH"}
+    of_statements = {"--project", "--client", "--firm", "--surveyor", "--date", "--class-h", "--class-v"}
+    assert options == REFUSED.keys() | of_statements | TAKEN - {"PATH"}
     assert not REFUSED.keys() & TAKEN
 
 
