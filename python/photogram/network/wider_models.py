@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from photogram import _photocore
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.network.cameras import Camera
 
-_WIDER = {
-    "perspective": ("brown",),
-    "simple_pinhole": ("radial", "opencv", "full_opencv"),
-    "simple_radial": ("radial", "opencv", "full_opencv"),
-    "radial": ("opencv", "full_opencv"),
-    "pinhole": ("opencv", "full_opencv"),
-    "opencv": ("full_opencv",),
-    "simple_fisheye": ("radial_fisheye", "opencv_fisheye"),
-    "simple_radial_fisheye": ("radial_fisheye", "opencv_fisheye"),
-    "radial_fisheye": ("opencv_fisheye",),
-    "fisheye": ("opencv_fisheye",),
-}
-"""Models that contain a model, the narrowest first."""
+_RADIAL = {"k1", "k2"}
+"""Terms of models that a calibration may change to."""
+_DIRECTIONS = np.array([[0.2, 0.1, -1.0], [-0.3, 0.25, -1.0], [0.05, -0.35, -1.0]])
+"""Directions with equal images in a model and in all models that contain it."""
 _INTERIOR = ("f", "fx", "fy", "c", "cx", "cy", "xp", "yp")
 _LENS = ("k", "k1", "k2", "p1", "p2", "a1", "a2")
 """Principal distance and point, two radial and two tangential terms, under the names of all models."""
@@ -96,17 +89,33 @@ def calibrated(camera: Camera) -> Camera:
 
 
 def _models(camera: Camera) -> list[Camera]:
-    """Return a camera in its own model and in all that contain it."""
+    """Return a camera in its own model and in all that contain it, those with the fewest parameters first.
+
+    Models with inverted formulas (Brown's) precede others of as many parameters.
+    """
     if camera.covariance is not None:
         return [camera]
-    return [camera, *(_in_model(camera, model) for model in _WIDER.get(camera.model, ()))]
+    models = sorted(_photocore.camera_models(), key=lambda each: (len(each[1][1]), each[1][3] == "forward"))
+    wider = (_in_model(camera, name, facts[1]) for name, facts in models if name != camera.model)
+    return [camera, *(each for each in wider if each is not None)]
 
 
-def _in_model(camera: Camera, model: str) -> Camera:
-    """Return a camera in a model that contains its own."""
-    has_two = model in ("opencv", "full_opencv", "opencv_fisheye")
-    names = {"k": ("k1",), "f": ("fx", "fy") if has_two else ("f",)}
+def _in_model(camera: Camera, model: str, powers: Sequence[tuple[str, int]]) -> Camera | None:
+    """Return a camera in another model with its images; None if that model does not contain its own."""
+    names = [name for name, _ in powers]
+    if not {name.lower() for name in names} >= _RADIAL:
+        return None
+    same = {name: (name,) for name in names} | {"k": ("k1",)}
+    if "f" not in names:
+        same["f"] = ("fx", "fy")
+    if not all(set(same.get(name, ("",))) <= set(names) for name in camera.names):
+        return None
     known = zip(camera.names, camera.deviations.tolist(), strict=True)
-    deviations = {other: sd for name, sd in known for other in names.get(name, (name,))}
-    values = {other: value for name, value in camera.parameters.items() for other in names.get(name, (name,))}
-    return replace(camera, model=model, parameters=values, sd=deviations)
+    deviations = {other: sd for name, sd in known for other in same[name]}
+    values = {other: value for name, value in camera.parameters.items() for other in same[name]}
+    try:
+        wider = replace(camera, model=model, parameters=values, sd=deviations)
+        equal = np.allclose(wider.project(_DIRECTIONS), camera.project(_DIRECTIONS), rtol=1e-9, atol=0.0)
+    except InputError:  # A constant of the model, such as the size of the picture, is required.
+        return None
+    return wider if equal else None
