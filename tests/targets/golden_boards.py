@@ -1,10 +1,12 @@
 """Golden data of calibration with targets, as boards and corners."""
 
+from importlib.resources import files
+
 import numpy as np
 from given_targets import golden
 
 from golden_data import shared
-from photogram.targets import Board, Corners
+from photogram.targets import Board, Corners, read
 
 
 def left():
@@ -23,6 +25,14 @@ def left():
         sd=np.ones(pictures * points),
     )
     return Board(columns=9, rows=6, spacing=25.0, unit="mm"), corners
+
+
+def packaged():
+    """Return the packaged example: 20 pictures of 9 x 6 corners, 30 mm, those at the edges incomplete."""
+    calibration = read(files("photogram") / "examples" / "board")
+    corners = calibration.corners
+    names = [name.removesuffix(".jpg") for name in corners.pictures]
+    return calibration.board, corners.replace(pictures=names)
 
 
 def rig():

@@ -1,8 +1,10 @@
 """Variance components of corners: by camera and level, in Python and as an option of the command."""
 
+from importlib.resources import files
+
 import numpy as np
 import pytest
-from given_targets import left_table, rig_small
+from given_targets import rig_small
 from typer.testing import CliRunner
 
 from golden_data import shared
@@ -49,7 +51,14 @@ def test_priors_of_lenses_take_no_part():
 
 
 def test_it_is_an_option_of_the_command(tmp_path):
-    words = ["calibrate", left_table(tmp_path), "--out", tmp_path / "out", "--cross-validate", "none"]
+    words = [
+        "calibrate",
+        files("photogram") / "examples" / "board",
+        "--out",
+        tmp_path / "out",
+        "--cross-validate",
+        "none",
+    ]
     done = CliRunner().invoke(app, [*map(str, words), "--components", "component"])
     assert done.exit_code in (0, 4), done.output
     assert "Variance components" in done.output

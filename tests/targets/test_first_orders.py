@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from golden_boards import left, rig
+from golden_boards import packaged, rig
 from relisted import relisted
 
 from photogram import InputError
@@ -15,10 +15,10 @@ def remarks(first):
 
 
 def test_corners_that_stand_column_by_column_are_named_and_numbered_anew():
-    board, corners = left()
+    board, corners = packaged()
     first = first_values(board, relisted(board, corners, {0: 5, 4: 5}))
     assert any(
-        "left01, left05 were listed in another order: column by column" in each for each in remarks(first)
+        "middle01, middle05 were listed in another order: column by column" in each for each in remarks(first)
     )
     others = ~np.isin(corners.picture, [0, 4])
     assert (first.corners.point[others] == corners.point[others]).all()
@@ -27,45 +27,45 @@ def test_corners_that_stand_column_by_column_are_named_and_numbered_anew():
 
 
 def test_mirrored_corners_are_named_with_their_wrong_order():
-    board, corners = left()
+    board, corners = packaged()
     first = first_values(board, relisted(board, corners, {2: 1}))
     (said,) = [each for each in remarks(first) if "mirrored" in each]
-    assert "left03" in said
+    assert "middle03" in said
     assert LISTED[1] in said
     assert (first.corners.point == corners.point).all()
 
 
 def test_a_board_whose_columns_are_its_rows_is_told():
-    _, corners = left()
-    first = first_values(Board(columns=6, rows=9, spacing=25.0), corners)
+    _, corners = packaged()
+    first = first_values(Board(columns=6, rows=9, spacing=0.03), corners)
     assert any("are its columns its rows?" in each for each in remarks(first))
-    assert first.cameras[0].scale == pytest.approx(536, abs=2)
+    assert first.cameras[0].scale == pytest.approx(1312, abs=5)
 
 
 def test_corners_that_are_no_board_are_named_and_do_no_harm():
-    board, corners = left()
+    board, corners = packaged()
     xy = corners.xy.copy()
     own = np.isin(corners.picture, [1, 4])
     xy[own] = np.random.default_rng(3).uniform(0, 480, (int(own.sum()), 2))
     first = first_values(board, corners.replace(xy=xy))
-    assert any("left02, left05 fit the board more than 5 times worse" in each for each in remarks(first))
-    assert first.cameras[0].scale == pytest.approx(536, abs=5)
+    assert any("middle02, middle05 fit the board more than 5 times worse" in each for each in remarks(first))
+    assert first.cameras[0].scale == pytest.approx(1312, abs=13)
 
 
 def test_pictures_without_enough_corners_have_no_pose():
-    board, corners = left()
+    board, corners = packaged()
     kept = (corners.picture != 3) | (corners.point < 5)
     first = first_values(board, corners.replace(use=kept))
-    assert list(first.without) == ["left04"]
+    assert list(first.without) == ["middle04"]
     assert np.isnan(first.poses[3]).all()
     assert np.isfinite(np.delete(first.poses, 3, axis=0)).all()
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_few_pictures_are_enough_to_begin_with(count):
-    board, corners = left()
-    first = first_values(board, corners.of_pictures(np.arange(13) < count))
-    assert first.cameras[0].scale == pytest.approx(536, rel=0.03)
+    board, corners = packaged()
+    first = first_values(board, corners.of_pictures(np.arange(20) < count))
+    assert first.cameras[0].scale == pytest.approx(1312, rel=0.03)
 
 
 def test_cameras_without_a_view_in_common_are_named_and_have_references_of_their_own():
@@ -85,14 +85,14 @@ def test_frontal_views_are_named():
 
 
 def test_what_cannot_be_is_refused_by_name():
-    board, corners = left()
-    with pytest.raises(InputError, match="corner 40 of left01: the board has 40 points"):
-        first_values(Board(columns=8, rows=5, spacing=25.0), corners)
+    board, corners = packaged()
+    with pytest.raises(InputError, match="corner 40 of middle01: the board has 40 points"):
+        first_values(Board(columns=8, rows=5, spacing=0.03), corners)
     with pytest.raises(InputError, match="there is no lens 'opencv_pinhol'; did you mean opencv_pinhole"):
         first_values(board, corners, "opencv_pinhol")
     with pytest.raises(InputError, match="brown has no focal length and principal point in pixels"):
         first_values(board, corners, "brown")
-    with pytest.raises(InputError, match="camera left: no picture has enough corners: left01"):
+    with pytest.raises(InputError, match="camera camera: no picture has enough corners: middle01"):
         first_values(board, corners.replace(use=False))
 
 

@@ -99,7 +99,7 @@ def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> d
     made = {}
     if json is not None:
         made[json] = run.to_json()
-    if run.results:
+    if run.results or run.stop is None:
         from photogram.perspective_center.listing import listing
 
         made[folder / "listing.txt"] = listing(run).encode()
