@@ -105,7 +105,8 @@ def _in_model(camera: Camera, model: str, powers: Sequence[tuple[str, int]]) -> 
     names = [name for name, _ in powers]
     if not {name.lower() for name in names} >= _RADIAL:
         return None
-    same = {name: (name,) for name in names} | {"k": ("k1",)}
+    same: dict[str, tuple[str, ...]] = {name: (name,) for name in names}
+    same["k"] = ("k1",)
     if "f" not in names:
         same["f"] = ("fx", "fy")
     if not all(set(same.get(name, ("",))) <= set(names) for name in camera.names):
