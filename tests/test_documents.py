@@ -2,16 +2,19 @@
 
 import csv
 import json
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+import photogram
 from photogram.io import json as json_files
 from photogram.show import html
-from photogram.show.cells import page_table
-from photogram.show.forms import record, summary, table_text, to_json
+from photogram.show.cells import page_table, written
+from photogram.show.forms import record, summary, table_text, text, to_json
 from photogram.show.methods import Documented, page_of
-from photogram.show.page import Document, Fact, Judgement, Layers, Section, layered
+from photogram.show.page import Document, Fact, Facts, Judgement, Layers, Remarks, Section, Text, layered
 from photogram.show.quantity import Axis, Quantity, Table, records
 
 AXES = (Axis.of("x", "m"), Axis.of("y", "m"))
@@ -68,6 +71,45 @@ def test_text_and_page_write_the_same_cells():
     by_key = Document("Survey", "A", [], [], [], [Section.of(declared)])
     pytest.importorskip("jinja2")
     assert html.page_html(by_hand) == html.page_html(by_key)
+
+
+def test_the_report_has_every_part_of_a_document():
+    parts = [
+        Facts("Size", [Fact("Photos", "15"), Fact("Length", "3", "µm", "of a pixel")]),
+        Layers("layers", [table()]),
+        Text("A paragraph. " * 20),
+        Remarks(["First remark.", "Second remark."]),
+    ]
+    lines = text(
+        document().with_sections(Section("more", "More", parts), Section("empty", "Nothing", []))
+    ).splitlines()
+    assert lines[0].split() == ["photogram", photogram.__version__, "Survey", "A"]
+    heads = [line for line, below in pairwise(lines) if below and set(below) == {"-"}]
+    assert heads == ["Verdict", "What to do next", "Key figures", "Points", "More"]
+    for expected in (
+        "Measure again.",
+        "rms 3 um",
+        "length 3 um (of a pixel)",
+        "Two points.",
+        "Second remark.",
+    ):
+        assert expected in (" ".join(line.split()) for line in lines)
+    (rows,) = {tuple(table_text(written(table())))}
+    assert [line for line in lines if line in rows] == [*rows, *rows]
+    assert max(map(len, lines)) <= 100
+
+
+def test_people_see_the_chosen_rows_and_components():
+    whole = table()
+    some = written(replace(whole, shown=np.array([1])))
+    assert [row[0] for row in some.rows] == ["P2"]
+    components = written(replace(whole, shown=np.array([[0, 1], [1, 0]])))
+    heads = [column.head for column in components.columns]
+    assert [(row[0], row[heads.index("Component")]) for row in components.rows] == [
+        ("P1", "y"),
+        ("P2", "x"),
+    ]
+    assert len(records(replace(whole, shown=np.array([1])).columns)) == 2
 
 
 def test_a_pdf_document_has_declared_tables():

@@ -14,7 +14,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.show import quantity
 from photogram.show.lines import degrees_written, unit_of
 from photogram.show.page import Cell, Column, Table, decimals_of, fixed, significant
-from photogram.show.quantity import Axis, Quantities, Quantity, long
+from photogram.show.quantity import Axis, Quantities, Quantity, chosen, long
 
 LISTED = 120
 """Rows of a table with a row for each component at most."""
@@ -53,7 +53,10 @@ def page_table(caption: str, table: Quantities, note: str = "", by: Floats | Non
 def written(part: Any) -> Any:
     """Return a part of a document; a declared table becomes a table of cells."""
     if isinstance(part, quantity.Table):
-        return page_table(part.title, part.columns, part.note, part.deviations)
+        columns = part.columns
+        if part.shown is not None:
+            columns = (chosen if part.shown.ndim == 1 else long)(columns, part.shown)
+        return page_table(part.title, columns, part.note, part.deviations)
     return part
 
 

@@ -1,16 +1,21 @@
-"""Documents as JSON and as text in a few lines; `show.html` and `show.pdf` write them as pages."""
+"""Documents as JSON, as text, and as text in a few lines; `show.html` and `show.pdf` write them as pages."""
 
 from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
 
 from photogram import _photocore
 from photogram.io import json
 from photogram.show.cells import written
 from photogram.show.lines import fact_lines
-from photogram.show.page import Document, Table
+from photogram.show.page import Document, Facts, Layers, Part, Remarks, Section, Table, Text
 from photogram.show.quantity import records
 
-PLAIN = str.maketrans(
-    {"µ": "u", "′": "arcmin", "″": "arcsec", "°": "deg", "²": "2", "–": "-", "−": "-", "∞": "inf"}
+WIDTH = 100  # characters of a line of prose
+
+PLAIN = str.maketrans("µ–−ᵀ¹", "u--'1") | str.maketrans(
+    {"′": "arcmin", "″": "arcsec", "°": "deg", "∞": "inf", "⁻": "^-", "²": "^2"}
 )
 """Signs of pages as every terminal shows them."""
 
@@ -24,6 +29,59 @@ def record(document: Document) -> dict[str, object]:
 def to_json(document: Document) -> bytes:
     """Return a document as JSON (UTF-8). What is not a number is null."""
     return json.to_json({"program": f"photogram {_photocore.__version__}", **record(document)})
+
+
+def text(document: Document) -> str:
+    """Return a document as a report: verdict, advice, highlights, then all sections; plots are left out."""
+    judged = [
+        (f"{document.first}, {judgement.on}".removesuffix(", "), [judgement.headline, *judgement.lines])
+        for judgement in document.judgements
+    ]
+    parts = [f"photogram {_photocore.__version__}  {document.what}  {document.title}".rstrip()]
+    parts += [_titled(title, [_sentence(line) for line in lines]) for title, lines in judged]
+    parts.append(_titled("What to do next", [_sentence(line) for line in document.advice]))
+    parts.append(_titled("Key figures", fact_lines([*document.head, *document.highlights])))
+    parts += [_titled(section.title, _section_lines(section)) for section in document.sections]
+    return "\n\n".join(part for part in parts if part).translate(PLAIN) + "\n"
+
+
+def _titled(title: str, lines: Sequence[str]) -> str:
+    """Return lines below their underlined title; nothing without lines."""
+    return "\n".join([title, "-" * len(title), *lines]) if lines else ""
+
+
+def _sentence(line: str) -> str:
+    return textwrap.fill(f"{line[:1].upper()}{line[1:]}".removesuffix(".") + ".", WIDTH)
+
+
+def _section_lines(section: Section) -> list[str]:
+    """Return the introduction and the parts of a section, with an empty line between them."""
+    parts = [lines for part in section.parts if (lines := _part_lines(part, section.title))]
+    if not parts:
+        return []
+    return _spaced([textwrap.wrap(section.intro, WIDTH), *parts])
+
+
+def _spaced(parts: Iterable[list[str]]) -> list[str]:
+    return "\n\n".join("\n".join(lines) for lines in parts if lines).split("\n")
+
+
+def _part_lines(part: Part, title: str) -> list[str]:
+    """Return the lines of a part below a title; none for plots."""
+    match written(part):
+        case Table() as table if table.rows:
+            caption = [table.caption] if table.caption not in ("", title) else []
+            return [*caption, *table_text(table), *textwrap.wrap(table.note, WIDTH)]
+        case Facts(caption=caption, facts=facts) if facts:
+            return [*([caption] if caption not in ("", title) else []), *fact_lines(facts)]
+        case Layers(parts=layers):
+            below = [lines for layer in layers if (lines := _part_lines(layer, title))]
+            return _spaced(below) if below else []
+        case Text(text=paragraph):
+            return textwrap.wrap(paragraph, WIDTH)
+        case Remarks(sentences=sentences):
+            return [textwrap.fill(sentence, WIDTH, subsequent_indent="  ") for sentence in sentences]
+    return []
 
 
 def summary(document: Document, *keys: str) -> list[str]:

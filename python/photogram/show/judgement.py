@@ -74,4 +74,4 @@ def remarks_section(sentences: Iterable[object]) -> Section:
     return Section("remarks", "Remarks", [Remarks(told)] if told else [])
 
 
-_STATISTICS = {"s^2": "s²", "A^2": "A²", "c'C^-1c": "c′C⁻¹c"}
+_STATISTICS = {"s^2": "s²", "A^2": "A²", "c'C^-1c": "cᵀC⁻¹c"}

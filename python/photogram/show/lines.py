@@ -134,12 +134,14 @@ def marks(quantity: Quantity, mark: str) -> Field:
 
 def fact_lines(facts: Sequence[Fact]) -> list[str]:
     """Return named figures, one under the other, with their units and, in brackets, what is said of them."""
-    lines = []
-    for each in facts:
-        said = f" ({each.note})" if each.note else ""
-        name = each.name if each.name[1:2].isupper() else each.name[:1].lower() + each.name[1:]
-        lines.append(f"{name:<35} {f'{each.value} {each.unit}'.rstrip()}{said}")
-    return lines
+    names = [
+        fact.name if fact.name[1:2].isupper() else fact.name[:1].lower() + fact.name[1:] for fact in facts
+    ]
+    width = max([35, *map(len, names)])
+    return [
+        f"{name:<{width}} {f'{fact.value} {fact.unit}'.rstrip()}{f' ({fact.note})' if fact.note else ''}"
+        for name, fact in zip(names, facts, strict=True)
+    ]
 
 
 def table_lines(*rows: Sequence[Field]) -> list[str]:

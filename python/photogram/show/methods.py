@@ -157,6 +157,12 @@ class Documented(Paged):
         """Return the document: judgement, sections, tables."""
         raise NotImplementedError
 
+    def report(self) -> str:
+        """Return the document as text."""
+        from photogram.show.forms import text
+
+        return text(self.document())
+
     def to_json(self) -> bytes:
         """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
         from photogram.show.forms import to_json

@@ -161,6 +161,7 @@ class Table:
     note: str = ""  # a remark on this table
     about: str = ""  # the meaning of the columns
     deviations: Floats | None = None  # (n,) or (n, k): the decimals of values follow from them
+    shown: Indices | None = None  # people see these (r,) rows, or these (r, 2) rows and components; None: all
 
     def frame(self) -> pd.DataFrame:
         """Return the columns that have a name as a data frame."""
