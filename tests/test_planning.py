@@ -379,24 +379,32 @@ def test_the_table_has_a_row_for_each_pattern_and_group(two_patterns):
 LOCATIONS = ["corner", "edge", "interior"]
 
 
-def test_the_report_of_three_networks_and_of_one():
-    overlaps = {f"{p:.0%} forward": network(forward_overlap=p) for p in (0.6, 0.8)}
-    text = plan({**overlaps, "no control": network(control="none", position_sd=0.1)}).report()
-    assert "7 to 9 rays" in text
-    assert "no control: there is no control: the datum" in text
-    rows = {line.split(",")[0]: line for line in text.splitlines()}
-    assert rows["rms Z"].endswith("no control is 1.29 times better than 80% forward")
-    assert "redundancy" in text.split("Photos: ")[1].split("Control: ")[0]
+def parts_of(made, key):
+    """Return the parts of a section of the document, with the layers of the first."""
+    (section,) = (section for section in made.document().sections if section.key == key)
+    return [layer for part in section.parts for layer in getattr(part, "parts", [part])]
 
-    alone = plan({"alone": network(control="none", position_sd=0.1)}).report()
-    assert "Control: " not in alone
-    assert "Comparison" not in alone
-    assert max(len(line) for line in alone.splitlines()) < 110
+
+def test_the_document_of_three_networks_and_of_one():
+    overlaps = {f"{p:.0%} forward": network(forward_overlap=p) for p in (0.6, 0.8)}
+    made = plan({**overlaps, "no control": network(control="none", position_sd=0.1)})
+    assert [table.title for table in parts_of(made, "points")] == ["60% forward", "80% forward", "no control"]
+    assert any("7 to 9 rays" in table.columns[1].values for table in parts_of(made, "points"))
+    (comparison,) = parts_of(made, "comparison")
+    (height,) = (row for row in comparison.rows if row[0] == "rms Z")
+    assert height[-2] == "no control"
+    assert height[-1] == pytest.approx(max(height[1:4]) / min(height[1:4]))
+    assert [table.title for table in parts_of(made, "control")] == ["60% forward", "80% forward"]
+    assert max(len(line) for line in made.report().splitlines()) < 140
+
+    alone = plan({"alone": network(control="none", position_sd=0.1)})
+    assert not parts_of(alone, "control")
+    assert len(parts_of(alone, "comparison")[0].columns) == 4
 
 
 def test_equal_networks_do_not_differ():
-    text = plan({"one": network(), "same": network()}).report()
-    assert text.count("no difference") == 6
+    (comparison,) = parts_of(plan({"one": network(), "same": network()}), "comparison")
+    assert [row[-2] for row in comparison.rows] == 6 * ["no difference"]
 
 
 # Command line
@@ -448,7 +456,7 @@ def test_plan_writes_a_document_and_a_picture(run, tmp_path):
     assert pattern["axes"] == ["E", "N", "h"]
     everything = pattern["points"][-1]
     assert everything["group"] == "all"
-    assert f"{everything['rms_sd'][2]:.3f}" in result.output
+    assert f"{everything['rms_sd'][2]:.3g}" in result.output
     assert document["noncentrality"] == noncentrality()
     assert (tmp_path / "o" / "plan.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "o" / "report.txt").read_text() in result.output
@@ -501,8 +509,11 @@ def test_control_that_nothing_checks():
     )
     made = plan({"one photo": photo})
     assert [(quality.held, quality.detectable) for quality in made.patterns[0].control] == 3 * [(3, math.inf)]
-    row = next(line for line in made.report().split("Control: ")[1].splitlines() if line.startswith("X"))
-    assert row.split() == ["X", "3", "0.1000", "0.000", "-", "-"]
+    (table,) = parts_of(made, "control")
+    component, held, sd, redundancy, detectable, effect = (column.values[0] for column in table.columns)
+    assert (component, held, sd) == ("X", 3, 0.1)
+    assert redundancy == pytest.approx(0.0, abs=1e-9)
+    assert [detectable, effect] == [math.inf, math.inf]
 
 
 def test_a_second_pattern_by_spacing_and_by_positions(run):

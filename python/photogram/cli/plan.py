@@ -62,7 +62,6 @@ def plan(
     """
     with job:
         from photogram.planning.networks import plan as predict
-        from photogram.show.methods import page_of
 
         if packaged:
             if projects:
@@ -83,7 +82,7 @@ def plan(
             patterns = _simulated(moves, network, second)
         made = predict(patterns)
         texts = {} if out is None else {out / TEXT: made.report().encode()}
-        page = documents.page(job, "plan", out, lambda: page_of(made))
+        page = documents.page(job, "plan", out, made.document)
         job.finish(
             {**texts, **page, **documents.as_json(made), **_drawn(made, pictures)},
             summary=lambda: output.print(made.report(), markup=False, end=""),

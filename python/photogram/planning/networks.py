@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
 from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError, RankError
-from photogram.io import json
-from photogram.lazy_dataclasses import asdict, dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
 from photogram.planning.pattern import Pattern
 from photogram.planning.statistics import with_known_readout
-from photogram.planning.text import report, what_next
-from photogram.show.methods import Paged
-from photogram.statistics.reliability import TESTABLE, noncentrality
+from photogram.show.methods import Documented
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure, SubFigure
 
+    from photogram.show.page import Document
+
 
 @dataclass(frozen=True)
-class Plan(Paged):
+class Plan(Documented):
     """Patterns of a network side by side.
 
     Attributes
@@ -47,21 +45,18 @@ class Plan(Paged):
         """
         import pandas as pd  # pandas takes long to import
 
-        rows = []
-        for pattern in self.patterns:
-            for quality in pattern.points:
-                row = {"pattern": pattern.name, **asdict(quality)}
-                for name in ("rms_sd", "max_sd"):
-                    values = row.pop(name)
-                    row |= {f"{name}_{axis}": sd for axis, sd in zip(pattern.axes, values, strict=True)}
-                rows.append(row)
-        table = pd.DataFrame(rows)
+        from photogram.planning.document import points_table
+
+        frames = {pattern.name: points_table(pattern).frame() for pattern in self.patterns}
+        table = pd.concat(frames, names=["pattern"]).reset_index(level="pattern")
         present = table.groupby("group")["points"].transform("max") > 0
         return table[present].reset_index(drop=True)
 
-    def report(self) -> str:
-        """Return the tables a planner needs as text."""
-        return report(self.patterns)
+    def document(self) -> Document:
+        """Return the document of the plan."""
+        from photogram.planning.document import plan_document
+
+        return plan_document(self.patterns)
 
     @overload
     def plot(self) -> Figure: ...
@@ -88,26 +83,6 @@ class Plan(Paged):
         made = new_figure(1.0, 1.0) if figure is None else figure
         on_axes(plan_sketch(self.patterns), made)
         return made
-
-    def to_json(self) -> bytes:
-        """Return the figures of the plan as a JSON document (UTF-8); what is not a number is null."""
-        linear = self.patterns[0].block.linear_unit
-        document = {
-            "program": f"photogram {_photocore.__version__}",
-            "units": {
-                "scale": f"{linear} on the ground for 1 mm in the photo",
-                "unit": f"{linear}: the standard deviation of image coordinates on the ground",
-                "points": f"standard deviations {linear}, detectable mm, effect standard deviations",
-                "photos": f"positions {linear}, angles rad",
-                "control": f"sd and detectable {linear}, effect standard deviations",
-                **({"motion": "as each says"} if any(each.motion for each in self.patterns) else {}),
-            },
-            "noncentrality": noncentrality(),
-            "unchecked_below": TESTABLE,
-            "next": what_next(self.patterns),
-            "patterns": [_pattern(pattern) for pattern in self.patterns],
-        }
-        return json.to_json(document)
 
 
 def plan(
@@ -155,24 +130,6 @@ def plan(
         except RankError as error:
             raise RankError(f"{name}: {error}", error.photos, error.points) from None
     return Plan(tuple(made))
-
-
-def _pattern(pattern: Pattern) -> dict[str, Any]:
-    return {
-        "name": pattern.name,
-        "title": pattern.block.title,
-        "messages": [str(message) for message in pattern.result.messages],
-        "axes": pattern.axes,
-        "photo_count": len(pattern.block.photo_ids),
-        "image_count": int(pattern.result.used_images.sum()),
-        "scale": pattern.scale,
-        "unit": pattern.unit,
-        "points": [asdict(quality) for quality in pattern.points if quality.points],
-        "photos": [asdict(quality) for quality in pattern.photos],
-        "control": [asdict(quality) for quality in pattern.control],
-        **({"motion": [asdict(quality) for quality in pattern.motion]} if pattern.motion else {}),
-        **({"rms_sd_known_readout": known} if (known := pattern.known_rms_sd) else {}),
-    }
 
 
 check_arguments(globals(), ["plan"])

@@ -22,8 +22,10 @@ PLAIN = str.maketrans("µ–−ᵀ¹", "u--'1") | str.maketrans(
 
 def record(document: Document) -> dict[str, object]:
     """Return the members of a JSON document: those of the document, and its tables by their keys."""
-    tables = [each for each in document.tables() if any(column.member for column in each.columns)]
-    return {**document.members, **{each.key: records(each.columns) for each in tables}}
+    tables = [
+        table for table in document.tables() if table.key and any(column.member for column in table.columns)
+    ]
+    return {**document.members, **{table.key: records(table.columns) for table in tables}}
 
 
 def to_json(document: Document) -> bytes:

@@ -155,7 +155,7 @@ Quantities = Sequence[Quantity]
 class Table:
     """A table of a result, declared once: all forms of a document are written from it."""
 
-    key: str  # name in JSON documents, and key of its section
+    key: str  # name in JSON documents, and key of its section; empty: another member has its rows
     title: str
     columns: Quantities
     note: str = ""  # a remark on this table

@@ -1,0 +1,345 @@
+"""The document of a plan: patterns of a network side by side, tables of each pattern as layers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from photogram.lazy_dataclasses import replace
+from photogram.planning.pattern import Pattern
+from photogram.planning.plot import plan_sketch
+from photogram.show.angles import ARCSEC
+from photogram.show.judgement import remarks_section
+from photogram.show.page import (
+    Column,
+    Document,
+    Drawing,
+    Fact,
+    Judgement,
+    Layers,
+    Row,
+    Section,
+    significant,
+)
+from photogram.show.page import Table as Cells
+from photogram.show.quantity import Axis, Quantity, Table, chosen, of_each, records
+from photogram.statistics.reliability import TESTABLE, noncentrality
+
+ALIKE = 1.05  # largest ratio of standard deviations of patterns that are called alike
+MIN_IMPROVEMENT = 1.1  # ratio of standard deviations from which a known readout time is recommended
+MAX_UNCHECKED = 0.01  # share of image coordinates without a check from which more rays are recommended
+MIN_REDUNDANCY = 0.2  # redundancy number of control below which more control is recommended
+SHARE = (Axis("", "", small="percent", factor=100.0),)
+IMAGE = (Axis("", "mm", small="um", factor=1000.0),)
+MOTION_UNITS = {"s": (1e-3, "ms"), "rad/s": (1e-3, "mrad/s"), "rad": (ARCSEC, "arcsec")}
+
+
+def plan_document(patterns: Sequence[Pattern]) -> Document:
+    """Return the document of a plan."""
+    caption = (
+        "The patterns in plan, on one scale of colours: the expected standard deviation of points in height."
+        " Control points are marked by the components that they fix or weight."
+    )
+    title = "Expected standard deviation in height"
+    drawing = Drawing("picture-plan", title, caption, partial(plan_sketch, patterns))
+    points = (
+        "Expected standard deviations, a priori: nothing has been measured. Detectable is the smallest error"
+        " of an image coordinate that the test detects (level 0.001, power 0.80). The effect is the largest"
+        " change of an unknown by an undetected error of this size, in standard deviations."
+    )
+    control = "An error of control that is smaller than the detectable one changes the result undetected."
+    new = any(pattern.new_points.any() for pattern in patterns)
+    return Document(
+        what="Prediction of a network before it is flown",
+        title=patterns[0].block.title,
+        judgements=[Judgement("Prediction", _comparison(patterns))],
+        advice=advice(patterns),
+        highlights=_highlights(patterns),
+        sections=[
+            Section("network", "Plan of the network", [drawing] if new else []),
+            _comparison_section(patterns),
+            Section("size", "How much", [_size(patterns)]),
+            _layers("points", "New points", patterns, _shown_points, points),
+            _layers("multiples", "New points, in standard deviations of an image", patterns, _multiples),
+            _layers("photos", "Photos", patterns, _photos),
+            _layers("motion", "Motion", patterns, _motion),
+            _layers("control", "Control", patterns, _shown_control, control),
+            remarks_section(_remarks(patterns)),
+        ],
+        members=_members(patterns),
+    )
+
+
+def _members(patterns: Sequence[Pattern]) -> dict[str, object]:
+    linear = patterns[0].block.linear_unit
+    units = {
+        "scale": f"{linear} on the ground for 1 mm in the photo",
+        "unit": f"{linear}: the standard deviation of image coordinates on the ground",
+        "points": f"standard deviations {linear}, detectable mm, effect standard deviations",
+        "photos": f"positions {linear}, angles rad",
+        "control": f"sd and detectable {linear}, effect standard deviations",
+    }
+    if any(pattern.motion for pattern in patterns):
+        units["motion"] = "as each says"
+    return {
+        "units": units,
+        "noncentrality": noncentrality(),
+        "unchecked_below": TESTABLE,
+        "next": advice(patterns),
+        "patterns": [_pattern_members(pattern) for pattern in patterns],
+    }
+
+
+def _pattern_members(pattern: Pattern) -> dict[str, object]:
+    members: dict[str, object] = {
+        "name": pattern.name,
+        "title": pattern.block.title,
+        "messages": [str(message) for message in pattern.result.messages],
+        "axes": pattern.axes,
+        "photo_count": len(pattern.block.photo_ids),
+        "image_count": int(pattern.result.used_images.sum()),
+        "scale": pattern.scale,
+        "unit": pattern.unit,
+        "points": records(_present(points_table(pattern)).columns),
+        "photos": [vars(quality) for quality in pattern.photos],
+        "control": records(_control(pattern).columns),
+    }
+    if pattern.motion:
+        members["motion"] = [vars(quality) for quality in pattern.motion]
+    if (known := pattern.known_rms_sd) is not None:
+        members["rms_sd_known_readout"] = known
+    return members
+
+
+def points_table(pattern: Pattern) -> Table:
+    """Return the quality of new points: a row for each group, also of groups without points."""
+    axes = tuple(Axis.of(axis, pattern.block.linear_unit) for axis in pattern.axes)
+    groups = partial(of_each, pattern.points)
+    columns = [
+        groups("grouping", (), "name", name="grouping"),
+        groups("group", (), "name", name="group", head="Group"),
+        groups("points", name="points", head="Points"),
+        groups("rms_sd", axes, "deviation", name="rms_sd", head="rms {}"),
+        groups("max_sd", axes, "deviation", name="max_sd", head="max {}"),
+        groups("redundancy", name="redundancy", head="Mean redundancy", decimals=3),
+        groups("unchecked", SHARE, "deviation", name="unchecked", head="Unchecked", decimals=0),
+        groups("detectable", IMAGE, "deviation", name="detectable", head="Detectable", decimals=1),
+        groups("effect", name="effect", head="Effect in sd", decimals=1),
+    ]
+    return Table("", pattern.name, columns)
+
+
+def _present(table: Table) -> Table:
+    """Return the groups that have points."""
+    count = next(column for column in table.columns if column.name == "points")
+    return replace(table, columns=chosen(table.columns, np.flatnonzero(count.values)))
+
+
+def _shown_points(pattern: Pattern) -> Table | None:
+    return _present(points_table(pattern)) if pattern.new_points.any() else None
+
+
+def _multiples(pattern: Pattern) -> Table | None:
+    if not pattern.new_points.any():
+        return None
+    axes, points = tuple(Axis(axis) for axis in pattern.axes), _present(points_table(pattern))
+    group, rms, largest = (points.columns[k] for k in (1, 3, 4))
+    columns = [
+        replace(quantity, values=quantity.values / pattern.unit, axes=axes, kind="number", decimals=2)
+        for quantity in (rms, largest)
+    ]
+    return Table("", pattern.name, [group, *columns])
+
+
+def _photos(pattern: Pattern) -> Table:
+    linear = pattern.block.linear_unit
+    axes = (
+        *(Axis.of(quality.unknown, linear) for quality in pattern.photos[:3]),
+        *(Axis.turned(quality.unknown) for quality in pattern.photos[3:]),
+    )
+    of = np.arange(len(axes))
+    unknown = [f"{axis.name}, {axis.small}" for axis in axes]
+    columns = [
+        Quantity(np.array(unknown, dtype=object), (), "name", head="Unknown"),
+        of_each(pattern.photos, "rms_sd", axes, "deviation", head="rms sd", of=of),
+        of_each(pattern.photos, "max_sd", axes, "deviation", head="Largest sd", of=of),
+        of_each(pattern.photos, "redundancy", head="Mean redundancy of weighted values", decimals=3),
+    ]
+    return Table("", pattern.name, columns)
+
+
+def _motion(pattern: Pattern) -> Cells | None:
+    rows: list[Row] = []
+    for quality in pattern.motion:
+        factor, unit = MOTION_UNITS.get(quality.unit, (1.0, quality.unit))
+        rows.append([f"{quality.unknown}, {unit}", quality.rms_sd / factor, quality.max_sd / factor, None])
+    known = zip(pattern.axes, pattern.known_rms_sd or (), _improvements(pattern), strict=False)
+    for axis, sd, ratio in known:
+        name = f"{axis} of new points if the readout time is known, {pattern.block.linear_unit}"
+        rows.append([name, sd, None, ratio])
+    columns = [
+        Column("Unknown", text=True),
+        Column("rms sd", figures=3),
+        Column("Largest sd", figures=3),
+        Column("Times better", decimals=2),
+    ]
+    return Cells(pattern.name, columns, rows) if rows else None
+
+
+def _control(pattern: Pattern) -> Table:
+    length = (Axis.of("", pattern.block.linear_unit),)
+    components = partial(of_each, pattern.control)
+    columns = [
+        components("component", (), "name", head="Component"),
+        components("held", head="Weighted or fixed"),
+        components("sd", length, "deviation", head="sd a priori"),
+        components("redundancy", head="Mean redundancy", decimals=3),
+        components("detectable", length, "deviation", head="Detectable"),
+        components("effect", head="Effect in sd", decimals=1),
+    ]
+    return Table("", pattern.name, columns)
+
+
+def _shown_control(pattern: Pattern) -> Table | None:
+    rows = np.flatnonzero([quality.held for quality in pattern.control])
+    return replace(_control(pattern), shown=rows) if rows.size else None
+
+
+def _layers(
+    key: str,
+    title: str,
+    patterns: Sequence[Pattern],
+    table: Callable[[Pattern], Table | Cells | None],
+    intro: str = "",
+) -> Section:
+    """Return a section with the table of each pattern as a layer."""
+    tables = [made for pattern in patterns if (made := table(pattern)) is not None]
+    return Section(key, title, [Layers(f"{key}-layers", tables)] if len(tables) > 1 else tables, intro)
+
+
+def _comparison(patterns: Sequence[Pattern]) -> str:
+    """Return the sentence that names the better pattern, by the rms of new points in height."""
+    if not all(pattern.new_points.any() for pattern in patterns):
+        return "There are no new points to be compared"
+    unit = patterns[0].block.linear_unit
+    heights = {pattern.name: pattern.points[-1].rms_sd[2] for pattern in patterns}
+    best, worst = min(heights, key=heights.__getitem__), max(heights, key=heights.__getitem__)
+    if len(patterns) == 1:
+        return f"Heights of new points will have an rms of {significant(heights[best], 3)} {unit}"
+    if heights[worst] <= ALIKE * heights[best]:
+        return f"The patterns are alike: heights with an rms of {significant(heights[best], 3)} {unit}"
+    return (
+        f"“{best}” gives heights {heights[worst] / heights[best]:.2f} times better than “{worst}”:"
+        f" rms {significant(heights[best], 3)} against {significant(heights[worst], 3)} {unit}"
+    )
+
+
+def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
+    unit = patterns[0].block.linear_unit
+    facts = []
+    for pattern in patterns:
+        if pattern.new_points.any():
+            x, y, z = pattern.points[-1].rms_sd
+            plane = f"{pattern.axes[0]} {significant(x, 2)}, {pattern.axes[1]} {significant(y, 2)} {unit}"
+            facts.append(Fact(f"rms in {pattern.axes[2]}, {pattern.name}", significant(z, 2), unit, plane))
+    error = significant(patterns[0].unit, 2)
+    return [*facts, Fact("An image error on the ground", error, unit, "standard deviation, mean of all")]
+
+
+def _comparison_section(patterns: Sequence[Pattern]) -> Section:
+    rows: list[Row] = []
+    if all(pattern.new_points.any() for pattern in patterns):
+        groups = [pattern.points[-1] for pattern in patterns]
+        for k, axis in enumerate(patterns[0].axes):
+            for kind, values in (
+                ("rms", [group.rms_sd[k] for group in groups]),
+                ("largest", [group.max_sd[k] for group in groups]),
+            ):
+                least, most = min(values), max(values)
+                best = patterns[values.index(least)].name if most > 1.005 * least else "no difference"
+                rows.append([f"{kind} {axis}", *values, best, most / least if least > 0 else math.nan])
+    columns = [
+        Column("Standard deviation", text=True),
+        *(Column(pattern.name, patterns[0].block.linear_unit, figures=3) for pattern in patterns),
+        Column("Best", text=True),
+        Column("Largest over smallest", decimals=2),
+    ]
+    return Section("comparison", "Side by side", [Cells("All new points", columns, rows)] if rows else [])
+
+
+def _size(patterns: Sequence[Pattern]) -> Cells:
+    linear = patterns[0].block.linear_unit
+    columns = [
+        [
+            len(pattern.block.photo_ids),
+            int(pattern.new_points.sum()),
+            int((pattern.result.used_points & ~pattern.new_points).sum()),
+            len(pattern.result.dropped),
+            int(pattern.result.used_images.sum()),
+            significant(pattern.scale),
+            significant(pattern.unit, 3),
+        ]
+        for pattern in patterns
+    ]
+    names = (
+        *("Photos", "New points", "Control points", "Points left out", "Image points"),
+        f"1 mm in the photo on the ground, {linear}",
+        f"sd of image coordinates on the ground, {linear}",
+    )
+    rows = [[name, *values] for name, *values in zip(names, *columns, strict=True)]
+    return Cells("How much", [Column("", text=True), *(Column(pattern.name) for pattern in patterns)], rows)
+
+
+def advice(patterns: Sequence[Pattern]) -> list[str]:
+    """Return what to do next: what would make the network check itself."""
+    sentences = []
+    for pattern in patterns:
+        unchecked = pattern.points[-1].unchecked
+        if pattern.new_points.any() and unchecked > MAX_UNCHECKED:
+            sentences.append(
+                f"“{pattern.name}”: gross errors of {100 * unchecked:.0f} percent of the image coordinates"
+                " could not be detected. More rays for each point (more overlap) make them detectable."
+            )
+        weak = [
+            quality.component
+            for quality in pattern.control
+            if quality.held and quality.redundancy < MIN_REDUNDANCY
+        ]
+        if weak:
+            sentences.append(
+                f"“{pattern.name}”: the network hardly checks control in {', '.join(weak)}. More control"
+                " points, or check points, would reveal its errors."
+            )
+        readout = [quality for quality in pattern.motion if quality.unit == "s"]
+        ratio = max(_improvements(pattern))
+        if readout and ratio > MIN_IMPROVEMENT:
+            sentences.append(
+                f"“{pattern.name}”: the readout time has a standard deviation of"
+                f" {1e3 * readout[0].rms_sd:.2g} ms. Points would be up to {ratio:.1f} times better if it"
+                " were known: specify its value and standard deviation, or fly strips across, faster or at"
+                " another height."
+            )
+    return sentences
+
+
+def _improvements(pattern: Pattern) -> list[float]:
+    """Return the ratios of standard deviations of new points without and with a known readout time."""
+    known = pattern.known_rms_sd
+    if known is None:
+        return [1.0]
+    return [sd / better for sd, better in zip(pattern.points[-1].rms_sd, known, strict=True)]
+
+
+def _remarks(patterns: Sequence[Pattern]) -> list[str]:
+    """Return each remark once, with the names of its patterns unless it concerns all."""
+    names: dict[str, list[str]] = {}
+    for pattern in patterns:
+        for message in pattern.result.messages:
+            names.setdefault(str(message), []).append(pattern.name)
+    return [
+        text if len(concerned) == len(patterns) else f"{'; '.join(concerned)}: {text}"
+        for text, concerned in names.items()
+    ]
