@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import photogram
-from photogram.diagnosis.page import check_page
-from photogram.show.page import Table
+from photogram.show.page import Facts, Table
 
 
 @pytest.mark.parametrize("feet", [False, True])
@@ -14,7 +13,7 @@ def test_the_page_says_what_the_verdict_says(feet):
     if feet:
         block = block.replace(point_positions=block.point_positions * [1, 1, 1 / 0.3048])
     found = photogram.diagnose(block)
-    page = check_page(found)
+    page = found.document()
     (judgement,) = page.judgements
     assert judgement.headline == found.verdict.headline
     assert judgement.tone == ("bad" if feet else "look" if found.verdict.warning else "good")
@@ -30,10 +29,10 @@ def test_iterations_are_no_findings():
     found = photogram.diagnose(block)
     (numbers,) = [section for section in found.sections if section.title == "Key numbers"]
     squares = [each.weighted_sum_of_squares for each in found.result.iterations]
-    assert not any("iteration 1" in line for line in numbers.lines)
-    (line,) = [line for line in numbers.lines if line.startswith("weighted sum of squares")]
+    facts = [fact for part in numbers.parts if isinstance(part, Facts) for fact in part.facts]
+    (fact,) = [fact for fact in facts if fact.name.lower().startswith("weighted sum of squares")]
     assert np.allclose(
-        [float(part) for part in line.split("last")[1].split(",")],
+        [float(part) for part in fact.value.split(",")],
         [found.result.initial_weighted_sum_of_squares, squares[-1]],
         rtol=1e-3,
     )

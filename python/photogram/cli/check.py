@@ -16,7 +16,7 @@ from photogram.cli.options import Quiet, Threads, default_out, out_option
 from photogram.cli.projects import Additions, Example, ProjectPath, described, project_path, read_project
 
 if TYPE_CHECKING:
-    from photogram.diagnosis.findings import Diagnosis
+    from photogram.diagnosis.diagnosis import Diagnosis
 
 EXAMPLE = "galveston"
 """The packaged example, a directory of photogram.examples."""

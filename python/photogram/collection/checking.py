@@ -6,7 +6,8 @@ from photogram.collection.adjust import adjust
 from photogram.collection.as_block import as_block
 from photogram.collection.collection import Collection
 from photogram.diagnosis.diagnose import Manner, check_block, check_of
-from photogram.diagnosis.findings import Diagnosis, Section
+from photogram.diagnosis.diagnosis import Diagnosis
+from photogram.diagnosis.findings import Section
 from photogram.errors import AdjustmentError
 
 
@@ -18,8 +19,8 @@ def _(network: Collection, threads: int | None) -> Diagnosis:
         network = network.replace(
             photo_parameters=adjusted.photo_parameters, point_positions=adjusted.point_positions
         )
-        section.lines.append(f"{'robust adjustment':<50}{adjusted.status}")
+        section.figure("robust adjustment", adjusted.status)
     except AdjustmentError as error:
-        section.lines.append(f"no robust adjustment: {error}")
+        section.remark(f"no robust adjustment: {error}")
     sections, result = check_block(as_block(network), Manner({"threads": threads}))
     return Diagnosis("", [section, *sections], result)

@@ -20,7 +20,7 @@ from photogram.results.result import Result
 
 if TYPE_CHECKING:
     from photogram.adjustment.first_values import FirstValues
-    from photogram.diagnosis.findings import Diagnosis
+    from photogram.diagnosis.diagnosis import Diagnosis
 
 BAD = 5.0
 """Sigma0 above which an adjustment that has converged is doubted."""
@@ -108,7 +108,8 @@ def _with_hints(result: Result) -> Result:
 
 def diagnosis_of(result: Result) -> Diagnosis:
     """Return what explains an adjustment that has failed or fits badly; its verdict is the judgement."""
-    from photogram.diagnosis.findings import Diagnosis, Section, note_all, note_verdict
+    from photogram.diagnosis.diagnosis import Diagnosis
+    from photogram.diagnosis.findings import Section, note_all, note_verdict
     from photogram.diagnosis.weights import weight_hints
 
     found = diagnosed(result)

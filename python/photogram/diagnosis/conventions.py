@@ -351,9 +351,9 @@ def conventions(view: View) -> tuple[Section, View, bool]:
         note(section, "convention", "grave", bars.text)
         view = view.changed(bars.change)
     if section.findings:
-        section.parts.append("the sections below hold with this put right")
+        section.remark("the sections below hold with this put right")
     if not exact:
-        section.parts.append(
+        section.remark(
             "the size of a pixel and the origin are known only about: nothing below is called grave"
         )
     return section, view, exact

@@ -22,8 +22,9 @@ from photogram.diagnosis.blunders import BESIDE
 from photogram.diagnosis.control import control
 from photogram.diagnosis.control_sets import doubtful, explain, free_model
 from photogram.diagnosis.conventions import conventions, further
+from photogram.diagnosis.diagnosis import Diagnosis
 from photogram.diagnosis.editing import HOPELESS, Edited, blunder_section, edit
-from photogram.diagnosis.findings import Diagnosis, Explained, Finding, Level, Section, Words, note
+from photogram.diagnosis.findings import Explained, Finding, Level, Section, Words, note
 from photogram.diagnosis.gross import Suspects, disproved, gross, without
 from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel, lenses_estimated, lenses_put_right
@@ -156,7 +157,7 @@ def _started(block: Block) -> tuple[Block | None, Section]:
     except (AdjustmentError, InputError) as error:
         note(section, "no-first-values", "grave", f"nothing can be checked: {error}")
         return None, section
-    section.parts.append(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
+    section.remark(f"{len(found.sources)} of {len(block.photo_ids)} photos have first values")
     for photo, why in found.missing.items():
         text = f"photo {photo} could not be started: {why}"
         note(section, "no-first-values", "grave", text, [photo])

@@ -23,7 +23,7 @@ from photogram.diagnosis.blunders import (
     tests,
     with_rivals,
 )
-from photogram.diagnosis.findings import Finding, Listing, Section, small_unit
+from photogram.diagnosis.findings import Finding, Section, small_unit
 from photogram.diagnosis.gross import Suspects
 from photogram.diagnosis.predictions import (
     exchange,
@@ -40,6 +40,7 @@ from photogram.network.block import Block
 from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
+from photogram.show.page import Column, Table
 
 ROUNDS = 20
 """Adjustments at the most."""
@@ -251,9 +252,9 @@ def _first(block: Block, bad: Bools, adjusted: Adjuster, section: Section) -> tu
         error = caught
     fewer = of_photos(block, ~bad)
     names = [name for name, of in zip(block.photo_ids, bad.tolist(), strict=True) if of]
-    section.parts.append(f"adjusted without the photos that do not fit: {', '.join(names)}")
+    section.remark(f"adjusted without the photos that do not fit: {', '.join(names)}")
     if error is not None:
-        section.parts.append(f"with them: {error}")
+        section.remark(f"with them: {error}")
     return adjusted(fewer), fewer
 
 
@@ -279,7 +280,7 @@ def _snoop(
         try:
             result = adjusted(block)
         except AdjustmentError as error:
-            section.parts.append(f"without these it cannot be adjusted: {error}")
+            section.remark(f"without these it cannot be adjusted: {error}")
             break
     return result, spread, control
 
@@ -407,7 +408,6 @@ def _list(result: Result, spread: float, section: Section) -> None:
         return
     block = result.block
     unit, factor = small_unit(block.image_unit)
-    section.parts.append("the largest that are left, each with the error that would explain it:")
     listed: list[tuple[str | float, ...]] = []
     for row in np.argsort(-values[images, axes], kind="stable")[:SHOWN].tolist():
         i, axis = int(images[row]), int(axes[row])
@@ -415,13 +415,12 @@ def _list(result: Result, spread: float, section: Section) -> None:
         names = block.photo_ids[block.image_photos[i]], block.point_ids[block.image_points[i]]
         figures = residual, redundancy, values[i, axis], residual / redundancy
         listed.append((*names, "xy"[axis], *map(float, figures)))
-    columns = (
-        ("photo", "<10"),
-        ("point", "<10"),
-        ("", "^3"),
-        (f"residual {unit}", ">12.1f"),
-        ("redundancy", ">12.3f"),
-        ("test value", ">12.2f"),
-        (f"error {unit}", ">12.1f"),
-    )
-    section.parts.append(Listing(columns, listed))
+    columns = [
+        *(Column(head, text=True) for head in ("Photo", "Point", "Axis")),
+        Column("Residual", unit, decimals=1),
+        Column("Redundancy", decimals=3),
+        Column("Test value", decimals=2),
+        Column("Error", unit, decimals=1),
+    ]
+    note = "The error is the gross error that would explain the residual."
+    section.parts.append(Table("Largest test values of the other observations", columns, listed, note))

@@ -8,12 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.findings import Listing, Section, note, small_unit
+from photogram.diagnosis.findings import Section, note, small_unit
 from photogram.diagnosis.robust import critical, normal_of_chi_square
 from photogram.network.block import Block
 from photogram.network.directions import without_lenses
 from photogram.network.rays import frame_radius
 from photogram.results.result import Result
+from photogram.show.page import Column, Table
 
 FEWEST = 20
 """Images of a photo that a test of its pattern needs."""
@@ -43,7 +44,7 @@ def residuals(result: Result, spread: float) -> Section:
     _sums(result, section)
     plain = without_lenses(result.block)
     if len(plain.image_xy) < len(result.block.image_xy):
-        section.parts.append("images beyond what the lens sees: no patterns over the frame")
+        section.remark("images beyond what the lens sees: no patterns over the frame")
         return section
     _frame_pattern(result, plain, spread, section)
     _photo_patterns(result, plain, spread, section)
@@ -60,14 +61,14 @@ def _by_rays(result: Result, section: Section) -> None:
         x, y = factor * np.sqrt((result.residuals[rows] ** 2).mean(axis=0))
         redundancy = result.redundancy[rows].mean()
         listed.append((number, int(rows.sum()), float(x), float(y), float(redundancy)))
-    columns = (
-        ("rays", ">6"),
-        ("images", ">9"),
-        (f"rms x {unit}", ">11.2f"),
-        (f"rms y {unit}", ">11.2f"),
-        ("mean redundancy", ">17.3f"),
-    )
-    section.parts.append(Listing(columns, listed))
+    columns = [
+        Column("Rays"),
+        Column("Image observations"),
+        Column("rms x", unit, decimals=2),
+        Column("rms y", unit, decimals=2),
+        Column("Mean redundancy", decimals=3),
+    ]
+    section.parts.append(Table("Residuals by number of rays", columns, listed))
 
 
 def _sums(result: Result, section: Section) -> None:

@@ -63,14 +63,14 @@ def stations(block: Block, result: Result | None, misleading: Collection[str] = 
     axes = local_axes(block)
     positions, cameras = axes.positions(block.photo_positions), axes.cameras()
     if not flown(block):
-        section.parts.append("the photos do not look down, as those of an aircraft do: no paths")
+        section.remark("the photos do not look down, as those of an aircraft do: no paths")
         return section
     strips = strips_of(positions)
     heights = block.photo_positions[:, 2]
     paths = [
         _path(positions[strip], heights[strip], cameras[strip]) for strip in strips if len(strip) >= FEWEST
     ]
-    section.parts.append(
+    section.remark(
         f"{len(strips)} strips; {len(paths)} of them long enough ({FEWEST} photos) to judge the {which} path"
     )
     if paths:
@@ -206,14 +206,14 @@ def two_ray_heights(result: Result) -> Section:
     )
     block = result.block
     if not flown(block):
-        section.parts.append("the photos do not look down: there is no ground that heights are above")
+        section.remark("the photos do not look down: there is no ground that heights are above")
         return section
     known = np.flatnonzero(result.used_points)
     positions = local_axes(block).positions(result.point_positions[known])
     heights = result.point_positions[known, 2]
     two = np.flatnonzero((result.point_rays[known] == 2) & ~np.isfinite(block.point_sd[known, 2]))
     if len(known) <= NEIGHBOURS + 1 or not two.size:
-        section.parts.append(f"{len(two)} two-ray points of {len(known)}: nothing to compare")
+        section.remark(f"{len(two)} two-ray points of {len(known)}: nothing to compare")
         return section
     near = neighbours(positions[:, :2], two, NEIGHBOURS)
     departures, extrapolation = _above_planes(positions[:, :2], heights, two, near)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.diagnosis.findings import Figure, Section, Words, note
+from photogram.diagnosis.findings import Section, Words, note
 from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.structuring import structure
@@ -56,7 +56,9 @@ def structure_section(block: Block, result: Result | None, words: Words) -> Sect
 def _bandwidths(block: Block, result: Result | None, section: Section) -> None:
     if result is not None:
         head, figures = bandwidths(result)
-        section.parts += [head, *(Figure(f"  {name}", value) for name, value in figures)]
+        section.remark(head)
+        for name, value in figures:
+            section.figure(name, value)
         bandwidth = structure(result.block.image_photos, result.block.image_points).effective_bandwidth
     else:
         structured = structure(block.image_photos, block.image_points)
@@ -66,7 +68,7 @@ def _bandwidths(block: Block, result: Result | None, section: Section) -> None:
             f"{bandwidth} sets of three effective, {structured.naive_bandwidth} without sharing",
         )
     photos = (bandwidth - 1) // 2
-    section.parts.append(
+    section.remark(
         f"{bandwidth} sets hold {photos} photos at a time: a photo may share points with {max(photos - 1, 0)}"
         " photos before it or after it in FRAMES"
     )

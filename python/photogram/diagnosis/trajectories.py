@@ -52,9 +52,7 @@ def flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[
         "Adjustment",
         "Photos on trajectories are no pictures with one pose: units, axes and angles are not tried on them.",
     )
-    section.parts.append(
-        f"{flown_by(block)}: of {counted(len(timed), 'photo')} {int(timed.sum())} are on one"
-    )
+    section.remark(f"{flown_by(block)}: of {counted(len(timed), 'photo')} {int(timed.sum())} are on one")
     try:
         result = adjusted(block)
     except (AdjustmentError, InputError) as error:

@@ -6,7 +6,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools
 from photogram.diagnosis.diagnose import Manner, check_block, check_of
-from photogram.diagnosis.findings import Diagnosis, Finding, Names, Section, Words
+from photogram.diagnosis.diagnosis import Diagnosis
+from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.giant.project import Project
@@ -75,13 +76,12 @@ def _(network: Project, threads: int | None) -> Diagnosis:
 
 def _input(project: Project, block: Block, limits: Limits | None) -> Section:
     section = Section("Input", "Remarks on the files, and the warnings of the 1987 program.")
-    section.parts.append(
+    section.remark(
         f"{len(block.photo_ids)} photos, {len(block.point_ids)} points, {len(block.image_xy)} images"
     )
     section.findings += [Finding("remark", "look", str(message)) for message in project.messages]
     for warning in error_warnings(project, block, limits):
-        above = "ERROR WARNINGS" if warning.general else ""
-        section.parts.append(Names(warning.heading, warning.names, above))
+        section.figure(warning.heading, ", ".join(warning.names))
         text = f"{warning.heading.lower()}: {len(warning.names)}"
         section.findings.append(Finding("warning", "look", text, [], warning.names))
     return section

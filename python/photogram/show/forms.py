@@ -58,7 +58,7 @@ def _sentence(line: str) -> str:
 
 def _section_lines(section: Section) -> list[str]:
     """Return the introduction and the parts of a section, with an empty line between them."""
-    parts = [lines for part in section.parts if (lines := _part_lines(part, section.title))]
+    parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
     if not parts:
         return []
     return _spaced([textwrap.wrap(section.intro, WIDTH), *parts])
@@ -68,7 +68,7 @@ def _spaced(parts: Iterable[list[str]]) -> list[str]:
     return "\n\n".join("\n".join(lines) for lines in parts if lines).split("\n")
 
 
-def _part_lines(part: Part, title: str) -> list[str]:
+def part_lines(part: Part, title: str = "") -> list[str]:
     """Return the lines of a part below a title; none for plots."""
     match written(part):
         case Table() as table if table.rows:
@@ -77,7 +77,7 @@ def _part_lines(part: Part, title: str) -> list[str]:
         case Facts(caption=caption, facts=facts) if facts:
             return [*([caption] if caption not in ("", title) else []), *fact_lines(facts)]
         case Layers(parts=layers):
-            below = [lines for layer in layers if (lines := _part_lines(layer, title))]
+            below = [lines for layer in layers if (lines := part_lines(layer, title))]
             return _spaced(below) if below else []
         case Text(text=paragraph):
             return textwrap.wrap(paragraph, WIDTH)
@@ -102,7 +102,13 @@ def table_text(table: Table) -> list[str]:
     columns = [[f"{column.head} {column.unit}".rstrip().translate(PLAIN)] for column in table.columns]
     for row in table.cells():
         for texts, (column, cell) in zip(columns, row, strict=True):
-            texts.append(f"{column.written(cell.value)}{'*' * (cell.tone == 'look')}".translate(PLAIN))
+            mark = "*" if cell.tone == "look" and not column.text else ""
+            texts.append(f"{column.written(cell.value)}{mark}".translate(PLAIN))
+    if (
+        max(len(text) for texts in columns for text in texts) > WIDTH // 2
+    ):  # sentences: a paragraph for each row
+        rows = ("; ".join(filter(None, row)) for row in zip(*columns, strict=True))
+        return [textwrap.fill(row, WIDTH, subsequent_indent="  ") for row in rows]
     padded = [
         [f"{text:{'<' if column.text else '>'}{max(map(len, texts))}}" for text in texts]
         for column, texts in zip(table.columns, columns, strict=True)

@@ -1,0 +1,88 @@
+"""The document of a check: its findings, then its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from photogram.diagnosis.findings import Finding, Section
+from photogram.lazy_dataclasses import asdict
+from photogram.messages import counted, listed
+from photogram.results.page.network import drawings
+from photogram.results.result import Result
+from photogram.show import page
+from photogram.show.forms import part_lines
+from photogram.show.judgement import judged, verdict_table
+from photogram.show.page import Cell, Column, Document, Fact, Row, Table, Text, Tone
+from photogram.statistics.verdict import Verdict
+
+LEVELS: dict[str, tuple[str, Tone]] = {"grave": ("grave", "bad"), "look": ("to look at", "look")}
+MAX_NAMES = 6  # photos and points that a row names
+MAX_FINDINGS = 200  # rows of the table of findings
+
+
+def check_document(title: str, verdict: Verdict, parts: Sequence[Section], result: Result | None) -> Document:
+    """Return the document of a check with these parts, and of its adjustment."""
+    findings = [(finding, part.title) for part in parts for finding in part.findings]
+    grave = sum(finding.level == "grave" for finding, _ in findings)
+    look = len(findings) - grave
+    plan = [] if result is None else [drawings(result)["network"]]
+    about = (
+        "Grave findings make results wrong or impossible. Look at the others. The check corrects a mistake"
+        " in memory before its next step, so that each mistake is reported once. The files are unchanged."
+    )
+    tests = "The tests of the adjustment without the observations that the check rejects."
+    return Document(
+        what="Check of a network before its adjustment",
+        title=title,
+        judgements=[replace(judged(verdict), lines=())],  # the table of findings has them
+        advice=verdict.next,
+        highlights=[
+            Fact("Grave", f"{grave}", tone="bad" if grave else ""),
+            Fact("To look at", f"{look}", tone="look" if look else ""),
+        ],
+        sections=[
+            page.Section("findings", "Findings", [_findings_table(findings)] if findings else [], about),
+            page.Section("network", "Plan of the network", plan),
+            *(_section(number, section) for number, section in enumerate(parts)),
+            page.Section("tests", "Tests", [verdict_table(verdict)] if verdict.tests else [], tests),
+        ],
+        members={
+            "title": title,
+            "grave": grave,
+            "verdict": verdict.document(),
+            "sections": [_members(section) for section in parts],
+        },
+    )
+
+
+def _members(section: Section) -> dict[str, object]:
+    return {
+        "title": section.title,
+        "why": section.why,
+        "lines": [line for part in section.parts for line in part_lines(part)],
+        "findings": [asdict(finding) for finding in section.findings],
+    }
+
+
+def _section(number: int, section: Section) -> page.Section:
+    count = len(section.findings)
+    end = Text(f"{counted(count, 'finding')} of this part: see the table of findings.")
+    parts = [*section.parts, end if count else Text("Nothing found.")]
+    return page.Section(f"part-{number}", section.title, parts, section.why)
+
+
+def _findings_table(findings: Sequence[tuple[Finding, str]]) -> Table:
+    """Return the table of findings with the titles of their parts, grave findings first."""
+    ordered = sorted(findings, key=lambda row: row[0].level != "grave")
+    columns = [Column(head, text=True) for head in ("Level", "Finding", "Photos and points", "Part")]
+    rows: list[Row] = [_row(finding, title) for finding, title in ordered[:MAX_FINDINGS]]
+    rest = len(ordered) - len(rows)
+    note = f"The JSON document has {rest} more." if rest else ""
+    return Table("Findings", columns, rows, note)
+
+
+def _row(finding: Finding, title: str) -> Row:
+    level, tone = LEVELS[finding.level]
+    names = listed([*finding.photos, *finding.points], MAX_NAMES)
+    return [Cell(level, tone=tone), finding.text, names, title]
