@@ -1,6 +1,7 @@
 """The plain project: what is read, what is refused and where, round trips."""
 
 import csv
+import json
 import shutil
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from photogram import (
     formats,
     simulate,
 )
+from photogram.formats.supplements import self_calibrated
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
 from photogram.io.units import scaled
@@ -60,10 +62,13 @@ def written(project, place, file_format="plain"):
         ("opencv", "radial", "-0.068,0.041"),
         ("opencv_fisheye", "radial_fisheye", "-0.068,0.041"),
         ("division", "simple_division", "-0.068"),
+        ("opencv", "agisoft_frame", "-0.068,0.041,1e-3,-2e-3"),
+        ("full_opencv", "agisoft_frame", "-0.068,0.041,1e-3,-2e-3"),
+        ("thin_prism_fisheye", "agisoft_fisheye", "-0.068,0.041,1e-3,-2e-3"),
     ],
 )
 def test_one_unknown_column_f_is_one_unknown(example, model, single, values):
-    names = {"-0.068,0.041": "k1,k2", "-0.068": "k", "": ""}[values]
+    names = ("", "k", "k1,k2", "k1,k2,p1,p2")[len(values.split(",")) // 2 + bool(values)]
     head = ",".join(filter(None, ["camera,model,width,height,f,sd_f,cx,cy", names]))
     row = ",".join(filter(None, [f"drone,{model},4000,3000,3620.0,inf,2009.3,1491.6", values]))
     (example / "cameras.csv").write_text(f"{head}\n{row}\n")
@@ -71,9 +76,54 @@ def test_one_unknown_column_f_is_one_unknown(example, model, single, values):
     assert camera.model == single
     assert [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd] == ["f"]
     parameters = {name: value for name, value in camera.parameters.items() if name != "f"}
+    if "w" in parameters:
+        parameters = {name: parameters[name] for name in ("k1", "k2")}
+        parameters |= {"cx": 2009.3, "cy": 1491.6, "p1": 1e-3, "p2": -2e-3}
     double = Camera(model or "pinhole", parameters | {"fx": 3620.0, "fy": 3620.0})
     directions = np.array([[0.1, -0.2, -1.0], [-0.3, 0.2, -1.0]])
     np.testing.assert_allclose(camera.project(directions), double.project(directions), atol=1e-9)
+
+
+def test_one_unknown_f_with_p1_is_adjusted_and_written_as_one(example, tmp_path, run):
+    (example / "cameras.csv").write_text(
+        "camera,model,width,height,f,cx,cy,k1,k2,p1,p2,sd_f\n"
+        "drone,opencv,4000,3000,3620,2009.3,1491.6,-0.068,0.041,1e-4,-2e-4,inf\n"
+    )
+    project = formats.read(example)
+    (camera,) = project.block.cameras
+    fixed = adjust(project.block.replace(cameras=[camera.replace(sd=0.0)]))
+    done = run("adjust", str(example), "--json", "result.json", "--out", "out")
+    assert done.exit_code in (0, 4), done.output
+    document = json.loads(Path("result.json").read_bytes())
+    unknowns = [each for each in document["cameras"][0]["parameters"] if each["sd"]]
+    assert [each["name"] for each in unknowns] == ["f"]
+    assert document["degrees_of_freedom"] == fixed.degrees_of_freedom - 1
+    (camera,) = formats.read(Path("out/adjusted")).block.cameras
+    assert [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd] == ["f"]
+    assert camera.parameters["f"] == pytest.approx(unknowns[0]["value"], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("fy", "names", "unknown"),
+    [
+        ("3620", "f", ["f"]),
+        ("3621", "f", ["fx", "fy"]),
+        ("3620", "fx,fy", ["fx", "fy"]),
+        ("3620", "f,k3", ["f", "k3"]),
+    ],
+)
+def test_f_of_equal_fx_and_fy_is_one_unknown(example, fy, names, unknown):
+    (example / "cameras.csv").write_text(
+        "camera,model,width,height,fx,fy,cx,cy,k1,k2,p1,p2\n"
+        f"drone,opencv,4000,3000,3620,{fy},2009.3,1491.6,-0.068,0.041,1e-4,-2e-4\n"
+    )
+    project = formats.read(example)
+    (before,), (camera,) = (
+        each.block.cameras for each in (project, self_calibrated(project, names.split(",")))
+    )
+    assert [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd] == unknown
+    directions = np.array([[0.1, -0.2, -1.0], [-0.3, 0.2, -1.0]])
+    np.testing.assert_allclose(camera.project(directions), before.project(directions), rtol=1e-12)
 
 
 # Numbers

@@ -263,7 +263,7 @@ def test_a_user_adds_what_a_project_lacks(run, tmp_path):
     )
     assert free.exit_code == 0, free.output
     cameras = pd.read_csv(tmp_path / "three" / "cameras.csv").set_index("parameter")
-    assert (cameras.loc[["fx", "fy", "k1"], "sd"] > 0).all()
+    assert (cameras.loc[["f", "k1"], "sd"] > 0).all()
     for words, say in (
         (["--self-calibrate", "k9"], "no camera has the parameter k9"),
         (["--sd", "images=0"], "cannot be without error"),

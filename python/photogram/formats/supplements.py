@@ -28,7 +28,13 @@ from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
-from photogram.network.wider_models import freed, matching_word, with_parameters
+from photogram.network.wider_models import (
+    focal_length_message,
+    freed,
+    matching_word,
+    with_one_focal_length,
+    with_parameters,
+)
 from photogram.results.result import Result
 
 if TYPE_CHECKING:
@@ -151,7 +157,7 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
     """Return a project whose cameras have free parameters: those named, or those of their models for `all`.
 
     A camera whose model lacks a named parameter gets the narrowest model with it that contains its own: k1 of
-    a pinhole.
+    a pinhole. The parameter f of a model with fx and fy is one unknown if these are equal, and two if not.
 
     Raises
     ------
@@ -164,10 +170,14 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
         raise InputError("the block has principal distances and no cameras that could be calibrated")
     wanted = {name.lower() for name in names}
     cameras, used, messages = [], set(), []
-    for camera in project.block.cameras:
+    for camera, size in zip(project.block.cameras, project.sizes, strict=True):
         model = with_parameters(camera, wanted)
         free = set(model.names) - model.constants
-        cameras.append(freed(model, {name.lower() for name in free} if "all" in wanted else wanted))
+        unknown = freed(model, {name.lower() for name in free} if "all" in wanted else wanted)
+        cameras.append(unknown)
+        if "fx" in free and "f" in wanted:
+            cameras[-1] = with_one_focal_length(unknown, size if unknown.unit == "px" else None)
+            messages.append(Message(focal_length_message(unknown, cameras[-1])))
         used |= {matching_word(name, wanted) for name in free}
         if model.model != camera.model:
             messages.append(

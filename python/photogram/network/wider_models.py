@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping
+from functools import cache
 
 import numpy as np
 
@@ -16,6 +17,7 @@ _RADIAL = {"k1", "k2"}
 """Terms of models that a calibration may change to."""
 _DIRECTIONS = np.array([[0.2, 0.1, -1.0], [-0.3, 0.25, -1.0], [0.05, -0.35, -1.0]])
 """Directions with equal images in a model and in all models that contain it."""
+_DISTANCES = frozenset({"f", "fx", "fy", "c"})
 _INTERIOR = ("f", "fx", "fy", "c", "cx", "cy", "xp", "yp")
 _LENS = ("k", "k1", "k2", "p1", "p2", "a1", "a2")
 """Principal distance and point, two radial and two tangential terms, under the names of all models."""
@@ -88,6 +90,50 @@ def calibrated(camera: Camera) -> Camera:
     return freed(with_parameters(camera, words), words) if words else camera
 
 
+def with_one_focal_length(camera: Camera, size: tuple[float, float] | None = None) -> Camera:
+    """Return a camera with equal fx and fy in the narrowest model with one focal length f and its images.
+
+    The camera remains as it is if fx differs from fy, if no model contains its values and unknowns, or if
+    that model requires the size of the picture and none is given.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+    size
+        Width and height of the picture in pixels.
+    """
+    sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+    values = camera.parameters
+    if "fx" not in values or values["fx"] != values["fy"] or sd["fx"] != sd["fy"]:
+        return camera
+    if camera.covariance is not None:
+        return camera
+    used = tuple(name for name in camera.names if values[name] or sd[name])
+    single = (
+        model
+        for name, names in _names_by_model()
+        if "f" in names and (model := _in_model(camera, name, used, size)) is not None
+    )
+    return next(single, camera)
+
+
+def focal_length_message(camera: Camera, single: Camera) -> str:
+    """Return a sentence on the unknown f of a camera and of its :func:`with_one_focal_length`."""
+    title, model = f"camera {camera.title}", camera.model
+    if single is camera:
+        return f"{title}: f is two unknowns of the model {model}, fx and fy"
+    changes = []
+    if (single.parameters.get("p1"), single.parameters.get("p2")) != (
+        camera.parameters.get("p1"),
+        camera.parameters.get("p2"),
+    ):
+        changes.append("its p1 and p2 are p2 and p1")
+    if "w" in single.names:
+        changes.append("cx and cy count from the middle of the picture")
+    return "; ".join([f"{title}: {single.model} is {model} with one unknown f", *changes])
+
+
 def _models(camera: Camera) -> list[Camera]:
     """Return a camera in its own model and in all that contain it, those with the fewest parameters first.
 
@@ -95,28 +141,77 @@ def _models(camera: Camera) -> list[Camera]:
     """
     if camera.covariance is not None:
         return [camera]
-    models = sorted(_photocore.camera_models(), key=lambda each: (len(each[1][1]), each[1][3] == "forward"))
-    wider = (_in_model(camera, name, facts[1]) for name, facts in models if name != camera.model)
+    wider = (
+        _in_model(camera, name, camera.names)
+        for name, names in _names_by_model()
+        if name != camera.model and {each.lower() for each in names} >= _RADIAL | ({"fx"} & set(camera.names))
+    )
     return [camera, *(each for each in wider if each is not None)]
 
 
-def _in_model(camera: Camera, model: str, powers: Sequence[tuple[str, int]]) -> Camera | None:
-    """Return a camera in another model with its images; None if that model does not contain its own."""
-    names = [name for name, _ in powers]
-    if not {name.lower() for name in names} >= _RADIAL:
+@cache
+def _names_by_model() -> list[tuple[str, tuple[str, ...]]]:
+    """Return models and their parameters, those with the fewest parameters first."""
+    models = sorted(_photocore.camera_models(), key=lambda each: (len(each[1][1]), each[1][3] == "forward"))
+    return [(name, tuple(parameter for parameter, _ in facts[1])) for name, facts in models]
+
+
+def _in_model(
+    camera: Camera, model: str, used: tuple[str, ...], size: tuple[float, float] | None = None
+) -> Camera | None:
+    """Return a camera in another model with its images; None if that model lacks a used parameter."""
+    same = _same_parameters(camera.model, model, used)
+    if same is None:
         return None
-    same: dict[str, tuple[str, ...]] = {name: (name,) for name in names}
-    same["k"] = ("k1",)
-    if "f" not in names:
-        same["f"] = ("fx", "fy")
-    if not all(set(same.get(name, ("",))) <= set(names) for name in camera.names):
-        return None
-    known = zip(camera.names, camera.deviations.tolist(), strict=True)
-    deviations = {other: sd for name, sd in known for other in same[name]}
-    values = {other: value for name, value in camera.parameters.items() for other in same[name]}
+    sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+    deviations = {other: sd[name] for name, others in same.items() for other in others}
     try:
-        wider = replace(camera, model=model, parameters=values, sd=deviations)
-        equal = np.allclose(wider.project(_DIRECTIONS), camera.project(_DIRECTIONS), rtol=1e-9, atol=0.0)
+        values = _renamed(camera.parameters, same, model, size)
+        return replace(camera, model=model, parameters=values, sd=deviations)
     except InputError:  # A constant of the model, such as the size of the picture, is required.
         return None
-    return wider if equal else None
+
+
+@cache
+def _same_parameters(model: str, other: str, used: tuple[str, ...]) -> dict[str, tuple[str, ...]] | None:
+    """Return the parameters of another model by those that do the same; None if their images differ."""
+    names = dict(_names_by_model())[other]
+    same: dict[str, tuple[str, ...]] = {name: (name,) for name in names}
+    if "k" not in names:
+        same["k"] = ("k1",)
+    if "f" in names:
+        same |= {"fx": ("f",), "fy": ("f",)}
+    else:
+        same["f"] = ("fx", "fy")
+    values = {name: 0.01 * row for row, name in enumerate(used, 1)}
+    values |= {name: -1.0 if name == "c" else 1.0 for name in _DISTANCES.intersection(used)}
+    for exchange in ({}, {"p1": ("p2",), "p2": ("p1",)}):
+        by_name = same | exchange
+        if not all(set(by_name.get(name, ("",))) <= set(names) for name in used):
+            continue
+        own = {name: by_name[name] for name in used}
+        try:
+            images = [
+                Camera(*each).project(_DIRECTIONS)
+                for each in ((model, values), (other, _renamed(values, own, other, (2.0, 2.0))))
+            ]
+        except InputError:  # A parameter without a general value, such as the order of splines.
+            continue
+        if np.allclose(*images, rtol=1e-9, atol=0.0):
+            return own
+    return None
+
+
+def _renamed(
+    values: Mapping[str, float],
+    same: Mapping[str, tuple[str, ...]],
+    model: str,
+    size: tuple[float, float] | None,
+) -> dict[str, float]:
+    """Return values under the names of another model, which may count from the middle of the picture."""
+    renamed = {other: values[name] for name, others in same.items() for other in others}
+    if size is not None and "w" not in values and "w" in dict(_names_by_model())[model]:
+        middle = {"cx": size[0] / 2, "cy": size[1] / 2}
+        renamed |= {name: values.get(name, 0.0) - value for name, value in middle.items()}
+        renamed |= {"w": size[0], "h": size[1]}
+    return renamed

@@ -24,6 +24,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import listed, quoted
 from photogram.network.cameras import Camera, Weights
 from photogram.network.moving_photos import LineSensor, Shutter
+from photogram.network.wider_models import focal_length_message, with_one_focal_length
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
@@ -267,13 +268,8 @@ def _camera(
     model = given.model or ("brown" if "c" in known and not known.keys() & {"f", "fx"} else "pinhole")
     if model not in _MODELS:
         raise table.error(row, f"column model: there is no {quoted(model)}, but {', '.join(_MODELS)}")
-    if (single := _single_focal_length(model, given)) != model:
-        tables.tell(f"camera {given.name}: {single} is {model} with one unknown f", table.path)
-        model = single
     powers = dict(_MODELS[model][1])
     own = {name.lower(): name for name in powers}
-    if given.deviations.get("f") and "f" not in own and "fx" in own:
-        tables.tell(f"camera {given.name}: f is two unknowns of the model {model}, fx and fy", table.path)
     image = tables.settings.image
     if size is None and "w" in own:
         raise table.error(row, f"columns width and height are needed by the model {model}")
@@ -296,7 +292,7 @@ def _camera(
         choices = ", ".join(get_args(Weights))
         raise table.error(row, f"column weights: {quoted(given.weights)} is none of {choices}")
     constants = [*powers][len(powers) - _MODELS[model][2] :]
-    return Camera(
+    camera = Camera(
         model,
         values,
         {
@@ -308,27 +304,11 @@ def _camera(
         unit="px" if image == "px" else "mm",
         weights=cast("Weights", given.weights),
     )
-
-
-_SINGLE = {
-    "pinhole": ("simple_pinhole",),
-    **dict.fromkeys(("opencv", "full_opencv", "opencv_pinhole"), ("simple_pinhole", "radial")),
-    "fisheye": ("simple_fisheye",),
-    "opencv_fisheye": ("simple_fisheye", "radial_fisheye"),
-    "division": ("simple_division",),
-}
-"""Models with one focal length that are models with two if the other parameters are 0."""
-
-
-def _single_focal_length(model: str, given: _Row) -> str:
-    """Return the model in which an unknown focal length f of both axes is one unknown, if there is one."""
-    if not given.deviations.get("f"):
-        return model
-    used = {name for of in (given.values, given.deviations) for name, value in of.items() if value}
-    for single in _SINGLE.get(model, ()):
-        if used <= {name.lower() for name, _ in _MODELS[single][1]}:
-            return single
-    return model
+    if not given.deviations.get("f") or "fx" not in own:
+        return camera
+    single = with_one_focal_length(camera, size if image == "px" else None)
+    tables.tell(focal_length_message(camera, single), table.path)
+    return single
 
 
 def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:
