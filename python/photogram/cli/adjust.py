@@ -87,6 +87,10 @@ def adjust(
     documents.place(target)  # refused before anything is read
     if not statement:
         wanted.check_alone()
+    if snooping.snoop:
+        check_alone(job, "--snoop", DIVIDING)
+    if ordering != "auto":
+        check_alone(job, "--ordering", DIVIDING)
     with job:
         pictures = documents.pictures(job, target)
         division = divided.division
@@ -118,10 +122,6 @@ def adjust(
             threads=threads,
             division=division,
         )
-        if snooping.snoop:
-            check_alone(job, "--snoop", DIVIDING)
-        if ordering != "auto":
-            check_alone(job, "--ordering", DIVIDING)
         if snooping.snoop:
             removed = _snooped(job, project, block, started, run, choices, threads, snooping)
             result = cast("Result", removed.result)
