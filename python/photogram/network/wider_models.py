@@ -191,13 +191,11 @@ def _same_parameters(model: str, other: str, used: tuple[str, ...]) -> dict[str,
             continue
         own = {name: by_name[name] for name in used}
         try:
-            images = [
-                Camera(*each).project(_DIRECTIONS)
-                for each in ((model, values), (other, _renamed(values, own, other, (2.0, 2.0))))
-            ]
+            images = Camera(model, values).project(_DIRECTIONS)
+            renamed = Camera(other, _renamed(values, own, other, (2.0, 2.0))).project(_DIRECTIONS)
         except InputError:  # A parameter without a general value, such as the order of splines.
             continue
-        if np.allclose(*images, rtol=1e-9, atol=0.0):
+        if np.allclose(renamed, images, rtol=1e-9, atol=0.0):
             return own
     return None
 
