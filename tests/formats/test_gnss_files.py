@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from formats.photographs import EXAMPLE, block_with_pictures, picture
-from photogram import InputError, LeverArm, Message, Position, adjust, formats
+from photogram import InputError, LeverArm, Message, Position, Spheroid, adjust, formats
 from photogram.formats import GnssFile, PhotoFiles, Wishes, read_metadata
+from photogram.network.geometry import geographic_to_geocentric, local_frames
 
 SD = (0.012, 0.011, 0.025)
 ANTENNA = (0.05, 0.08, 0.12)
@@ -229,12 +230,42 @@ def test_events_in_weeks_and_in_degrees_minutes_seconds(tmp_path):
         "float",
         "above sea level",
     )
-    for old, new in (("2264 ", "x "), ("latitude(d'\")", "x-ecef(m)"), ("551.2", "high"), (" 0.05", "")):
+    for old, new in (("2264 ", "x "), ("latitude(d'\")", "e-baseline(m)"), ("551.2", "high"), (" 0.05", "")):
         other = tmp_path / "b_events.pos"
         other.write_text(path.read_text().replace(old, new))
         with pytest.raises(InputError) as caught:
             read_events(other)
         assert caught.value.record is not None
+
+
+def test_geocentric_events_are_the_same_positions_with_their_covariances(tmp_path):
+    from photogram.formats.metadata.rtklib import is_events, read_events
+
+    place = [*np.radians([8.54, 47.38]).tolist(), 551.2]
+    [xyz] = geographic_to_geocentric([place], Spheroid.wgs84())
+    [axes] = local_frames([place])
+    matrix = axes.T @ np.diag([0.03**2, 0.02**2, 0.05**2]) @ axes
+    pairs = [matrix[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))]
+    words = [f"{value:.6f}" for value in [*xyz, *np.sign(pairs) * np.sqrt(np.abs(pairs))]]
+    path = tmp_path / "a_events.pos"
+    path.write_text(
+        "% (x/y/z-ecef=WGS84,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of satellites)\n"
+        "%  GPST                      x-ecef(m)      y-ecef(m)      z-ecef(m)   Q  ns   sdx(m)   sdy(m)"
+        "   sdz(m)  sdxy(m)  sdyz(m)  sdzx(m) age(s)  ratio\n"
+        f"2024/05/17 10:07:45.500 {' '.join(words[:3])} 1 12 {' '.join(words[3:])} 0.00 3.5\n"
+    )
+    assert is_events(path)
+    (event,) = read_events(path)
+    np.testing.assert_allclose(event.said.position, (8.54, 47.38, 551.2), rtol=0, atol=2e-6)
+    assert event.said.position[2] == pytest.approx(551.2, abs=2e-6)
+    np.testing.assert_allclose(event.said.sd, (0.03, 0.02, 0.05), rtol=1e-3)
+    assert (event.said.fix, event.said.heights) == ("fixed", "")
+    text = path.read_text()
+    path.write_text(text.replace(" ".join(words[:3]), "0 0 0"))
+    assert read_events(path)[0].said.position is None
+    path.write_text(text.replace(f" {words[-1]} 0.00 3.5", ""))
+    with pytest.raises(InputError, match="at least 13"):
+        read_events(path)
 
 
 def test_positions_of_a_file_replace_those_of_the_project(tmp_path, flown):
@@ -266,6 +297,37 @@ def test_the_commands_have_the_options(run, tmp_path, flown):
     before = path.read_bytes()
     assert run("info", folder / "plain", *words, "--json", path).exit_code == 1
     assert path.read_bytes() == before
+
+
+UNUSABLE = {
+    "missing.csv": None,
+    "folder": "",
+    "empty.csv": b"",
+    "empty.MRK": b"",
+    "empty.pos": b"",
+    "zeros.csv": bytes(4000),
+    "binary.csv": np.random.default_rng(3).bytes(5000),
+    "binary.MRK": np.random.default_rng(4).bytes(5000),
+    "binary.xlsx": np.random.default_rng(5).bytes(5000),
+    "photo.jpg": b"\xff\xd8\xff\xe0\x00\x10JFIF\x00" + bytes(range(256)),
+}
+
+
+@pytest.mark.parametrize("name", UNUSABLE)
+@pytest.mark.parametrize("command", ["info", "adjust", "convert", "check"])
+def test_an_unusable_file_is_named_and_nothing_is_written(run, tmp_path, command, name):
+    content = UNUSABLE[name]
+    if content == "":
+        (tmp_path / name).mkdir()
+    elif content is not None:
+        (tmp_path / name).write_bytes(content)
+    before = sorted(tmp_path.rglob("*"))
+    own = {"convert": ["out"], "adjust": ["--out", "out", "--json", "a.json"]}.get(command, [])
+    done = run(command, EXAMPLE, *own, "--gnss", name)
+    assert done.exit_code == 1, done.output
+    assert done.exception is None or isinstance(done.exception, SystemExit)
+    assert f"error: {name}" in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 TIE_POINTS = {

@@ -72,6 +72,8 @@ def _of_exposures(
 ) -> Mapping[str, Said]:
     """Return exposures of an .MRK file by the photos whose names contain their numbers."""
     exposures = read_exposures(path)
+    if not exposures:
+        raise InputError("has no exposures; DJI writes one row for each photo of a flight", file=path)
     names: dict[int, str] = {}
     for photo in photos:
         number = number_of(PurePosixPath(photo).stem)

@@ -9,10 +9,13 @@ from datetime import datetime
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+
 from photogram.formats.metadata.record import (
     ELLIPSOIDAL,
     SEA_LEVEL,
     Said,
+    Triple,
     geographic_position,
     usable_deviations,
 )
@@ -20,6 +23,7 @@ from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
+from photogram.network.geometry import Spheroid, geocentric_to_geographic, local_frames
 
 SOURCE = "RTKLIB"
 SECONDS_OF_WEEK = 604_800
@@ -54,7 +58,7 @@ def read_events(path: Path) -> list[Event]:
     Raises
     ------
     InputError
-        Positions other than latitude, longitude and height; a line that cannot be read; no event.
+        Baselines instead of positions; a line that cannot be read; no event.
     """
     head, heights, events = Place(path), "", list[Event]()
     for record, line in enumerate(read_lines(path), 1):
@@ -70,31 +74,59 @@ def read_events(path: Path) -> list[Event]:
 
 def _event(place: Place, head: Place, heights: str) -> Event:
     columns = head.text or ""
-    if "latitude(" not in columns:
-        raise head.error("has no latitude and longitude; set the solution format of RTKLIB to Lat/Lon/Height")
+    if "e-baseline(" in columns:
+        raise head.error(
+            "has baselines from the base station; required are positions: set the solution format of RTKLIB"
+            " to Lat/Lon/Height or X/Y/Z-ECEF"
+        )
+    geocentric = "x-ecef(" in columns
     words = _WORDS.split((place.text or "").strip())
     size = 3 if "latitude(d'" in columns else 1
-    if len(words) < 2 * size + 8:
-        raise place.error(
-            f"has {len(words)} words; an event has at least {2 * size + 8}: time (2 words), latitude,"
-            " longitude, height, Q, ns, sdn, sde, sdu"
-        )
-    angles, rest = words[2 : 2 + 2 * size], words[2 + 2 * size :]
-    latitude, longitude = (_degrees(angles[k : k + size], place) for k in (0, size))
-    north, east, up = (place.number(word, "standard deviation") for word in rest[3:6])
+    least, names = 2 * size + 8, "latitude, longitude, height, Q, ns, sdn, sde, sdu"
+    if geocentric:
+        least, names = 13, "x, y, z, Q, ns, sdx, sdy, sdz, sdxy, sdyz, sdzx"
+    if len(words) < least:
+        raise place.error(f"has {len(words)} words; an event has at least {least}: time (2 words), {names}")
+    count = 3 if geocentric else 2 * size + 1
+    *first, last = words[2 : 2 + count]
+    quality, _, *rest = words[2 + count :]
+    deviations = [place.number(word, "standard deviation") for word in rest[: 6 if geocentric else 3]]
+    if geocentric:
+        xyz = [place.number(word, "coordinate") for word in (*first, last)]
+        position, (east, north, up) = _geographic(xyz, deviations)
+    else:
+        latitude, longitude = (_degrees(first[k : k + size], place) for k in (0, size))
+        position = longitude, latitude, place.number(last, "height")
+        north, east, up = deviations
     return Event(
         _seconds(words[:2], place),
         Said(
             SOURCE,
             place,
             ELLIPSOIDAL,
-            heights,
-            geographic_position(place, (longitude, latitude, place.number(rest[0], "height"))),
+            "" if geocentric else heights,
+            geographic_position(place, position),
             usable_deviations(east, north, up),
             rtk=True,
-            flag=_FLAGS.get(place.whole(rest[1], "Q", highest=9)),
+            flag=_FLAGS.get(place.whole(quality, "Q", highest=9)),
         ),
     )
+
+
+def _geographic(xyz: Sequence[float], deviations: Sequence[float]) -> tuple[Triple, Triple]:
+    """Return longitude, latitude, height and standard deviations of east, north, up; 0, 0, 0 stays.
+
+    `deviations` are those of X, Y, Z, and the roots of the covariances XY, YZ, ZX with their signs.
+    """
+    if not any(xyz):
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    [place] = geocentric_to_geographic([xyz], Spheroid.wgs84())
+    xx, yy, zz, xy, yz, zx = (value * abs(value) for value in deviations)
+    [axes] = local_frames([place])
+    turned = axes @ np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]) @ axes.T
+    longitude, latitude = np.degrees(place[:2]).tolist()
+    east, north, up = np.sqrt(np.maximum(np.diagonal(turned), 0.0)).tolist()
+    return (longitude, latitude, float(place[2])), (east, north, up)
 
 
 def _degrees(words: Sequence[str], place: Place) -> float:
