@@ -134,6 +134,26 @@ def test_null_values_are_derived_from_other_fields(tmp_path):
     assert read_support(written(tmp_path, data)).detector.centre.tolist() == [150.0, 400.0]
 
 
+@pytest.mark.parametrize(
+    ("kind", "changes", "remarks"),
+    [
+        ("FRAME", {}, 1),
+        ("FRAME", {"focal2pixel_samples": [160.0, 50.0, 0.0]}, 0),
+        ("FRAME", {"detector_center": {"line": 0, "sample": 160.0}}, 0),
+        ("FRAME", {"starting_detector_line": 3}, 0),
+        ("LINE_SCANNER", {}, 0),
+    ],
+)
+def test_a_detector_center_in_the_corner_is_reported(tmp_path, kind, changes, remarks):
+    data = document(kind, records=1 if kind == "FRAME" else 9)
+    data |= {"starting_detector_line": 0, "starting_detector_sample": 0}
+    data |= {"focal2pixel_samples": [0.0, 50.0, 0.0], "focal2pixel_lines": [0.0, 0.0, 50.0]}
+    data |= {"detector_center": {"line": 0, "sample": 0.0}, **changes}
+    found = read_support(written(tmp_path, data))
+    assert len(found.remarks) == remarks
+    assert found.detector.centre.tolist() == [data["detector_center"][axis] for axis in ("sample", "line")]
+
+
 @pytest.mark.parametrize("kind", ["FRAME", "LINE_SCANNER"])
 def test_null_values_are_those_of_the_keywords(tmp_path, kind):
     data = document(kind)

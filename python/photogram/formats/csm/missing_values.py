@@ -7,6 +7,7 @@ from typing import Any
 
 from photogram.io.json import Tree
 
+_FRAME = "USGS_ASTRO_FRAME_SENSOR_MODEL"
 _SUMMING = "the number of detector {} that one {} of the image combines"
 _START = "the {} of the detector, from 0, at which the image begins"
 _CENTER = "the {} of the detector at which the axis of the camera meets it, in pixels"
@@ -17,7 +18,7 @@ def _middle(axis: str) -> Callable[[Tree], float | None]:
     """Return what derives the middle of a whole frame; of a part of a frame there is none."""
 
     def derive(tree: Tree) -> float | None:
-        if "FRAME_SENSOR" not in tree["name_model"].text() or tree[f"starting_detector_{axis}"].number():
+        if not tree["name_model"].text().startswith(_FRAME) or tree[f"starting_detector_{axis}"].number():
             return None
         return tree[f"image_{axis}s"].whole(1) * tree[f"detector_{axis}_summing"].number() / 2
 
@@ -77,4 +78,18 @@ def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple
         remarks.append(f"{path} is missing: {value} {origin} is used")
         own = {**holder, name: value}
         tree = Tree({**tree.value, group: own} if group else own, tree.file)
-    return tree, tuple(remarks)
+    return tree, (*remarks, *_center_in_corner(tree))
+
+
+def _center_in_corner(tree: Tree) -> list[str]:
+    """Return a remark on a whole frame whose axis meets the detector in its corner."""
+    offsets = (tree[f"focal2pixel_{axis}s"].numbers(3)[0] for axis in ("sample", "line"))
+    middle = _middle("sample")(tree), _middle("line")(tree)
+    center = tree["detector_center"]
+    if None in middle or any(offsets) or any(center[axis].number() for axis in ("sample", "line")):
+        return []
+    return [
+        "detector_center is 0, 0, a corner of the detector: some programs write 0 if the value is unknown."
+        f" The middle of the image is sample {middle[0]:g}, line {middle[1]:g}; correct detector_center if"
+        " the axis of the camera meets the detector there"
+    ]
