@@ -27,7 +27,9 @@ from photogram.cli import (
 )
 from photogram.cli.console import errors, output
 from photogram.cli.options import OrderingName
+from photogram.targets import Calibrated
 
+from .boards import board_run
 from .projects import PROJECTS, project_run
 
 __all__ = ["PROGRAMS", "Watch"]
@@ -56,6 +58,8 @@ class Watch:
         ("photogram.stellar.night_calibration", "calibrate_night"),
     )
     METHODS = (
+        ("photogram.targets.calibration", "Calibration", "adjust"),
+        ("photogram.targets.calibration", "Calibration", "snoop"),
         ("photogram.absolute_orientation.similarity", "Similarity", "transform"),
         ("photogram.comparator.correction", "Correction", "apply"),
         ("photogram.comparator.correction", "Correction", "invert"),
@@ -293,6 +297,7 @@ PROGRAMS: dict[str, tuple[Run, int]] = {
     "stellar camera: deck": (_plate("input.deck"), 2),
     "exposures": (_exposures, 1),
     "simulate": (_simulate, 4),
+    "calibration with a board": (board_run, 2),
 }
 PROGRAMS |= {f"project: {name}": (project_run(main), often) for name, (main, often) in PROJECTS.items()}
 """How each program is run, and how often among all inputs: what is quick is tried more often."""
@@ -300,6 +305,8 @@ PROGRAMS |= {f"project: {name}": (project_run(main), often) for name, (main, oft
 
 def unsound(result: Any) -> str | None:
     """Name what is not finite in a result that converged without a remark; None where all is well."""
+    if isinstance(result, Calibrated):
+        result = result.result
     if not getattr(result, "converged", False) or getattr(result, "messages", None):
         return None
     values = {

@@ -32,6 +32,7 @@ from photogram.giant import Common, Project
 from photogram.giant.files import to_bytes as record_bytes
 from photogram.stellar import calibrate_night, read_night, read_plain
 
+from .boards import boards
 from .projects import PROJECTS, Files, sound_projects
 
 __all__ = ["SOUND", "Files"]
@@ -252,6 +253,7 @@ SOUND: dict[str, Callable[[], list[Files]]] = {
     "stellar camera: deck": star_deck,
     "exposures": night,
     "simulate": options,
+    "calibration with a board": boards,
 }
 SOUND |= {f"project: {name}": partial(sound_projects, name) for name in PROJECTS}
 """How the sound inputs of each format are made."""
