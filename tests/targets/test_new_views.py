@@ -7,8 +7,9 @@ import pytest
 from given_targets import golden
 from golden_calibrations import rig_small
 
+from photogram.lazy_dataclasses import replace
 from photogram.targets import Candidate
-from photogram.targets.new_views import best_views
+from photogram.targets.new_views import added_by, best_views, placed_cofactors
 from photogram.targets.projection import common_partials, datum_rows, worst
 from photogram.targets.vision import composed
 
@@ -46,3 +47,27 @@ def test_the_best_view_is_first_and_the_next_counts_on_it(functions):
     assert found[0].candidate.name == min(data, key=lambda each: each["largest"])["name"]
     assert len({each.candidate.name for each in found}) == 6
     assert all((later.sd <= earlier.sd + 1e-12).all() for earlier, later in pairwise(found))
+
+
+def test_a_view_of_a_fixed_board_adds_to_the_cameras_alone():
+    whole = rig_small()
+    count = whole.board.start
+    kept = np.r_[:count, whole.common : len(whole.cofactors)]
+    fixed = replace(
+        whole,
+        cofactors=whole.cofactors[np.ix_(kept, kept)],
+        points_by_board=whole.points_by_board[:, :, :0],
+        weights=whole.weights[:count, :count],
+    )
+    each = golden("rig_small")["new_views"]["candidates"][0]
+    added = added_by(fixed, composed(each["R"], each["t"]), SIZES, SD)
+    own = fixed.cofactors[:count, :count]
+    cofactors = placed_cofactors(fixed)
+    assert cofactors.shape == (count + 3, count + 3)
+    rows, pose = np.zeros((len(added.by_pose), count)), added.by_pose
+    rows[:, added.touched] = added.by_cameras
+    across = pose.T @ rows
+    more = rows.T @ rows - across.T @ np.linalg.solve(pose.T @ pose, across)
+    expected = own - np.linalg.inv(np.linalg.inv(own) + more)
+    gain = added.gain(cofactors, slice(None))[:count, :count]
+    np.testing.assert_allclose(gain, expected, rtol=0, atol=1e-6 * np.abs(expected).max())

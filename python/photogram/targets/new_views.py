@@ -62,6 +62,8 @@ class Added:
 
     def gain(self, cofactors: Floats, rows: Indices | slice) -> Floats:
         """Return (k, k) what the cofactors of :func:`placed_cofactors` lose in some rows: G' W G."""
+        if not cofactors[self.places].any():
+            return self.likely_gain(cofactors, np.arange(len(cofactors))[rows])
         whole = self._times(cofactors)
         spread = self._times(whole.T) + np.eye(len(whole))
         own = whole[:, rows]
@@ -73,7 +75,10 @@ class Added:
         return np.asarray((gained + gained.T) / 2)
 
     def likely_gain(self, cofactors: Floats, rows: Indices) -> Floats:
-        """Return about the same, in a tenth of the time: each point known for itself, Q M (I + Q M)^-1 Q."""
+        """Return about the same, in a tenth of the time: each point known for itself, Q M (I + Q M)^-1 Q.
+
+        It is the same if the points are fixed.
+        """
         of_points = cofactors[self.places[:, :, np.newaxis], self.places[:, np.newaxis]]
         noise = np.eye(2) + self.by_place @ of_points @ self.by_place.transpose(0, 2, 1)
         both, count = np.hstack([self.by_cameras, self.by_pose]), len(self.touched)
@@ -188,17 +193,25 @@ def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added 
     return Added(
         touched=touched,
         by_cameras=by_cameras[:, touched],
-        places=before + 3 * points[:, np.newaxis] + np.arange(3),
+        places=before + 3 * points[:, np.newaxis] * _has_unknown_points(housing) + np.arange(3),
         by_place=by_place / sd,
         by_pose=by_pose.reshape(-1, 6) / sd,
         corners=np.bincount(cameras, minlength=len(housing.cameras)),
     )
 
 
+def _has_unknown_points(housing: Housing) -> bool:
+    return bool(housing.points_by_board.shape[2])
+
+
 def placed_cofactors(housing: Housing) -> Floats:
-    """Return the cofactors of cameras and sensors, and of the places (x, y, z) of all points of the board."""
+    """Return the cofactors of cameras and sensors, and of the places (x, y, z) of all points of the board.
+
+    All points of a fixed board have the same three rows, which are zero.
+    """
     before, own = housing.board.start, housing.cofactors[: housing.common, : housing.common]
-    by_board = housing.points_by_board.reshape(3 * len(housing.points), housing.common - before)
+    points = len(housing.points) if _has_unknown_points(housing) else 1
+    by_board = housing.points_by_board[:points].reshape(3 * points, housing.common - before)
     across = own[:before, before:] @ by_board.T
     return np.block(
         [[own[:before, :before], across], [across.T, by_board @ own[before:, before:] @ by_board.T]]
