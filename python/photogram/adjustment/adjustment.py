@@ -44,7 +44,7 @@ from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import NOT_PHOTOGRAPHED, REJECTED, Result
+from photogram.results.result import Result, dropped_points
 from photogram.show.methods import Way
 
 __all__ = [
@@ -389,7 +389,7 @@ def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message
     error = None if solution.undetermined is None else named(block, *solution.undetermined)
     messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
     messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
-    dropped = {block.point_ids[point]: reason for point, reason in solution.dropped}
+    dropped = dropped_points(block, solution)
     messages += _left_out(dropped)
     lost = [each.name for each in block.observations if dropped.keys() & set(each.points)]
     if lost:
@@ -403,21 +403,6 @@ def _left_out(dropped: Mapping[str, str]) -> list[Message]:
     for point, reason in dropped.items():
         by_reason.setdefault(reason, []).append(point)
     return [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
-
-
-def with_rejections(result: Result, given: Block) -> Result:
-    """Return a result in which points that had images in the given block are not called unphotographed."""
-    if NOT_PHOTOGRAPHED not in result.dropped.values():
-        return result
-    imaged = {given.point_ids[row] for row in np.unique(given.image_points).tolist()}
-    dropped = {
-        name: REJECTED if reason == NOT_PHOTOGRAPHED and name in imaged else reason
-        for name, reason in result.dropped.items()
-    }
-    before, messages = _left_out(result.dropped), result.messages
-    place = next((row for row, each in enumerate(messages) if each in before), 0)
-    rest = [each for each in messages if each not in before]
-    return replace(result, dropped=dropped, messages=[*rest[:place], *_left_out(dropped), *rest[place:]])
 
 
 def _rises(iterations: list[Iteration]) -> list[Message]:

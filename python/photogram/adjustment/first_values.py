@@ -27,7 +27,7 @@ from photogram.network.geometry import Cartesian
 from photogram.network.motion import at_rest, timed_photos
 from photogram.network.observations import Distance
 from photogram.network.similarity import similarity
-from photogram.network.subset import kept_images, of_photos
+from photogram.network.subset import kept_images, of_photos, with_rejected_points
 from photogram.show.summary import Brief
 
 __all__ = ["FirstValues", "first_values"]
@@ -102,7 +102,8 @@ class FirstValues(Brief):
             Observations of photos that could not be started.
         """
         started = np.array([photo in self.sources for photo in self.block.photo_ids])
-        return of_photos(kept_images(self.block, ~self.set_aside), started)
+        usable = of_photos(kept_images(self.block, ~self.set_aside), started)
+        return with_rejected_points(usable, self.block)
 
 
 def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:

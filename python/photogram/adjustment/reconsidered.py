@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from photogram.adjustment.a_priori import Known
-from photogram.adjustment.adjustment import adjust, with_rejections
+from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools
@@ -65,7 +65,6 @@ def adjust_started(started: FirstValues, *, by: Callable[..., Result] = adjust, 
         if not more.converged:
             break
         started, result = again, more
-    result = with_rejections(result, first.block)
     return replace(result, set_aside=_named(started), messages=[*_returned(first, started), *result.messages])
 
 

@@ -20,7 +20,6 @@ from photogram.adjustment.adjustment import (
     core_threads,
     iteration_limit,
     with_datum,
-    with_rejections,
 )
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.remarks import check_cameras
@@ -32,7 +31,7 @@ from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints, MinimumConstraints, check_datum
 from photogram.network.motion import timed_photos
-from photogram.network.subset import image_rows
+from photogram.network.subset import image_rows, with_rejected_points
 from photogram.results.exchanged_names import Exchange, exchanged_names
 from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.network import AdjustedNetwork
@@ -235,7 +234,6 @@ def _snoop_block(
         poses = {"photo_positions": block.photo_positions, "photo_attitudes": block.photo_attitudes}
         again = adjusted(cleaned.replace(**poses), datum=datum)
         result = again if again.converged else result.in_datum(datum)
-    result = with_rejections(result, block)
     has_held = any(
         (sd == 0).any() for sd in (block.photo_position_sd, block.photo_attitude_sd, block.point_sd)
     )
@@ -357,7 +355,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
     rows = [row for own, _ in block.observation_groups for row in own]
     dropped = {rows[index] for index in gone(trial, out, OBSERVATION)[0].tolist()}
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
-    return block.replace(
+    cleaned = block.replace(
         photo_positions=np.where(position_sd == 0, block.photo_positions, reached[:, :3]),
         photo_attitudes=np.where(attitude_sd == 0, block.photo_attitudes, reached[:, 3:]),
         photo_positions_observed=_observed(block.photo_positions, positions, position_sd),
@@ -369,6 +367,7 @@ def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
         **image_rows(block, images),
         observations=[each for row, each in enumerate(block.observations) if row not in dropped],
     )
+    return with_rejected_points(cleaned, block)
 
 
 def _observed(initial: Floats, observed: Floats | None, sd: Floats) -> Floats | None:

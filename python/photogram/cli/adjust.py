@@ -273,7 +273,6 @@ def _snooped(
 ) -> Snooped:
     """Take gross errors out of a block, of what is kept where first values have set images aside."""
     from photogram import Result, snoop
-    from photogram.adjustment.adjustment import with_rejections
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.results.fitting import with_features
 
@@ -296,7 +295,7 @@ def _snooped(
     assert isinstance(result, Result)
     _check_control(job, project, choices, result)
     messages = [*_replaced_by_snooping(job, project, choices), *result.messages]
-    result = with_rejections(replace(result, set_aside=aside, messages=messages), project.block)
+    result = replace(result, set_aside=aside, messages=messages)
     return replace(found, result=with_features(result, project.features))
 
 

@@ -178,6 +178,8 @@ class Block(Valued, Brief):
     passages: Sequence[Passage] = ()
     frame: Frame = field(default_factory=Frame)
     point_check_sd: Floats | None = None
+    rejected_points = frozenset[str]()
+    """Names of points whose image observations were all rejected; no field, but every copy has them."""
     if TYPE_CHECKING:
         # What checkers of types are told: more can be given than what the fields then hold.
         def __init__(
@@ -651,7 +653,9 @@ class Block(Valued, Brief):
         points = changes.get("point_ids")
         if points is not None and len(points) != len(self.point_ids):
             values["point_check_sd"] = None
-        return type(self)(**{**values, **changes})
+        own = type(self)(**{**values, **changes})
+        own._set("rejected_points", self.rejected_points)
+        return own
 
     def with_fixed_photos(self) -> Self:
         """Return the block with positions and attitudes that stay as they are: every point by itself.

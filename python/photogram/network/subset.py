@@ -33,6 +33,15 @@ def kept_images(block: Block, kept: Indices | Bools) -> Block:
     return own
 
 
+def with_rejected_points(block: Block, before: Block) -> Block:
+    """Return a block that names the points which lost their last image observation since another block."""
+    lost = np.setdiff1d(before.image_points, block.image_points)
+    names = {before.point_ids[row] for row in lost.tolist()}
+    own = block.kept()
+    object.__setattr__(own, "rejected_points", before.rejected_points | names)
+    return own
+
+
 def of_photos(block: Block, kept: Bools) -> Block:
     """Return a block of the (P,) photos that are kept, with their images and what was observed of them."""
     fewer = kept_images(block, kept[block.image_photos])

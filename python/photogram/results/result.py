@@ -56,6 +56,13 @@ REJECTED = "all its image observations are rejected"
 """Reasons why a point without image observations is left out: it never had any, or none was used."""
 
 
+def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str, str]:
+    """Return the points that are left out by their names, with the reasons."""
+    reasons = {block.point_ids[point]: reason for point, reason in solution.dropped}
+    rejected = [name for name in block.rejected_points if reasons.get(name) == NOT_PHOTOGRAPHED]
+    return reasons | dict.fromkeys(rejected, REJECTED)
+
+
 @dataclass(frozen=True)
 class SumsByKind:
     """Sums over kinds of observations.
@@ -196,7 +203,7 @@ class Result(OnFilm, AdjustedNetwork):
             kinds=observed_kinds(block, solution),
             cameras=adjusted_cameras(block, solution, scale),
             unknowns=adjusted_unknowns(block, solution, scale),
-            dropped={block.point_ids[point]: reason for point, reason in solution.dropped},
+            dropped=dropped_points(block, solution),
         )
 
     @property
