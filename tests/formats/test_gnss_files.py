@@ -10,7 +10,8 @@ import pytest
 from formats.photographs import EXAMPLE, block_with_pictures, picture
 from photogram import InputError, LeverArm, Message, Position, Spheroid, adjust, formats
 from photogram.formats import GnssFile, PhotoFiles, Wishes, read_metadata
-from photogram.network.geometry import geographic_to_geocentric, local_frames
+from photogram.network import geographic_to_geocentric, local_frames
+
 
 SD = (0.012, 0.011, 0.025)
 ANTENNA = (0.05, 0.08, 0.12)
