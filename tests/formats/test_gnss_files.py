@@ -12,7 +12,6 @@ from photogram import InputError, LeverArm, Message, Position, Spheroid, adjust,
 from photogram.formats import GnssFile, PhotoFiles, Wishes, read_metadata
 from photogram.network import geographic_to_geocentric, local_frames
 
-
 SD = (0.012, 0.011, 0.025)
 ANTENNA = (0.05, 0.08, 0.12)
 BEGIN = datetime(2024, 5, 17, 10, 7, 45)

@@ -2,6 +2,7 @@
 
 import io
 import time
+import warnings
 import zipfile
 
 import numpy as np
@@ -13,7 +14,7 @@ from photogram.targets import Board, read
 from photogram.targets.board_files import read_board
 from photogram.targets.mrcal_model import read_lens
 from photogram.targets.opencv_corners import read_npz, read_storage
-from photogram.targets.sightings import focal_lengths, homographies
+from photogram.targets.sightings import focal_lengths, homographies, ray_homographies
 
 HUGE = "1" + "0" * 400
 STORAGE = {
@@ -152,3 +153,17 @@ def test_corners_that_determine_no_camera_name_the_file(tmp_path):
     with pytest.raises(InputError) as found:
         read(tmp_path / "c.csv", board=board, size=(640, 480))
     assert found.value.file == tmp_path / "c.csv"
+
+
+def test_a_picture_with_one_ray_has_no_homography():
+    """A lens that is adjusted by other pictures may have a ray for one corner of a picture."""
+    places = np.mgrid[:3, :5].reshape(2, -1).T * 0.06
+    rays = np.concatenate([places - 0.1, np.ones((15, 1))], axis=1)
+    rays = np.array([rays / np.linalg.norm(rays, axis=1)[:, np.newaxis]] * 2)
+    whole = ray_homographies(places, rays[:1])
+    rays[1, 1:] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = ray_homographies(places, rays)
+    np.testing.assert_array_equal(found[0], whole[0])
+    assert np.isnan(found[1]).all()

@@ -142,9 +142,14 @@ def rays_of(camera: Camera, xy: Floats) -> Floats:
 
 
 def misfits(seen: Sightings, rays: Floats) -> Floats:
-    """Return (P,) the median angle (rad) between the rays of each picture and those of the board."""
+    """Return (P,) the median angle (rad) between the rays of each picture and those of the board.
+
+    It is infinite for a picture that has no rays, or one.
+    """
     found = ray_homographies(seen.coordinates, rays)
-    return np.asarray(np.nanmedian(angles_apart(seen.coordinates, rays, found), axis=1))
+    angles = angles_apart(seen.coordinates, rays, found)
+    angles[np.isnan(angles).all(axis=1)] = np.inf
+    return np.asarray(np.nanmedian(angles, axis=1))
 
 
 def _tried(seen: Sightings, camera: Camera) -> Trial:

@@ -136,11 +136,12 @@ def _scaled(points: Floats, seen: Bools) -> tuple[Floats, Floats]:
     kept = np.where(seen[..., np.newaxis], points, np.nan)
     middle = np.nanmean(kept, axis=1)
     apart = kept - middle[:, np.newaxis]
-    scale = math.sqrt(m) / np.nanmean(np.linalg.norm(apart, axis=-1), axis=1)
     made = np.tile(np.eye(m + 1), (len(points), 1, 1))
-    made[:, :m, :m] *= scale[:, np.newaxis, np.newaxis]
-    made[:, :m, m] = -scale[:, np.newaxis] * middle
-    return apart * scale[:, np.newaxis, np.newaxis], made
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = math.sqrt(m) / np.nanmean(np.linalg.norm(apart, axis=-1), axis=1)
+        made[:, :m, :m] *= scale[:, np.newaxis, np.newaxis]
+        made[:, :m, m] = -scale[:, np.newaxis] * middle
+        return apart * scale[:, np.newaxis, np.newaxis], made
 
 
 def _equations(board: Floats, rays: Floats) -> Floats:
@@ -157,10 +158,15 @@ def _equations(board: Floats, rays: Floats) -> Floats:
 
 
 def _smallest(rows: Floats, seen: Bools) -> Floats:
-    """Return (P, 3, m + 1) the H of norm 1 that make rows (P, n, k, 3 (m + 1)) of points seen least."""
+    """Return (P, 3, m + 1) the H of norm 1 that make rows (P, n, k, 3 (m + 1)) of points seen least.
+
+    NaN for a picture whose points are all in one place.
+    """
     used = np.where(seen[..., np.newaxis, np.newaxis], rows, 0.0).reshape(len(rows), -1, rows.shape[-1])
-    _, vectors = np.linalg.eigh(used.transpose(0, 2, 1) @ used)
-    return np.asarray(vectors[:, :, 0].reshape(len(rows), 3, -1))
+    squares = used.transpose(0, 2, 1) @ used
+    finite = np.isfinite(squares).all(axis=(1, 2))[:, np.newaxis, np.newaxis]
+    _, vectors = np.linalg.eigh(np.where(finite, squares, 0.0))
+    return np.where(finite, vectors[:, :, 0].reshape(len(rows), 3, -1), np.nan)
 
 
 LISTED = (
