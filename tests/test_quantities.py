@@ -13,9 +13,11 @@ from photogram.io import json
 from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES
 from photogram.show.cells import page_table
+from photogram.show.forms import record, text
+from photogram.show.html import page_html
 from photogram.show.lines import fact_lines, field, marks, table_lines
-from photogram.show.page import Cell, Fact, probability_written
-from photogram.show.quantity import Axis, Quantity, component, of_each, records, units
+from photogram.show.page import Cell, Document, Fact, Section, probability_written
+from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each, records, units
 
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
 AXES = (Axis.turned("omega", "deg"), Axis.of("s", "mm / m"), Axis.of("b1", "mm"))
@@ -135,3 +137,24 @@ def test_probabilities_are_written_by_one_rule(p, text):
     assert probability_written(p) == text
     assert Texts("en").probability(p) == text
     assert Texts("de").probability(p) == text.replace(".", ",")
+
+
+def test_a_table_may_be_a_part_of_a_member_and_one_without_rows_is_only_in_json():
+    numbers = [Quantity(np.arange(2), member="number", head="Number")]
+    nothing = Table("fit.terms", "Absent terms", [Quantity(np.zeros(0), member="term", head="Term")])
+    sections = [Section.of(Table("numbers", "Numbers", numbers)), Section.of(nothing)]
+    document = Document("", "", [], [], [], sections, {"fit": {"sigma0": 1.0}})
+    assert record(document) == {
+        "fit": {"sigma0": 1.0, "terms": []},
+        "numbers": [{"number": 0}, {"number": 1}],
+    }
+    assert document.members == {"fit": {"sigma0": 1.0}}
+    assert document.table("fit.terms") is nothing
+    assert "Absent" not in text(document)
+    assert b"Absent" not in page_html(document)
+
+
+def test_parts_of_many_things_are_columns_of_json():
+    rows = members_of_each([VALUES, SD], "kind", size="values.size")
+    assert records(rows) == [{"kind": "value", "size": 3}, {"kind": "deviation", "size": 3}]
+    assert records(members_of_each([], "kind")) == []

@@ -166,6 +166,7 @@ class Documents:
         text: bool = True,
         more: dict[Path, bytes] | None = None,
         above: Iterable[Section] = (),
+        tables: Sequence[str] = (),
         code: int | None = None,
     ) -> None:
         """Write and print a result that has a report, a page and a document, and end by its verdict.
@@ -180,14 +181,19 @@ class Documents:
             Further files.
         above
             What is printed above the report.
+        tables
+            Keys of tables: a summary with these tables is printed instead of the report.
         code
             The exit code, where it is not that of the verdict.
         """
+        from photogram.show.forms import summary
         from photogram.show.methods import page_of
 
         def summarize() -> None:
             print_sections(above, "the report")
-            output.print(escape(found.report()), end="")
+            lines = summary(found.document(), *tables) if tables else found.report().splitlines()
+            for line in lines:
+                output.print(escape(line))
 
         document, page = self.as_json(found), self.page(job, command, out, partial(page_of, found))
         texts = {out / TEXT: found.report().encode()} if text and out is not None else {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from photogram import _photocore
 from photogram.io import json
@@ -22,10 +23,16 @@ PLAIN = str.maketrans("µ–−ᵀ¹", "u--'1") | str.maketrans(
 
 def record(document: Document) -> dict[str, object]:
     """Return the members of a JSON document: those of the document, and its tables by their keys."""
-    tables = [
-        table for table in document.tables() if table.key and any(column.member for column in table.columns)
-    ]
-    return {**document.members, **{table.key: records(table.columns) for table in tables}}
+    members: dict[str, Any] = {**document.members}
+    for table in document.tables():
+        if table.key and any(column.member for column in table.columns):
+            *path, name = table.key.split(".")
+            place = members
+            for member in path:
+                place[member] = {**place[member]}
+                place = place[member]
+            place[name] = records(table.columns)
+    return members
 
 
 def to_json(document: Document) -> bytes:

@@ -302,6 +302,10 @@ class Document:
         parts = (part for section in self.sections for part in section.parts)
         return [part for part in parts if isinstance(part, quantity.Table)]
 
+    def table(self, key: str) -> quantity.Table:
+        """Return the table with a key."""
+        return next(table for table in self.tables() if table.key == key)
+
 
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:
     """Return one document of several with the same tables: tables of one key are layers of a section.

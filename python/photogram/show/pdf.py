@@ -22,6 +22,7 @@ from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import BaseDocTemplate, Frame, LongTable, PageBreak, PageTemplate, Paragraph, Spacer
 from reportlab.platypus import Table as Grid
 
+from photogram.show import quantity
 from photogram.show.cells import written
 from photogram.show.page import Document, Drawing, Facts, Judgement, Layers, Remarks, Section, Table, Text
 from photogram.show.style import styled
@@ -183,7 +184,8 @@ class _Flow:
         yield grid
 
     def _section(self, section: Section) -> Iterator[Any]:
-        if not section.parts:
+        parts = [part for part in section.parts if not isinstance(part, quantity.Table) or part.visible]
+        if not parts:
             return
         if section.title:
             yield _heading(escape(section.title), self._head, section.key)
@@ -192,7 +194,7 @@ class _Flow:
         if self._front and [type(part) for part in section.parts] == [Remarks, Drawing]:
             yield self._beside(*section.parts)
             return
-        for part in section.parts:
+        for part in parts:
             yield from self._part(part, section.title)
 
     def _beside(self, told: Any, drawing: Any) -> Any:

@@ -155,13 +155,20 @@ Quantities = Sequence[Quantity]
 class Table:
     """A table of a result, declared once: all forms of a document are written from it."""
 
-    key: str  # name in JSON documents, and key of its section; empty: another member has its rows
+    # Name in JSON documents (`a.b` for a part of member `a`; empty: another member has its rows), and key of its section
+    key: str
     title: str
     columns: Quantities
     note: str = ""  # a remark on this table
     about: str = ""  # the meaning of the columns
     deviations: Floats | None = None  # (n,) or (n, k): the decimals of values follow from them
     shown: Indices | None = None  # people see these (r,) rows, or these (r, 2) rows and components; None: all
+
+    @property
+    def visible(self) -> bool:
+        """Whether people see a part of it: a table without rows or heads is in JSON and in files only."""
+        rows = self.columns[0].values if self.shown is None else self.shown
+        return len(rows) > 0 and any(column.head for column in self.columns)
 
     def frame(self) -> pd.DataFrame:
         """Return the columns that have a name as a data frame."""
@@ -177,8 +184,8 @@ class Table:
 def of_each(
     things: Sequence[Any], attribute: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
 ) -> Quantity:
-    """Return an attribute of n things; JSON documents call it as it is called, unless `member` says else."""
-    found = [getattr(each, attribute) for each in things]
+    """Return an attribute (`a.b`) of n things; its name in JSON documents, unless `member` is another."""
+    found = [*map(attrgetter(attribute), things)]
     values = np.array(found, dtype=object if kind == "name" else None)
     return Quantity(values, axes, kind, **{"member": attribute, **more})
 
@@ -295,6 +302,12 @@ def members(thing: object, *names: str, **others: str) -> dict[str, Any]:
     attributes = {**dict(zip(names, names, strict=True)), **others}
     values = {name: attrgetter(attribute)(thing) for name, attribute in attributes.items()}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def members_of_each(things: Sequence[object], *names: str, **others: str) -> list[Quantity]:
+    """Return attributes of n things, as of `members`, that only JSON documents contain."""
+    rows = [members(thing, *names, **others) for thing in things]
+    return [Quantity([row[name] for row in rows], member=name) for name in (*names, *others)]
 
 
 def records(table: Quantities) -> list[dict[str, Any]]:
