@@ -165,3 +165,13 @@ def test_a_result_with_a_document_needs_no_other_definition():
     assert json.loads(Survey().to_json())["name"] == "A"
     pytest.importorskip("jinja2")
     assert b"Points" in Survey().to_html()
+
+
+def test_details_are_in_the_report_and_in_json_but_not_on_the_page():
+    declared = replace(table(), key="details", title="All points", keyed=True)
+    made = replace(document(), details=[Section.of(declared)])
+    assert record(made)["details"]["P1"] == {"position": [1.25, -2.5], "sd": [0.01, 0.02]}
+    assert made.table("details") is declared
+    assert "All points" in text(made)
+    pytest.importorskip("jinja2")
+    assert b"All points" not in html.page_html(made)

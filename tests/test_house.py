@@ -54,6 +54,18 @@ def modules():
     return found
 
 
+COMPOSED = {"document", "_findings"}
+"""Methods of results whose definitions are in the files above that read the results."""
+
+
+def nodes(node):
+    """Return the nodes of a file without the methods that lead to the files above."""
+    yield node
+    for part in ast.iter_child_nodes(node):
+        if not (isinstance(part, ast.FunctionDef) and part.name in COMPOSED):
+            yield from nodes(part)
+
+
 @cache
 def imports():
     """Return what each file imports of the package: within functions, by a string, for types only, too."""
@@ -61,7 +73,7 @@ def imports():
     graph = {}
     for name, path in found.items():
         arrows = set()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom):
                 inside = {f"{node.module}.{each.name}" for each in node.names} & set(found)
                 arrows |= inside or ({node.module} & set(found))

@@ -11,7 +11,6 @@ from photogram.io import json
 from photogram.show.cells import written
 from photogram.show.lines import fact_lines
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Section, Table, Text
-from photogram.show.quantity import records
 
 WIDTH = 100  # characters of a line of prose
 
@@ -31,7 +30,7 @@ def record(document: Document) -> dict[str, object]:
             for member in path:
                 place[member] = {**place[member]}
                 place = place[member]
-            place[name] = records(table.columns)
+            place[name] = table.record()
     return members
 
 
@@ -41,7 +40,7 @@ def to_json(document: Document) -> bytes:
 
 
 def text(document: Document) -> str:
-    """Return a document as a report: verdict, advice, highlights, then all sections; plots are left out."""
+    """Return a document as a report: verdict, advice, highlights, sections, details; plots are left out."""
     judged = [
         (f"{document.first}, {judgement.on}".removesuffix(", "), [judgement.headline, *judgement.lines])
         for judgement in document.judgements
@@ -50,7 +49,8 @@ def text(document: Document) -> str:
     parts += [_titled(title, [_sentence(line) for line in lines]) for title, lines in judged]
     parts.append(_titled("What to do next", [_sentence(line) for line in document.advice]))
     parts.append(_titled("Key figures", fact_lines([*document.head, *document.highlights])))
-    parts += [_titled(section.title, _section_lines(section)) for section in document.sections]
+    sections = (*document.sections, *document.details)
+    parts += [_titled(section.title, _section_lines(section)) for section in sections]
     return "\n\n".join(part for part in parts if part).translate(PLAIN) + "\n"
 
 

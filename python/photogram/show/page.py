@@ -270,6 +270,8 @@ class Document:
         The others.
     members
         Of the JSON document, beside the tables.
+    details
+        Sections of reports as text and of JSON documents that pages omit.
     phases
         Seconds that the engine spent in its phases.
     head
@@ -286,6 +288,7 @@ class Document:
     highlights: Sequence[Fact]
     sections: Sequence[Section]
     members: Mapping[str, object] = field(default_factory=dict)
+    details: Sequence[Section] = ()
     phases: Mapping[str, float] = field(default_factory=dict)
     head: Sequence[Fact] = ()
     language: str = "en"
@@ -298,8 +301,8 @@ class Document:
         return replace(self, sections=[*self.sections, *more])
 
     def tables(self) -> list[quantity.Table]:
-        """Return the tables of all sections, without those in layers."""
-        parts = (part for section in self.sections for part in section.parts)
+        """Return the tables of all sections and details, without those in layers."""
+        parts = (part for section in (*self.sections, *self.details) for part in section.parts)
         return [part for part in parts if isinstance(part, quantity.Table)]
 
     def table(self, key: str) -> quantity.Table:

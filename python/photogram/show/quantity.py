@@ -163,6 +163,7 @@ class Table:
     about: str = ""  # the meaning of the columns
     deviations: Floats | None = None  # (n,) or (n, k): the decimals of values follow from them
     shown: Indices | None = None  # people see these (r,) rows, or these (r, 2) rows and components; None: all
+    keyed: bool = False  # JSON documents have an object with a member for each name of the first column
 
     @property
     def visible(self) -> bool:
@@ -175,6 +176,13 @@ class Table:
         import pandas as pd
 
         return pd.DataFrame(frame(self.columns))
+
+    def record(self) -> list[dict[str, Any]] | dict[str, dict[str, Any]]:
+        """Return the rows of a JSON document: a list, or an object with the names of the first column."""
+        if self.keyed:
+            names = np.asarray(self.columns[0].values).tolist()
+            return dict(zip(names, records(self.columns[1:]), strict=True))
+        return records(self.columns)
 
     def csv(self) -> bytes:
         """Return the columns that have a name as text of commas, below their units."""
