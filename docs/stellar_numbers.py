@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import runpy
 from dataclasses import replace
 from functools import cache
@@ -12,6 +13,7 @@ from pathlib import Path
 import erfa
 import numpy as np
 
+from photogram.show.forms import summary
 from photogram.stellar import (
     ARCSEC,
     GRAD,
@@ -26,10 +28,7 @@ from photogram.stellar import (
     read_night,
     read_plain,
     refraction,
-    report,
 )
-from photogram.stellar.listing import summary
-from photogram.stellar.night_report import summary as night_summary
 from photogram.stellar.parameters import UNITS
 
 
@@ -48,12 +47,19 @@ def night() -> CalibratedNight:
         return calibrate_night(read_night(folder / "night.toml"))
 
 
+def section_lines(result: Result | CalibratedNight, *titles: str) -> list[str]:
+    """Return sections of a report without their titles."""
+    sections = re.split(r"\n\n(?=[^\n]+\n-{4,}\n)", result.report())
+    lines = {title: rest for title, _, *rest in map(str.splitlines, sections[1:])}
+    return [line for title in titles for line in ("", *lines[title])][1:]
+
+
 def adjustment_lines() -> list[str]:
     """Show the figures of the packaged plate."""
-    *_, (_, problems), (_, figures) = summary(plate())
     # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
     noisy = ("sums of", "weighted sum of squares, plate", "weighted sum of squares, stars")
-    return [*problems, "", *(line for line in figures if not line.startswith(noisy))]
+    figures = section_lines(plate(), "How much, how good", "Remarks")
+    return [*summary(plate().document()), "", *(line for line in figures if not line.startswith(noisy))]
 
 
 def parameter_lines() -> list[str]:
@@ -88,28 +94,17 @@ def refraction_lines() -> list[str]:
 
 def night_lines() -> list[str]:
     """Show the figures and the camera of the packaged night."""
-    *_, (_, figures), (_, camera) = night_summary(night())
-    return [*figures, "", *camera]
-
-
-def section_lines(result: CalibratedNight, *titles: str) -> list[str]:
-    """Take sections of a report."""
-    parts = report(result).split("\n\n")
-    lines: list[str] = []
-    for title in titles:
-        (found,) = [part for part in parts if part.startswith(f"{title}\n-")]
-        lines += ["", *found.splitlines()[2:]] if lines else found.splitlines()[2:]
-    return lines
+    return section_lines(night(), "How much, how good", "Camera")
 
 
 def lens_lines() -> list[str]:
     """Show the tests of the packaged night's lens."""
-    return section_lines(night(), "Tests of the lens")
+    return section_lines(night(), "Lens")
 
 
 def odds_lines() -> list[str]:
-    """Show the odds and the attitudes in ICRS of the packaged night."""
-    return section_lines(night(), "Identification", "Attitudes in ICRS")
+    """Show the odds and the attitudes of the packaged night."""
+    return section_lines(night(), "Exposures", "Attitudes in ICRS")
 
 
 def choice_lines() -> list[str]:
@@ -117,7 +112,7 @@ def choice_lines() -> list[str]:
     example = runpy.run_path(str(Path(__file__).parents[1] / "examples" / "all_sky_camera.py"))
     start = SkyCamera.of_field(*example["FRAME"], example["field_of"]("equisolid"), "kannala_brandt")
     made, _ = example["night"]("equisolid", 8, start, lenses=tuple(LENSES), tripod=True)
-    return section_lines(calibrate_night(made), "Lenses that were tried")
+    return section_lines(calibrate_night(made), "Lens")
 
 
 BLOCKS = {

@@ -22,7 +22,6 @@ from photogram.stellar import (
     apparent_places,
     calibrate_night,
     project_sky,
-    report,
     sidereal_time,
 )
 
@@ -97,7 +96,7 @@ def main(lens: str) -> None:
     """Print the report of a night whose lens nobody has said."""
     start = SkyCamera.of_field(*FRAME, field_of(lens), "kannala_brandt")
     found, _ = night(lens, 8, start, lenses=tuple(LENSES), tripod=True)
-    print(report(calibrate_night(found)))
+    print(calibrate_night(found).report())
 
 
 if __name__ == "__main__":

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable, Iterator
 
 from photogram.show.cells import written
+from photogram.show.forms import PLAIN
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Table, Text
-from photogram.show.sections import verdict_sections
 from photogram.statistics.verdict import Verdict
 
 CLAIMS = {
@@ -157,6 +157,11 @@ def _of_document(members: dict) -> Iterator[str]:
     yield from (f"problems: {each}" for each in members.get("problems", ()))
 
 
+def plain_words(text: str) -> str:
+    """Return a text without line ends and capitals, as a report writes it."""
+    return " ".join(text.translate(PLAIN).casefold().split())
+
+
 def assert_one_judgement(
     verdict: Verdict, page: Document | None, report: str, document: bytes | None
 ) -> None:
@@ -168,7 +173,8 @@ def assert_one_judgement(
         assert list(page.advice) == list(verdict.next)
     assert verdict.next
     if "Verdict\n" in report:
-        for title, lines in verdict_sections(verdict):
-            assert f"{title}\n{'-' * len(title)}\n" + "\n".join(lines) in report
+        words = plain_words(report)
+        for sentence in (verdict.headline, *verdict.lines, *verdict.next):
+            assert plain_words(str(sentence)) in words
     if document is not None and "verdict" in (members := json.loads(document)):
         assert members["verdict"]["next"] == list(verdict.next)

@@ -352,7 +352,6 @@ def good(tmp_path_factory):
             "read_plain": {"path": plate_file},
             "read_yaml": {"path": star_yaml},
             "refraction": {"zenith_distances": [0.5]},
-            "report": {"result": calibrated_night},
             "sidereal_time": {"site": night.site, "utc": exposure.utc, "dut1": 0.1},
             "to_yaml": {"camera": night.camera, "frame": night.frame, "form": "ros", "name": "A"},
         },

@@ -40,8 +40,8 @@ def see(result, document=True):
 def no_pictures(monkeypatch):
     """Leave the pictures out that pages draw at once: they have no sentences."""
     monkeypatch.setattr("photogram.comparator.pictures.book.sketches", lambda _: {})
-    monkeypatch.setattr("photogram.stellar.page.sketches", lambda _: {})
-    monkeypatch.setattr("photogram.stellar.night_page.sketches", lambda _: {})
+    monkeypatch.setattr("photogram.stellar.document.sketches", lambda _: {})
+    monkeypatch.setattr("photogram.stellar.night_document.sketches", lambda _: {})
 
 
 @pytest.fixture(scope="module")
@@ -366,23 +366,17 @@ def plate(shift=0.0, image=100, mean_error=0.0):
 )
 def test_plates(changes, code):
     from photogram.stellar import calibrate
-    from photogram.stellar.document import to_json as plate_to_json
-    from photogram.stellar.listing import listing as plate_listing
 
-    found = calibrate(plate(**changes))
-    assert_one_judgement(found.verdict, page_of(found), plate_listing(found), plate_to_json(found))
-    assert found.verdict.code == code
+    assert see(calibrate(plate(**changes))).code == code
 
 
 @pytest.mark.parametrize("pixel_sd", [None, 0.02])
 def test_nights(pixel_sd):
     pytest.importorskip("erfa")
-    from photogram.stellar import calibrate_night, read_night, report
-    from photogram.stellar.night_report import to_json as night_to_json
+    from photogram.stellar import calibrate_night, read_night
 
     night = read_night(Path(str(EXAMPLES / "exposures" / "night.toml")))
-    found = calibrate_night(night if pixel_sd is None else replace(night, pixel_sd=pixel_sd))
-    assert_one_judgement(found.verdict, page_of(found), report(found), night_to_json(found))
+    see(calibrate_night(night if pixel_sd is None else replace(night, pixel_sd=pixel_sd)))
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ import pytest
 import star_plates as plates
 from nights import MAKER
 
-from photogram.stellar import INDEX, calibrate, calibrate_exposures, calibrate_night, report
+from photogram.stellar import INDEX, calibrate, calibrate_exposures, calibrate_night
 from photogram.stellar.lens_choice import equal
 from photogram.stellar.lens_choice import test_scale as scale_of
 from photogram.stellar.lens_choice import test_terms as terms_of
-from photogram.stellar.listing import listing
+from photogram.stellar.night_tables import lens_tests
 
 FRAME = (6000.0, 4000.0)
 
@@ -38,7 +38,8 @@ def test_fx_may_be_fy(night, result):
     assert again.calibration.degrees_of_freedom == result.calibration.degrees_of_freedom + 1
     assert again.scale_test.statistic == pytest.approx(result.scale_test.statistic, rel=0.05)
     assert any(str(message).startswith("fx is not fy: the data refuse it") for message in again.messages)
-    assert "as fx" in report(again)
+    parameters = again.document().table("parameters").record()
+    assert parameters["fx"]["value"] == parameters["fy"]["value"]
 
 
 def test_the_test_of_fx_and_fy_is_the_change_of_the_sum_of_squares(result):
@@ -83,23 +84,27 @@ def test_effects_are_what_terms_move_in_the_frame(result):
     (remark,) = (str(each) for each in result.messages if "not significant" in str(each))
     named = {name for name, test in tests.items() if f"{name} (" in remark}
     assert named == {name for name, test in tests.items() if not test.significant}
-    assert "k3" in report(result).split("Tests of the lens")[1].split("not shown by the data")[0]
+    names, *_, outcomes = (column.values for column in lens_tests(result).columns)
+    assert dict(zip(names, outcomes, strict=True))["k3"] == "not shown by the data"
 
 
-def test_the_listing_of_a_plate_tests_its_two_scales(plate):
+def scale_test(result):
+    """Return the test of two principal distances."""
+    (size,) = (section for section in result.document().sections if section.key == "size")
+    return next(fact.value for facts in size.parts for fact in facts.facts if fact.name == "Test of cx = cy")
+
+
+def test_the_document_of_a_plate_tests_its_two_scales(plate):
     """F is the square of the difference over its mean error; with one scale there is nothing to test."""
     result = calibrate(plate)
     pair = [INDEX["cx"], INDEX["cy"]]
     (xx, xy), (_, yy) = result.covariance[np.ix_(pair, pair)]
     f = (result.parameters["cx"] - result.parameters["cy"]) ** 2 / (xx + yy - 2 * xy)
-    text = listing(result)
     assert f > 100
-    assert (
-        f"test of cx = cy                         F = {f:.2f} with 1 and 728 degrees of freedom, prob" in text
-    )
-    assert ": refused at 0.01" in text
+    assert scale_test(result).startswith(f"F = {f:.2f} with 1 and 728 degrees of freedom, prob")
+    assert scale_test(result).endswith(": refused at 0.01")
     common = calibrate(replace(plate, options=replace(plate.options, common_scale=True)))
-    assert "test of cx = cy                         not made: they are not estimated both" in listing(common)
+    assert scale_test(common) == "not made: they are not estimated both"
 
 
 def test_the_test_of_two_scales_is_the_change_of_the_sum_of_squares(plate):

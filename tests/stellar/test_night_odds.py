@@ -12,10 +12,8 @@ from typer.testing import CliRunner
 from example_scripts import load
 from photogram import InputError
 from photogram.cli import app
-from photogram.stellar import Catalogue, Exposure, calibrate_night, read_night, report
+from photogram.stellar import Catalogue, Exposure, calibrate_night, read_night
 from photogram.stellar.comparison import fewer_stars
-from photogram.stellar.night_report import to_json
-from photogram.stellar.night_tables import exposure_table, image_table
 from photogram.stellar.odds import LOG_ODDS, binomial_tail, log_odds, star_probabilities
 
 allsky = load("all_sky_camera")
@@ -29,19 +27,18 @@ def test_every_exposure_and_every_star_has_its_probability(result):
     assert (result.probabilities == 1 / (1 + result.odds)).all()
     assert len(result.star_probabilities) == len(result.calibration.xy)
     assert (result.star_probabilities >= 0.95).all()
-    document = json.loads(to_json(result))
+    document = json.loads(result.to_json())
     assert document["images"][3]["probability"] == result.star_probabilities[3]
     first = document["exposures"][0]
     assert (first["probability"], first["log_odds"]) == (result.probabilities[0], result.log_odds[0])
     assert first["icrs"]["quaternion"] == result.inertial[0].quaternion.tolist()
-    text = report(result).split("Identification\n")[1]
-    assert "accepted below 1E-06" in text
+    text = result.report().split("Identification and fit\n")[1]
     assert f"{result.log_odds[0]:.1f}" in text
-    table = exposure_table(result)
+    table = result.document().table("exposures").frame()
     assert table["by_chance"].tolist() == result.odds.tolist()
     assert table[["qw", "qx", "qy", "qz"]].iloc[2].tolist() == result.inertial[2].quaternion.tolist()
     assert table["cov_xy"][1] == result.inertial[1].covariance[0, 1]
-    images = image_table(result)
+    images = result.document().table("images").frame()
     assert images["probability"].tolist() == result.star_probabilities.tolist()
     assert images["residual_x_px"].tolist() == result.calibration.residuals[:, 0].tolist()
 
@@ -120,9 +117,9 @@ def test_a_doubtful_exposure_is_named_and_the_result_is_not_usable(doubtful):
     assert 1e-6 <= result.doubtful["1"] <= 1e-2
     assert not result.usable
     assert (result.verdict.code, result.verdict.exit) == ("identification", 4)
-    assert "The identification of stars is doubtful: exposure 1" in report(result)
+    assert "The identification of stars is doubtful: exposure 1" in result.report()
     assert any(str(m).startswith("the identification of exposure 1 is doubtful") for m in result.messages)
-    assert json.loads(to_json(result))["doubtful"] == result.doubtful
+    assert json.loads(result.to_json())["doubtful"] == result.doubtful
     # Its user says that it is right.
     confirmed = calibrate_night(replace(night, confirmed=("1",)))
     assert confirmed.names == ("1", "2", "3", "4", "5")
@@ -164,7 +161,7 @@ def test_a_camera_that_stood_still_and_one_that_did_not():
     assert moved.standstill.moved == (2,)
     assert moved.standstill.turns[2] == pytest.approx(3e-4, rel=0.15)
     assert any(str(m).startswith("exposure 2: the camera did not stand still") for m in moved.messages)
-    assert json.loads(to_json(moved))["standstill"]["moved"] == ["2"]
+    assert json.loads(moved.to_json())["standstill"]["moved"] == ["2"]
 
 
 def test_standstill_holds_its_level():

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import StrEnum
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from rich.markup import escape
 
-from photogram.cli.console import output, print_sections, print_withheld
+from photogram.cli.console import output, print_remark, print_withheld
 from photogram.cli.documents import OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, Writes, with_job
 from photogram.cli.options import Quiet, Strict, Threads, out_option
 
 if TYPE_CHECKING:
+    from photogram.show.sketch.declared import Sketch
     from photogram.stellar.night_calibration import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
@@ -66,11 +68,9 @@ def stellar_camera(
     `photogram stellar-camera exposures` does so by digital exposures of the sky.
     """
     with job:
-        from photogram.show.methods import page_of
         from photogram.statistics.verdict import worst
         from photogram.stellar import calibrate
         from photogram.stellar.cameras import camera_document
-        from photogram.stellar.document import to_json
 
         if deck is None:
             deck = job.packaged("stellar") / "plate.toml"
@@ -90,10 +90,9 @@ def stellar_camera(
             mark = f"-{number}" if len(problems) > 1 else ""
             written |= _files(result, target, mark, pictures)
             written |= _cameras(result, {target / f"camera{mark}.json": camera_document(result)})
-            make = partial(page_of, result)
-            written |= documents.page(job, "stellar-camera", target, make, mark)
+            written |= documents.page(job, "stellar-camera", target, result.document, mark)
             if documents.json is not None:
-                asked[documents.json.with_stem(documents.json.stem + mark)] = to_json(result)
+                asked[documents.json.with_stem(documents.json.stem + mark)] = result.to_json()
         job.finish(
             written,
             asked,
@@ -152,10 +151,8 @@ def exposures(
     """Calibrate a digital camera, also one of the whole sky, by exposures of the stars (needs pyerfa)."""
     with job:
         from photogram.errors import InputError
-        from photogram.show.methods import page_of
         from photogram.stellar.night_calibration import calibrate_night
         from photogram.stellar.night_file import inputs, read_night
-        from photogram.stellar.night_report import summary, to_json
 
         if night is None:
             night = job.packaged("exposures") / "night.toml"
@@ -168,12 +165,11 @@ def exposures(
             raise error if error.file else InputError(error.message, file=night) from None
         target = out or Path(f"{night.stem}-calibrated")
         written = _night_files(result, target, pictures)
-        make = partial(page_of, result)
-        written |= documents.page(job, "stellar-camera exposures", target, make)
+        written |= documents.page(job, "stellar-camera exposures", target, result.document)
         job.finish(
             written,
-            {documents.json: to_json(result)} if documents.json is not None else {},
-            summary=lambda: print_sections(summary(result), "the report"),
+            documents.as_json(result),
+            summary=lambda: _summarize([result], "parameters"),
             code=result.verdict.exit_code(strict=strict),
         )
 
@@ -244,11 +240,14 @@ def _said(
     }
 
 
-def _summarize(results: list[Result]) -> None:
-    from photogram.stellar.listing import summary
+def _summarize(results: Sequence[Result | CalibratedNight], *tables: str) -> None:
+    from photogram.show.forms import summary
 
     for result in results:
-        print_sections(summary(result), "the listing")
+        for line in summary(result.document(), *tables):
+            output.print(escape(line))
+        for message in result.messages:
+            print_remark(message)
 
 
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
@@ -270,44 +269,36 @@ def _cameras(result: Result | CalibratedNight, files: dict[Path, bytes]) -> dict
 
 def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, bytes]:
     """Make everything that is written for one problem."""
-    from photogram.stellar.listing import listing, plate_list
-    from photogram.stellar.printout import printout
+    from photogram.stellar.plots import sketches
+    from photogram.stellar.printout import plate_list, printout
 
-    made = {out / f"listing{mark}.txt": listing(result).encode()}
+    made = {out / f"listing{mark}.txt": result.report().encode()}
     if result.problem.options.as_published:
         made[out / f"printout{mark}.txt"] = printout(result).encode()
     if result.problem.options.plate_list:
         made[out / f"plate{mark}.txt"] = plate_list(result)
-    if pictures:
-        from photogram.show.pictures import files as drawn
-        from photogram.show.sketch.on_axes import figure
-        from photogram.stellar.plots import sketches
-
-        figures = {f"{name}{mark}": figure(each) for name, each in sketches(result).items()}
-        made |= drawn(figures, out, pictures)
-    return made
+    return made | _drawn(sketches(result), mark, out, pictures) if pictures else made
 
 
 def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path, bytes]:
     """Make everything that is written for a night."""
     from photogram.stellar.camera_yaml import WITH_YAML, to_yaml
-    from photogram.stellar.night_report import report
-    from photogram.stellar.night_tables import exposure_table, image_table
+    from photogram.stellar.night_plots import sketches
 
-    made = {
-        out / "report.txt": report(result).encode(),
-        out / "exposures.csv": exposure_table(result).to_csv(index=False).encode(),
-        out / "star-images.csv": image_table(result).to_csv(index=False).encode(),
-    }
+    document = result.document()
+    made = {out / "report.txt": result.report().encode()}
+    for name, key in (("exposures.csv", "exposures"), ("star-images.csv", "images")):
+        made[out / name] = document.table(key).frame().to_csv(index=False).encode()
     cameras = {out / "camera.json": result.camera.to_json()}
     if result.camera.lens in WITH_YAML:
         cameras[out / "camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
         cameras[out / "camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
     made |= _cameras(result, cameras)
-    if pictures:
-        from photogram.show.pictures import files as drawn
-        from photogram.show.sketch.on_axes import figure
-        from photogram.stellar.night_plots import sketches
+    return made | _drawn(sketches(result), "", out, pictures) if pictures else made
 
-        made |= drawn({name: figure(each) for name, each in sketches(result).items()}, out, pictures)
-    return made
+
+def _drawn(sketches: dict[str, Sketch], mark: str, out: Path, pictures: str) -> dict[Path, bytes]:
+    from photogram.show.pictures import files
+    from photogram.show.sketch.on_axes import figure
+
+    return files({f"{name}{mark}": figure(sketch) for name, sketch in sketches.items()}, out, pictures)

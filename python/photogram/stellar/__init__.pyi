@@ -11,7 +11,6 @@ from .landmarks import landmark as landmark
 from .lenses import LENSES as LENSES
 from .night_calibration import calibrate_night as calibrate_night
 from .night_file import read_night as read_night
-from .night_report import report as report
 from .night_result import CalibratedNight as CalibratedNight
 from .night_result import Night as Night
 from .options import Options as Options

@@ -1,234 +1,316 @@
-"""The JSON document of a calibration; `docs/stellar-camera.md` describes it."""
+"""The document of a camera that was calibrated by a plate with stars."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from photogram import _photocore
-from photogram.io import json
+from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
+from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.page import Document, Fact, Facts, Layers, Remarks, Section, significant
+from photogram.show.quantity import Table, members
+from photogram.stellar import tables
+from photogram.stellar.camera_tables import correlated_members, matrix_table
 from photogram.stellar.comparator_frame import comparator_frame
-from photogram.stellar.curves import (
-    distortion_curves,
-    histogram,
-    refraction_curves,
-    residual_classes,
-    star_means,
-)
-from photogram.stellar.movement import fictitious_points
-from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
-from photogram.stellar.pointing import transformed_angles
-from photogram.stellar.result import Ellipse, Result, Stage
+from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
+from photogram.stellar.lens_choice import LEVEL, equal
+from photogram.stellar.night_document import pictures
+from photogram.stellar.parameters import GRAD, GROUPS, INDEX
+from photogram.stellar.plots import sketches
+from photogram.stellar.printout import descriptors, have_common_weight
+from photogram.stellar.result import Result
+from photogram.stellar.sky import Site
+
+MAX_WORST_COORDINATES = 25
+
+CONVENTIONS = {
+    "frame": "north, east, zenith (left-handed); azimuth from south, positive west",
+    "longitude": "positive west",
+    "residual": "computed minus measured; of stars adjusted minus catalogue",
+    "standardized": "residual over its mean error",
+    "covariance": "cofactors times m squared, in the units of the parameters",
+}
 
 
-def to_json(result: Result) -> bytes:
-    """Return the whole result as JSON (UTF-8). What is not a number is null."""
-    return json.to_json(_document(result))
+def plate_document(result: Result) -> Document:
+    """Return the document of a plate."""
+    problem = result.problem
+    size = [Facts("How much", _much(result)), Facts("How good", _good(result))]
+    of_solution = _solution_sections(result)
+    sections = [
+        Section("pictures", "Stars and residuals", [pictures(sketches(result))]),
+        Section("size", "How much, how good", size),
+        of_solution.pop("parameters"),
+        of_solution.pop("derived"),
+        Section.of(tables.worst(result, MAX_WORST_COORDINATES)),
+        tests_section(result.verdict),
+        of_solution.pop("directions"),
+        of_solution.pop("distortion"),
+        Section.of(tables.movement(result)),
+        remarks_section(result.messages),
+    ]
+    histograms = tables.histograms(result) if problem.options.histogram else []
+    details = [
+        Section("problem", "Problem", [Facts("Problem", _problem(result))]),
+        Section("descriptors", "Problem descriptors", [Remarks([*descriptors(result), *_forms(result)])]),
+        *map(Section.of, tables.stages(result)),
+        *of_solution.values(),
+        Section.of(tables.pre_run(result)),
+        Section.of(tables.fictitious(result)),
+        Section("histogram", "Histogram of residuals", [Layers("histogram-layers", histograms)]),
+        *_combined(result),
+    ]
+    return Document(
+        what="Calibration of a camera by a plate with stars",
+        title=problem.labels.get("title", ""),
+        judgements=[judged(result.verdict)],
+        advice=result.verdict.next,
+        highlights=_highlights(result),
+        sections=sections,
+        members=_members(result),
+        details=details,
+    )
 
 
-def _document(result: Result) -> dict[str, Any]:
-    options = result.problem.options
+def _solution_sections(result: Result) -> dict[str, Section]:
+    """Return what a solution with separate attitudes and the combined one have alike, by keys."""
+    rows = [INDEX[name] for name in result.estimated]
+    cofactors = result.solved.cofactors[np.ix_(rows, rows)]
+    title = "Inverse of the reduced normal equations"
+    found = [
+        tables.parameters(result),
+        tables.transformed(result),
+        tables.stars(result),
+        tables.directions(result),
+        tables.images(result),
+        tables.means(result),
+        tables.distortion(result),
+        tables.refraction(result),
+        matrix_table("cofactors", title, result.estimated, cofactors, figures=10),
+    ]
+    derived = Section("derived", "Derived values", [Facts("Derived values", _derived(result))])
+    return {table.key: Section.of(table) for table in found} | {"derived": derived}
+
+
+def _combined(result: Result) -> list[Section]:
+    combined = result.combined
+    if combined is None:
+        return []
+    names = sorted({name for pair in combined.pairs for name in pair}, key=GROUPS.index)
+    intro = f"ORIENTATIONS FROM {', '.join(names).upper()} CONSTRAINED TO COMMON VALUES"
+    size = [Facts("How much", _much(combined)), Facts("How good", _good(combined))]
+    sections = [Section("combined", "Combined solution", size, intro)]
+    for key, section in _solution_sections(combined).items():
+        title = f"Combined solution: {section.title}"
+        parts = [replace(p, key=f"combined.{key}") if isinstance(p, Table) else p for p in section.parts]
+        sections.append(replace(section, key=f"combined-{key}", title=title, parts=parts))
+    return sections
+
+
+def _members(result: Result) -> dict[str, Any]:
+    """Return the JSON document without its tables."""
+    options, pre_run = result.problem.options, result.pre_run
+    classes = residual_classes(result) if options.histogram else {}
     return {
-        "program": f"photogram {_photocore.__version__}",
         "labels": result.problem.labels,
-        "conventions": {
-            "frame": "north, east, zenith (left-handed); azimuth from south, positive west",
-            "longitude": "positive west",
-            "residual": "computed minus measured; of stars adjusted minus catalogue",
-            "standardized": "residual over its mean error",
-            "covariance": "cofactors times m squared, in the units of the parameters",
-            "iteration": "as published" if options.as_published else "strict",
-        },
-        **_solution(result),
-        "iterations": [asdict(level) for level in result.levels],
+        "conventions": CONVENTIONS | {"iteration": "as published" if options.as_published else "strict"},
+        **_solution_members(result),
         "stop": result.solved.stop,
         "converged": result.converged,
         "verdict": result.verdict.document(),
-        "solutions": [_stage(stage) for stage in result.stages],
-        "messages": [str(message) for message in result.messages],
-        "correlated": [{"parameters": [a, b], "correlation": r} for a, b, r in result.correlated()],
+        "messages": [*map(str, result.messages)],
+        "correlated": correlated_members(result.correlated()),
         "significance": result.significance(),
-        "movement": [asdict(point) for point in result.movement],
-        "fictitious_points": [asdict(point) for point in fictitious_points(result)]
-        if result.movement
-        else [],
-        "pre_run": _pre_run(result),
-        "histogram": {axis: asdict(histogram(values)) for axis, values in residual_classes(result).items()}
-        if options.histogram
-        else None,
-        "combined": None
-        if result.combined is None
-        else {"pairs": result.combined.pairs, **_solution(result.combined)},
+        "pre_run": pre_run
+        and {**members(pre_run, "points", "stars"), "residual_um": 1e6 * pre_run.residuals},
+        "histogram": {axis: histogram(values) for axis, values in classes.items()} or None,
+        "combined": result.combined
+        and {"pairs": result.combined.pairs, **_solution_members(result.combined)},
     }
 
 
-def _solution(result: Result) -> dict[str, Any]:
-    """Return what the solution with separate attitudes and the combined one have alike."""
+def _solution_members(result: Result) -> dict[str, Any]:
+    """Return members of a solution, with separate attitudes or combined."""
     estimated = [INDEX[name] for name in result.estimated]
-    options, axis = result.problem.options, result.solved.axis_residual
+    options, residual = result.problem.options, result.solved.axis_residual
+    groups, angle = tables.solved_groups(result) if options.refraction else {}, options.comparator_angle
     return {
-        "m": result.mean_error,
-        "m_computed": result.computed_mean_error,
+        **members(result, "degrees_of_freedom", "counts", m="mean_error", m_computed="computed_mean_error"),
         "m_unit": "m",
-        "degrees_of_freedom": result.degrees_of_freedom,
-        "counts": asdict(result.counts),
         "sums_of_squares": dict(zip(("plate", "stars", "parameters"), result.solved.sums, strict=True)),
-        "parameters": _parameters(result),
         "covariance": {
             "order": result.estimated,
             "matrix": result.covariance[np.ix_(estimated, estimated)],
         },
-        "stars": _stars(result),
-        "images": _images(result),
-        "star_means": _means(result),
-        "axis_residual_um": None if axis is None else 1e6 * axis,
-        "transformed": _transformed(result),
-        "comparator_frame": None
-        if options.comparator_angle is None
-        else asdict(comparator_frame(result, options.comparator_angle)),
-        "distortion_curves": asdict(distortion_curves(result)) if options.curves else None,
-        "refraction_curves": {
-            GROUPS[g]: asdict(refraction_curves(result, g))
-            for g in range(3)
-            if options.refraction and result.solved.free[3 * g]
-        },
+        "axis_residual_um": None if residual is None else 1e6 * residual,
+        "transformed": options.reference and tables.transformed_attitudes(result),
+        "comparator_frame": None if angle is None else comparator_frame(result, angle),
+        "distortion_curves": distortion_curves(result) if options.curves else None,
+        "refraction_curves": {name: refraction_curves(result, g) for name, g in groups.items()},
     }
 
 
-def _stage(stage: Stage) -> dict[str, Any]:
-    """Describe one of the solutions; its determinant is in the units of the parameters."""
-    return {
-        "solution": stage.solution,
-        **asdict(stage.counts),
-        "degrees_of_freedom": stage.counts.degrees_of_freedom,
-        "iterations": len(stage.levels) - 1,
-        "stop": stage.stop,
-        "converged": stage.converged,
-        "log10_determinant": stage.log_determinant / math.log(10),
-    }
+_UNIT = "of a plate coordinate of weight 1"
 
 
-def _parameters(result: Result) -> dict[str, dict[str, Any]]:
-    errors, options = result.mean_errors, result.problem.options
-    names = [name for name in NAMES if options.refraction or name not in NAMES[22:]]
-    return {
-        name: {
-            "value": result.parameters[name],
-            "mean_error": errors[name],
-            "unit": UNITS[name],
-            "given": float(result.problem.initial[INDEX[name]]),
-            "weight": float(result.problem.parameter_weights[INDEX[name], INDEX[name]]),
-            "estimated": name in result.estimated,
-        }
-        for name in names
-    }
-
-
-def _stars(result: Result) -> list[dict[str, Any]]:
-    problem = result.problem
-    unknown = {direction.star: direction for direction in result.directions()}
-    columns = zip(
-        problem.star_ids,
-        problem.star_names or problem.star_ids,
-        problem.known.tolist(),
-        result.solved.places.tolist(),
-        (result.star_residuals / ARCSEC).tolist(),
-        result.ellipses(),
-        result.solved.star_redundancy.tolist(),
-        result.star_standardized.tolist(),
-        strict=True,
-    )
-    stars = []
-    for star, name, known, place, residual, ellipse, redundancy, standardized in columns:
-        document = {
-            "id": star,
-            "name": name,
-            "known": known,
-            "place_rad": place,
-            "ellipse": _ellipse(ellipse),
-        }
-        if known:
-            document |= {"residual": residual, "redundancy": redundancy, "standardized": standardized}
-        else:
-            direction = unknown[star]
-            document |= {
-                "correction": [value / ARCSEC for value in direction.correction],
-                "azimuth_rad": direction.azimuth,
-                "elevation_rad": direction.elevation,
-                "m_i": direction.image_mean_error,
-                "orientation_ellipse": _ellipse(direction.orientation),
-                "published_ellipse": _ellipse(direction.published),
-            }
-        stars.append(document)
-    return stars
-
-
-def _ellipse(ellipse: Ellipse) -> dict[str, float]:
-    return {
-        "major_arcsec": ellipse.major / ARCSEC,
-        "minor_arcsec": ellipse.minor / ARCSEC,
-        "direction_rad": ellipse.direction,
-    }
-
-
-def _images(result: Result) -> list[dict[str, Any]]:
-    problem = result.problem
-    columns = zip(
-        problem.image_points,
-        problem.image_stars.tolist(),
-        problem.image_groups.tolist(),
-        problem.image_xy.tolist(),
-        (1e6 * result.solved.residuals).tolist(),
-        result.solved.redundancy.tolist(),
-        result.standardized.tolist(),
-        strict=True,
-    )
+def _highlights(result: Result) -> list[Fact]:
+    x, y = np.sqrt((result.solved.residuals**2).mean(axis=0)) * 1e6
+    known = int(result.problem.known.sum())
+    stars = f"{known} known, {len(result.problem.image_stars)} images"
     return [
-        {
-            "point": point,
-            "star": problem.star_ids[star],
-            "orientation": GROUPS[group],
-            "xy_m": xy,
-            "residual_um": residual,
-            "redundancy": redundancy,
-            "standardized": standardized,
-        }
-        for point, star, group, xy, residual, redundancy, standardized in columns
+        Fact("Mean error of unit weight", significant(1e6 * result.mean_error, 4), "µm", _UNIT),
+        Fact("rms of plate residuals, x", significant(float(x), 3), "µm", f"y {significant(float(y), 3)} µm"),
+        Fact("Stars", f"{len(result.problem.star_ids)}", note=stars),
+        Fact("Degrees of freedom", f"{result.degrees_of_freedom}"),
     ]
 
 
-def _means(result: Result) -> list[dict[str, Any]]:
-    """Return means over the images of each star with two at least."""
+def _much(result: Result) -> list[Fact]:
+    problem, counts = result.problem, result.counts
+    known = int(problem.known.sum())
+    of_known = problem.known[problem.image_stars]
+    groups = [problem.image_groups == g for g in range(3)]
+    points = ", ".join(f"{int((g & of_known).sum())} / {int((g & ~of_known).sum())}" for g in groups)
+    observations = (
+        f"{counts.plate_observations} of the plate, {counts.star_observations} of stars,"
+        f" {counts.parameter_observations} of parameters, {counts.constraints} constraints"
+    )
+    unknowns = f"{counts.parameter_unknowns} parameters, {counts.star_unknowns} of stars"
+    unique = "" if counts.degrees_of_freedom else "unique; 1 used"
     return [
-        {
-            "star": star,
-            "xy_m": xy,
-            "residual_um": 1e6 * v,
-            "radial_um": 1e6 * radial,
-            "tangential_um": 1e6 * along,
-        }
-        for star, xy, v, (radial, along) in star_means(result)
+        Fact("Stars", f"{known} known, {len(problem.star_ids) - known} unknown"),
+        Fact("Images on the plate", f"{len(problem.image_stars)}"),
+        Fact("Images pre, post, event", points, note="of known / unknown stars"),
+        Fact("Observations", f"{counts.observations}", note=observations),
+        Fact("Unknowns", f"{counts.unknowns}", note=unknowns),
+        Fact("Degrees of freedom", f"{counts.degrees_of_freedom}", note=unique),
+        Fact("Stop", result.solved.stop.capitalize()),
     ]
 
 
-def _pre_run(result: Result) -> dict[str, Any] | None:
-    found = result.pre_run
-    if found is None:
-        return None
-    return {"points": found.points, "stars": found.stars, "residual_um": 1e6 * found.residuals}
+def _good(result: Result) -> list[Fact]:
+    problem, sums = result.problem, result.solved.sums
+    weights = problem.star_weights[problem.known & ~problem.held]
+    squares = zip(("plate", "stars", "parameters", "total"), (*sums, sum(sums)), strict=True)
+    return [
+        Fact("Mean error of unit weight, computed", significant(1e6 * result.computed_mean_error, 9), "µm"),
+        Fact("Mean error of unit weight, in use", significant(1e6 * result.mean_error, 9), "µm", _UNIT),
+        *(
+            Fact(f"Weighted sum of squares, {name}", significant(1e12 * float(square), 9), "µm²")
+            for name, square in squares
+        ),
+        Fact("Common mean error of the plate", *_before(result, problem.image_weights, 1e-6, "µm")),
+        Fact("Common mean error of the stars", *_before(result, weights, ARCSEC, "arcsec")),
+        *(
+            Fact(
+                f"Sums of {axis} residuals: +, -, both",
+                f"{1e6 * v[v > 0].sum():.3f}, {1e6 * v[v < 0].sum():.3f}, {1e6 * v.sum():z.3f}",
+                "µm",
+            )
+            for axis, v in zip("xy", result.solved.residuals.T, strict=True)
+        ),
+        Fact("Test of cx = cy", _scale_test(result)),
+    ]
 
 
-def _transformed(result: Result) -> dict[str, Any] | None:
-    options = result.problem.options
-    if options.reference is None:
-        return None
-    values = result.solved.parameters[:9].reshape(3, 3)
-    return {
-        GROUPS[g]: transformed_angles(values[g], result.problem.site, options.reference, options.pole)
-        for g in range(3)
-        if result.solved.free[3 * g]
-    }
+def _before(result: Result, weights: Floats, unit: float, name: str) -> tuple[str, str]:
+    """Write the mean errors before the adjustment that a common weight implies."""
+    if not len(weights) or not have_common_weight(weights):
+        return "individual weights" if len(weights) else "-", ""
+    x, y = result.mean_error / np.sqrt(np.diag(weights[0])) / unit
+    return f"{x:.4f}, {y:.4f}", name
+
+
+def _scale_test(result: Result) -> str:
+    """Return the test whether the two principal distances differ."""
+    pair, freedom = [INDEX["cx"], INDEX["cy"]], result.degrees_of_freedom
+    if not (result.solved.free[pair].all() and freedom):
+        return "not made: they are not estimated both"
+    f, probability = equal(result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], freedom)
+    verdict = "refused" if probability < LEVEL else "not refused"
+    degrees = f"1 and {freedom} degrees of freedom"
+    return f"F = {f:.2f} with {degrees}, probability {probability:.2G}: {verdict} at {LEVEL:g}"
+
+
+def _derived(result: Result) -> list[Fact]:
+    """Return centres, principal distance, scales of the comparator, and the axis, with mean errors."""
+    options, given, residual = result.problem.options, result.problem.axis, result.solved.axis_residual
+    facts = []
+    for name, *terms in (("XS", "xp", "dx"), ("YS", "yp", "dy")):
+        rows = [INDEX[term] for term in terms]
+        error = np.sqrt(max(float(result.covariance[np.ix_(rows, rows)].sum()), 0.0))
+        value = f"{result.solved.parameters[rows].sum():.10g}"
+        facts.append(Fact(f"{name} = {terms[0]} + {terms[1]}", value, "m", f"mean error {error:.8g} m"))
+    if options.curves:
+        curves = distortion_curves(result)
+        error = f"mean error {significant(1e6 * curves.calibrated_error, 4)} µm"
+        facts += [
+            Fact("Calibrated principal distance", f"{curves.calibrated:.9f}", "m", error),
+            Fact("Crossover", f"{1e3 * options.crossover:g}", "mm"),
+        ]
+    if options.comparator_angle is not None:
+        frame = comparator_frame(result, options.comparator_angle)
+        x, y, oblique = (f"mean error {error:.3e}" for error in np.divide(frame.mean_errors, [1, 1, GRAD]))
+        facts += [
+            Fact("Comparator, angle x to y", f"{options.comparator_angle / GRAD:.9f}", "grads"),
+            Fact("Comparator, scale x", f"{frame.scale_x:.12f}", note=x),
+            Fact("Comparator, scale y", f"{frame.scale_y:.12f}", note=y),
+            Fact("Comparator, epsilon", f"{frame.epsilon / GRAD:.9f}", "grads", oblique),
+        ]
+    if given is not None and residual is not None:
+        (x, y), (vx, vy), weight = 1e3 * given.xy, 1e6 * residual, given.weight
+        weights = ", ".join(f"{value:.6G}" for value in (weight[0, 0], weight[1, 1], weight[0, 1]))
+        south = "from south, positive west"
+        facts += [
+            Fact("Axis, orientation", GROUPS[given.group]),
+            Fact("Axis, azimuth", tables.degrees(given.azimuth), note=south),
+            Fact("Axis, elevation", tables.degrees(np.pi / 2 - given.zenith_distance)),
+            Fact("Axis, plate x, y", f"{x:.6f}, {y:.6f}", "mm"),
+            Fact("Axis, weights", weights),
+            Fact("Axis, residuals", f"{vx:.3f}, {vy:.3f}", "µm"),
+        ]
+    return facts
+
+
+def _problem(result: Result) -> list[Fact]:
+    site, o = result.problem.site, result.problem.options
+    facts = [
+        *(Fact(name, value) for name, value in result.problem.labels.items()),
+        *_station("Station", site),
+        Fact("Elevation", f"{site.elevation:.4f}", "m"),
+        Fact("Temperature, pressure", f"{site.air.temperature:.2f} K, {site.air.pressure:.2f} mm of mercury"),
+        Fact("Diurnal aberration at the equator", f"{site.aberration / ARCSEC:.4f}", "arcsec"),
+        Fact("Tolerance of levels", f"{o.tolerance:.3E}", "m"),
+        Fact("Tolerance of refraction", f"{o.refraction_tolerance / ARCSEC:.3E}", "arcsec"),
+        Fact("Tolerance of distortion", f"{o.distortion_tolerance:.3E}", "m"),
+        Fact("Crossover, interval, end of curves", f"{o.crossover:g}, {o.interval:g}, {o.extent:g}", "m"),
+        Fact("Factor k of the movement test", f"{o.movement_factor:g}"),
+        Fact("Time of the fictitious points", tables.hours(o.movement_time)),
+    ]
+    if o.reference is not None:
+        x, y = (value / ARCSEC for value in o.pole)
+        facts += [
+            *_station("Reference station", o.reference),
+            Fact("Pole x, y", f"{x:.4f}, {y:.4f}", "arcsec"),
+        ]
+    return facts
+
+
+def _station(name: str, site: Site) -> list[Fact]:
+    return [
+        Fact(name, f"{site.number} {site.name}".strip() or "-"),
+        Fact(f"{name}, latitude", tables.degrees(site.latitude)),
+        Fact(f"{name}, longitude west", tables.degrees(site.longitude_west)),
+    ]
+
+
+def _forms(result: Result) -> list[str]:
+    """Return the states of the options that the report does not have."""
+    o = result.problem.options
+    return [
+        "SCALE AFTER DISTORTION" if o.distortion_first else "SCALE BEFORE DISTORTION",
+        "ITERATION AS PUBLISHED" if o.as_published else "STRICT ITERATION",
+    ]

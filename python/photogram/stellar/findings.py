@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Observations, Tested, by_t
 from photogram.statistics.reliability import TESTABLE
 from photogram.stellar.night_result import CalibratedNight
@@ -17,7 +16,6 @@ from photogram.stellar.result import SIGNIFICANT, Result
 Named = Callable[[tuple[int, ...]], str]
 
 
-@findings_of.register(Result)
 def plate_findings(result: Result) -> Findings:
     """Return the tests of a plate: w where the mean error of unit weight is given (option 14), else t."""
     problem, tests = result.problem, studentized(result)
@@ -61,7 +59,6 @@ def _not_significant(result: Result) -> list[str]:
     return [f"Distortion terms that are not significant: {named}. A calibration without them is simpler."]
 
 
-@findings_of.register(CalibratedNight)
 def night_findings(result: CalibratedNight) -> Findings:
     """Return the tests of exposures of the sky against the standard deviation of their images."""
     found, freedom = result.calibration, result.calibration.degrees_of_freedom

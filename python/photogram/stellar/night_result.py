@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed
-from photogram.show.methods import Judged, Paged
+from photogram.show.methods import Documented, Judged
 from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.stellar.camera_tables import correlated, significance
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.comparison import Standstill
 from photogram.stellar.lens_choice import LensFit, LensTest
@@ -24,8 +26,9 @@ from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import SkyCamera
 
-CORRELATED = 0.95
-"""Correlations above this are named."""
+if TYPE_CHECKING:
+    from photogram.show.page import Document
+    from photogram.statistics.findings import Findings
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,7 +127,7 @@ class Night(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibratedNight(Judged, Paged, Brief):
+class CalibratedNight(Judged, Documented, Brief):
     """A calibrated camera, and what happened to the images.
 
     Attributes
@@ -228,17 +231,22 @@ class CalibratedNight(Judged, Paged, Brief):
         """The calibrated camera."""
         return self.calibration.camera
 
+    def document(self) -> Document:
+        """Return the document: verdict, camera, exposures, images."""
+        from photogram.stellar.night_document import night_document
+
+        return night_document(self)
+
+    def _findings(self) -> Findings:
+        from photogram.stellar.findings import night_findings
+
+        return night_findings(self)
+
     def correlated(self) -> list[tuple[str, str, float]]:
         """Name pairs of camera parameters whose correlation exceeds 0.95."""
-        sd = np.sqrt(np.diag(self.camera.covariance))
-        scale = np.divide(1.0, sd, out=np.zeros_like(sd), where=sd > 0)
-        found = self.camera.covariance * np.outer(scale, scale)
-        rows, columns = np.nonzero(np.triu(np.abs(found) > CORRELATED, 1))
-        names = self.camera.names
-        return [(names[i], names[j], float(found[i, j])) for i, j in zip(rows, columns, strict=True)]
+        return correlated(self.camera.names, self.camera.covariance)
 
     def significance(self) -> dict[str, float]:
         """Return each estimated distortion term over its mean error."""
-        sd = np.sqrt(np.diag(self.camera.covariance))
-        rows = zip(self.camera.names[4:], self.camera.values[4:], sd[4:], strict=True)
-        return {name: float(abs(value) / error) for name, value, error in rows if error > 0}
+        camera = self.camera
+        return significance(camera.names[4:], camera.values[4:], camera.covariance[4:, 4:])

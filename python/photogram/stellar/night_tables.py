@@ -1,46 +1,82 @@
-"""What is known of a calibrated night: exposures with attitudes and odds, images with their stars, lenses."""
+"""Tables of a calibrated night: exposures with attitudes and odds, images with their stars, lenses."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.show.angles import ARCSEC
 from photogram.show.page import Fact
-from photogram.show.quantity import Axis, Quantity, chosen, frame, of_each
+from photogram.show.quantity import Axis, Quantities, Quantity, Table, chosen, of_each
+from photogram.stellar.camera_tables import parameter_table
+from photogram.stellar.lens_choice import DECISIVE, POSITIVE
 from photogram.stellar.night_result import CalibratedNight, Night
+from photogram.stellar.odds import ACCEPTED, LOG_ODDS
+from photogram.stellar.parameters import GRAD
 from photogram.stellar.pointing import axis_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _PIXELS = (Axis.of("x", "px", "_px"), Axis.of("y", "px", "_px"))
 _PLACE = (Axis.of("ra", "arcsec"), Axis.of("dec", "arcsec"))
 
 
-def exposure_table(result: CalibratedNight) -> pd.DataFrame:
-    """Return one row for each exposure that takes part.
+def parameters(result: CalibratedNight) -> Table:
+    """Return the parameters of the camera, with those of the prior."""
+    camera, prior = result.camera, result.night.prior
+    before = None
+    if prior is not None:
+        deviations = np.sqrt(np.diag(prior.covariance))
+        before = np.where(prior.known, [prior.values, deviations], np.nan)
+    axes = tuple(Axis(name, "pixel" if name[0] in "fc" else "") for name in camera.names)
+    axes = tuple(replace(axis, small="px" if axis.unit else "") for axis in axes)
+    note = "fy is fx: there is one principal distance." if camera.common_scale else ""
+    errors = np.sqrt(np.diag(camera.covariance))
+    return parameter_table(axes, camera.values, errors, before, result.significance(), note=note)
+
+
+def exposures(result: CalibratedNight, most: int) -> list[Table]:
+    """Return how exposures fit and how certain their stars are, and their attitudes."""
+    count = len(result.names)
+    some = f"The first {most} of {count}; exposures.csv has all. " if count > most else ""
+    odds = (
+        "By chance: expected number of wrong attitudes under which as many images have a star, accepted"
+        f" below {ACCEPTED:.0e}. Log odds: natural logarithm, accepted above {LOG_ODDS:.1f}. Both are absent"
+        " if the images name their stars."
+    )
+    name, azimuth, elevation, _, errors, *_ = _attitudes(result)
+    _, ra, dec, *_ = _inertial(result)
+    columns, shown = [name, azimuth, elevation, ra, dec, errors], np.arange(min(count, most))
+    return [
+        Table("fit", "Identification and fit", _fit(result), some + odds, shown=shown),
+        Table("attitudes", "Attitudes", columns, some, shown=shown),
+    ]
+
+
+def attitudes(result: CalibratedNight) -> list[Table]:
+    """Return the attitudes at the station and in ICRS with mean errors."""
+    name, _, _, angles, errors, *_ = _attitudes(result)
+    about = "Quaternion w, x, y, z from ICRS to the camera: x right, y down, z along the axis."
+    return [
+        _for_people("angles", "Attitudes at the station", [name, angles, errors]),
+        _for_people("inertial", "Attitudes in ICRS", _inertial(result), about),
+    ]
+
+
+def exposure_table(result: CalibratedNight) -> Table:
+    """Return the exposures that take part, with all columns of `exposures`, for files.
 
     Angles in degrees, azimuths from south, positive west; the quaternion (w, x, y, z) leads from ICRS to the
     camera (x right, y down, z along the axis), the covariance (radians squared) is that of the small turn
     about these axes, its upper triangle row by row; `by_chance` is the expected number of chance matches,
     `log_odds` a natural logarithm.
     """
-    import pandas as pd
-
-    return pd.DataFrame(frame(exposures(result)))
-
-
-def exposures(result: CalibratedNight) -> list[Quantity]:
-    """Return the exposures that take part: how they fit, their attitudes here and in ICRS."""
-    return [*fit(result), *attitudes(result)[1:], *inertial(result)[1:]]
+    columns = [*_fit(result), *_attitudes(result)[1:], *_inertial(result)[1:]]
+    return Table("exposures", "Exposures", [replace(column, head="") for column in columns])
 
 
-def fit(result: CalibratedNight) -> list[Quantity]:
-    """Return how many images of each exposure have stars, how they fit, and how certain the stars are."""
+def _fit(result: CalibratedNight) -> list[Quantity]:
     found, count = result.calibration, len(result.names)
     own = [found.exposures == i for i in range(count)]
     rms = np.array([np.sqrt(np.mean(found.residuals[rows] ** 2)) for rows in own])
@@ -54,32 +90,37 @@ def fit(result: CalibratedNight) -> list[Quantity]:
         Quantity(result.identified, name="identified", member="identified", head="Identified"),
         Quantity(result.rejected, name="left_out", member="rejected", head="Left out"),
         Quantity(rms, _PIXELS[:1], "deviation", head="rms", decimals=3),
-        Quantity(result.odds, name="by_chance", member="expected_chance_matches"),
-        Quantity(result.probabilities, name="probability", member="probability"),
+        Quantity(
+            result.odds, name="by_chance", member="expected_chance_matches", head="By chance", figures=1
+        ),
+        Quantity(
+            result.probabilities, name="probability", member="probability", head="Probability", decimals=6
+        ),
         Quantity(result.log_odds, name="log_odds", member="log_odds", head="Log odds", decimals=1),
-        Quantity(least, head="Least certain star", figures=6),
+        Quantity(1.0 - least, head="Least certain star: 1 - probability", figures=1),
     ]
 
 
-def attitudes(result: CalibratedNight) -> list[Quantity]:
+def _attitudes(result: CalibratedNight) -> list[Quantity]:
     """Return the attitudes in the system of the station: axis, angles, mean errors, covariances."""
     found = result.calibration
     azimuth, elevation = np.degrees([axis_of(each) for each in found.attitudes]).T
     errors = np.sqrt(np.diagonal(found.attitude_covariances, axis1=1, axis2=2))
     angles = tuple(map(Axis.turned, ("alpha", "omega", "kappa")))
+    grads = tuple(Axis(axis.name, "rad", small="grads", factor=1 / GRAD) for axis in angles)
     south = "Azimuth from south, positive west"
     return [
         _exposure(result),
         _degrees(azimuth, "azimuth_south_deg", south, 5, "azimuth_deg"),
         _degrees(elevation, "elevation_deg", "Elevation", 5, "elevation_deg"),
-        Quantity(found.attitudes, angles, "value", member="alpha_omega_kappa_rad"),
+        Quantity(found.attitudes, grads, "deviation", member="alpha_omega_kappa_rad", head="{}", decimals=6),
         Quantity(errors, angles, "deviation", head="sd {}", decimals=2),
         Quantity(found.attitude_covariances, member="covariance"),
         Quantity(found.cross_covariances, member="covariance_with_camera"),
     ]
 
 
-def inertial(result: CalibratedNight) -> list[Quantity]:
+def _inertial(result: CalibratedNight) -> list[Quantity]:
     """Return the attitudes in ICRS: axis, quaternion, mean errors and covariances of turns of the camera."""
     found = result.inertial
     ra, dec = np.degrees([each.axis for each in found]).T
@@ -96,13 +137,17 @@ def inertial(result: CalibratedNight) -> list[Quantity]:
         }
         for each, right_ascension, declination in zip(found, ra.tolist(), dec.tolist(), strict=True)
     ]
-    quaternions = np.array([each.quaternion for each in found])
+    quaternions, axes = (
+        np.array([each.quaternion for each in found]),
+        tuple(map(Axis, ("qw", "qx", "qy", "qz"))),
+    )
+    errors = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     return [
         _exposure(result),
         _degrees(ra, "ra_deg", "Right ascension in ICRS", 6),
         _degrees(dec, "dec_deg", "Declination in ICRS", 6),
-        Quantity(quaternions, tuple(map(Axis, ("qw", "qx", "qy", "qz"))), name=""),
-        Quantity(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)), turns, "deviation"),
+        Quantity(quaternions, axes, name="", head="{}", decimals=9),
+        Quantity(errors, turns, "deviation", head="sd {}", decimals=2),
         Quantity(covariances[:, *np.triu_indices(3)], upper, name="cov"),
         Quantity(members, member="icrs"),
     ]
@@ -118,60 +163,67 @@ def _degrees(values: Floats, name: str, head: str, decimals: int, member: str = 
     return Quantity(values, axis, "value", name=name, member=member, head=head, decimals=decimals)
 
 
-def image_table(result: CalibratedNight) -> pd.DataFrame:
-    """Return one row for each image used: pixels, measured minus computed, and how likely its star is."""
-    import pandas as pd
-
-    return pd.DataFrame(frame(images(result)))
-
-
-def images(result: CalibratedNight) -> list[Quantity]:
+def images(result: CalibratedNight) -> Table:
     """Return the images used: exposures and stars, pixels, residuals, tests, how likely the stars are."""
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
-    names = np.array(result.names, dtype=object)[found.exposures]
-    return [
+    names, likely = np.array(result.names, dtype=object)[found.exposures], result.star_probabilities
+    columns = [
         Quantity(names, kind="name", name="exposure", member="exposure", head="Exposure"),
         Quantity(ids[found.stars], kind="name", name="star", member="star", head="Star"),
-        Quantity(found.xy, _PIXELS, "value", name="", member="xy_px", head="{}", decimals=2),
+        Quantity(found.xy, _PIXELS, "value", name="", member="xy_px", head="{}", decimals=3),
         Quantity(
             found.residuals, _PIXELS, "deviation", "residual", "residual_px", head="Residual {}", decimals=3
         ),
         Quantity(found.redundancy, _PIXELS, name="redundancy", member="redundancy"),
         Quantity(
-            found.standardized,
-            _PIXELS,
-            name="standardized",
-            member="standardized",
-            head="w {}",
-            decimals=2,
+            found.standardized, _PIXELS, "number", "standardized", "standardized", head="w {}", decimals=2
         ),
-        Quantity(result.star_probabilities, name="probability", member="probability"),
+        Quantity(likely, name="probability", member="probability"),
+        Quantity(1.0 - likely, head="1 - probability", figures=1),
     ]
+    about = "Pixels right and down, measured minus computed; probability of the star of each image."
+    return Table("images", "Images and their stars", columns, about=about)
 
 
-def largest(result: CalibratedNight, most: int) -> list[Quantity]:
+def worst(result: CalibratedNight, most: int) -> Table:
     """Return the images with the largest standardized residuals."""
-    size = np.nanmax(np.abs(np.nan_to_num(result.calibration.standardized)), axis=1)
-    return chosen(images(result), np.argsort(-size, kind="stable")[:most])
+    size = np.nan_to_num(np.abs(result.calibration.standardized)).max(axis=1, initial=0.0)
+    rows: Indices = np.argsort(-size, kind="stable")[:most]
+    columns = chosen(images(result).columns[:-1], rows)
+    note = f"The {len(rows)} images of the largest test values."
+    return _for_people("worst", "Worst observations", columns, note)
 
 
-def stars(result: CalibratedNight) -> list[Quantity]:
+def _for_people(key: str, title: str, columns: Quantities, note: str = "") -> Table:
+    """Return a table that JSON documents and files do not have."""
+    return Table(key, title, [replace(column, member="", name=None) for column in columns], note)
+
+
+def stars(result: CalibratedNight) -> Table:
     """Return the stars that were estimated: adjusted minus catalogue, tests."""
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
-    table = [
-        Quantity(ids[found.catalogue], kind="name", member="id"),
-        Quantity(found.star_residuals / ARCSEC, _PLACE, "deviation", member="residual"),
+    columns = [
+        Quantity(ids[found.catalogue], kind="name", member="id", head="Star"),
+        Quantity(
+            found.star_residuals / ARCSEC,
+            _PLACE,
+            "deviation",
+            member="residual",
+            head="Correction {}",
+            decimals=5,
+        ),
         Quantity(found.star_redundancy, _PLACE, member="redundancy"),
-        Quantity(found.star_standardized, _PLACE, member="standardized"),
+        Quantity(found.star_standardized, _PLACE, member="standardized", head="w {}", decimals=2),
     ]
-    return chosen(table, np.flatnonzero(np.isfinite(found.star_residuals[:, 0])))
+    estimated = np.flatnonzero(np.isfinite(found.star_residuals[:, 0]))
+    return Table("stars", "Corrections of stars", chosen(columns, estimated))
 
 
-def lens_tests(result: CalibratedNight) -> list[Quantity]:
-    """Return the tests of the lens, that of its scale first."""
+def lens_tests(result: CalibratedNight) -> Table:
+    """Return the tests of the lens, the test of its scale first."""
     found = [*([result.scale_test] if result.scale_test else []), *result.term_tests]
     degrees = [f"{each.dimension}, {each.freedom}" for each in found]
-    return [
+    columns = [
         of_each(found, "name", kind="name", head="Zero?"),
         of_each(found, "statistic", head="F", decimals=2),
         Quantity(degrees, kind="name", head="Degrees of freedom"),
@@ -180,23 +232,29 @@ def lens_tests(result: CalibratedNight) -> list[Quantity]:
         of_each(found, "effect", (Axis.of("", "px"),), "deviation", head="Effect", decimals=3),
         of_each(found, "verdict", kind="name", head="Outcome"),
     ]
+    order = "In the order in which they may be left out, each without those above it."
+    return _for_people("lens-tests", "Tests of the lens", columns, order)
 
 
-def lenses(result: CalibratedNight) -> list[Quantity]:
-    """Return the lenses that were tried, the best first, with why one was not adjusted."""
+def lenses(result: CalibratedNight) -> Table:
+    """Return the lenses that were tried, the best first, with the reason if one was not adjusted."""
     found = result.lenses
     best = min((each.bic for each in found), default=0.0)
-    over = np.array([each.bic - best for each in found])
-    remarks = [f"not adjusted: {each.reason}" if each.reason else "" for each in found]
+    numbers = [(each.parameters, each.images, each.mean_error, each.bic - best) for each in found]
     done = np.array([not each.reason for each in found])
-    return [
+    counts = np.where(done, np.reshape(numbers, (-1, 4)).T, np.nan)
+    heads = zip(
+        counts, ("Parameters", "Images", "Unit weight", "BIC over the best"), (0, 0, 4, 1), strict=True
+    )
+    columns = [
         of_each(found, "lens", kind="name", head="Lens"),
-        of_each(found, "parameters", head="Parameters", seen=done),
-        of_each(found, "images", head="Images", seen=done),
-        of_each(found, "mean_error", head="Unit weight", decimals=4, seen=done),
-        Quantity(over, head="BIC over the best", decimals=1, seen=done),
-        Quantity(remarks, kind="name", head="Remark"),
+        *(Quantity(values, head=head, decimals=decimals) for values, head, decimals in heads),
+        Quantity(
+            [each.reason and f"not adjusted: {each.reason}" for each in found], kind="name", head="Remark"
+        ),
     ]
+    note = f"The first is used; a difference above {DECISIVE:g} is decisive, above {POSITIVE:g} positive."
+    return _for_people("lenses", "Lenses that were tried", columns, note)
 
 
 def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:

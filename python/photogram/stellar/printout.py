@@ -13,7 +13,6 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.curves import star_means
-from photogram.stellar.listing import descriptors
 from photogram.stellar.parameters import GROUPS
 from photogram.stellar.result import Result, Stage
 from photogram.stellar.sky import Site
@@ -74,6 +73,74 @@ def _problem(result: Result) -> Iterator[str]:
     )
     for stage in result.stages:
         yield from _stage(stage)
+
+
+def descriptors(result: Result) -> list[str]:
+    """Say of every option of the report in which state it is, in the words of figure 22 where it has them."""
+    o, problem = result.problem.options, result.given
+    states = [
+        (
+            o.common_scale,
+            "COMMON SCALAR COMPUTED FOR X AND Y (CX EQUALS CY)",
+            "INDIVIDUAL SCALAR COMPONENTS COMPUTED FOR X AND Y (CX DOES NOT EQUAL CY)",
+        ),
+        (
+            problem.axis is not None,
+            "AZIMUTH AND ELEVATION OF THE CAMERA GIVEN",
+            "NO AZIMUTH AND ELEVATION GIVEN",
+        ),
+        (
+            have_common_weight(problem.star_weights[problem.known]),
+            "COMMON WEIGHT MATRIX FOR ALL KNOWN STARS",
+            "INDIVIDUAL WEIGHT MATRICES FOR KNOWN STARS",
+        ),
+        (
+            have_common_weight(problem.image_weights),
+            "COMMON WEIGHT MATRIX FOR ALL PLATE POINTS",
+            "INDIVIDUAL WEIGHT MATRICES FOR PLATE POINTS",
+        ),
+        (
+            o.refraction,
+            "REFRACTION COEFFICIENT CORRECTIONS COMPUTED",
+            "NO REFRACTION COEFFICIENT CORRECTIONS COMPUTED",
+        ),
+        (
+            bool(o.minimum_stars),
+            f"MINIMUM SOLUTION COMPUTED WITH {len(o.minimum_stars)} STARS",
+            "NO MINIMUM SOLUTION COMPUTED",
+        ),
+        (o.pre_run, "PRE-RUN RESIDUALS COMPUTED", "NO PRE-RUN"),
+        (o.curves, "RADIAL AND TANGENTIAL LENS DISTORTION CURVES COMPUTED", "NO DISTORTION CURVES COMPUTED"),
+        (
+            o.reference is not None,
+            "FINAL CAMERA ORIENTATION ANGLES TRANSFORMED TO A REFERENCE STATION SYSTEM",
+            "NO TRANSFORMATION TO A REFERENCE STATION",
+        ),
+        (bool(problem.weighted.any()), "PARAMETERS WEIGHTED", "NO PARAMETERS WEIGHTED"),
+        (o.plate_list, "PLATE COORDINATES AND RESIDUALS PUNCHED", "NO PLATE COORDINATES PUNCHED"),
+        (
+            bool(o.max_iterations_minimum),
+            f"MINIMUM SOLUTION LIMITED TO {o.max_iterations_minimum} ITERATIONS",
+            "MINIMUM SOLUTION LIMITED BY TOLERANCE",
+        ),
+        (
+            bool(o.max_iterations),
+            f"MAXIMUM SOLUTION LIMITED TO {o.max_iterations} ITERATIONS",
+            "MAXIMUM SOLUTION LIMITED BY TOLERANCE",
+        ),
+        (
+            bool(o.mean_error),
+            f"INPUT MEAN ERROR OF UNIT WEIGHT {o.mean_error:.8E}",
+            "COMPUTED MEAN ERROR OF UNIT WEIGHT",
+        ),
+        (o.histogram, "HISTOGRAM OF RESIDUALS COMPUTED", "NO HISTOGRAM OF RESIDUALS"),
+    ]
+    return [yes if state else no for state, yes, no in states]
+
+
+def have_common_weight(weights: Floats) -> bool:
+    """Return whether all weight matrices are equal."""
+    return bool((weights == weights[:1]).all())
 
 
 def _station(site: Site) -> str:
@@ -158,3 +225,14 @@ def _mean(star: str, mean: Floats, residual: Floats, parts: tuple[float, float])
 
 def _row(values: Sequence[float] | Floats, width: int) -> str:
     return "".join(f"{exponential(float(value)):<{width}}" for value in values)
+
+
+def plate_list(result: Result) -> bytes:
+    """Return plate coordinates and residuals (m) as option 11 punched them: 4(1X,E14.8), I6, problem."""
+    number = result.problem.labels.get("problem", "")
+    rows = zip(result.problem.image_xy, result.solved.residuals, result.problem.image_points, strict=True)
+    lines = [
+        "".join(f" {value:14.7E}" for value in (*xy, *residual)) + f"{point:>6} {number}"
+        for xy, residual, point in rows
+    ]
+    return ("\n".join(lines) + "\n").encode()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,13 +12,18 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.show.methods import Judged, Paged
+from photogram.show.methods import Documented, Judged
 from photogram.show.summary import Brief
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.stellar.camera_tables import correlated, correlations, significance
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.plate_model import plate_camera
 from photogram.stellar.problem import Counts, Problem
 from photogram.stellar.state import Level, Solved
+
+if TYPE_CHECKING:
+    from photogram.show.page import Document
+    from photogram.statistics.findings import Findings
 
 __all__ = ["Ellipse", "FictitiousPoint", "Movement", "PreRun", "Result", "Stage", "ellipse"]
 
@@ -60,8 +65,6 @@ class FictitiousPoint:
     covariance: Floats  # (2, 2) of the place from the orientation, radians squared
 
 
-CORRELATED = 0.95
-"""Correlations above this are named."""
 SIGNIFICANT = 1.96
 """Distortion terms below this multiple of their mean error are named (5 % of error)."""
 _SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
@@ -178,7 +181,7 @@ class PreRun:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result(Judged, Paged, Brief):
+class Result(Judged, Documented, Brief):
     """A calibration.
 
     Residuals are computed minus measured (the report's v), for stars adjusted minus catalogue: what has to be
@@ -298,9 +301,7 @@ class Result(Judged, Paged, Brief):
     @cached_property
     def correlation(self) -> Floats:
         """(26, 26) correlations; zero for what was not estimated."""
-        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0))
-        scale = np.where(sd > 0, 1.0 / np.where(sd > 0, sd, 1.0), 0.0)
-        return np.asarray(self.covariance * np.outer(scale, scale), float)
+        return correlations(self.covariance)
 
     @property
     def star_residuals(self) -> Floats:
@@ -371,21 +372,26 @@ class Result(Judged, Paged, Brief):
             published=ellipse(orientation + own**2 * inverse, place[1]),
         )
 
+    def document(self) -> Document:
+        """Return the document: verdict, parameters, stars, images, curves, movement."""
+        from photogram.stellar.document import plate_document
+
+        return plate_document(self)
+
+    def _findings(self) -> Findings:
+        from photogram.stellar.findings import plate_findings
+
+        return plate_findings(self)
+
     def correlated(self) -> list[tuple[str, str, float]]:
         """Name pairs of parameters whose correlation exceeds 0.95."""
-        rows, columns = np.nonzero(np.triu(np.abs(self.correlation) > CORRELATED, 1))
-        return [
-            (NAMES[i], NAMES[j], float(self.correlation[i, j])) for i, j in zip(rows, columns, strict=True)
-        ]
+        return correlated(NAMES, self.covariance)
 
     def significance(self) -> dict[str, float]:
         """Return each estimated distortion coefficient over its mean error."""
-        errors = self.mean_errors
-        return {
-            name: abs(self.parameters[name]) / errors[name]
-            for name in DISTORTION
-            if self.solved.free[INDEX[name]] and errors[name] > 0
-        }
+        rows = [INDEX[name] for name in DISTORTION if self.solved.free[INDEX[name]]]
+        names = [NAMES[row] for row in rows]
+        return significance(names, self.solved.parameters[rows], self.covariance[np.ix_(rows, rows)])
 
     def doubtful(self) -> list[str]:
         """Name what the stars hardly determine: correlations, distortion terms that are not significant."""

@@ -1,16 +1,18 @@
-"""The tables of a calibration's listing (NOAA TR NOS 55, section E; section 9 of its specification)."""
+"""Tables of a calibrated plate (NOAA TR NOS 55, section E; section 9 of its specification)."""
 
 from __future__ import annotations
 
 import math
-import re
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
-from photogram.show.lines import padded
-from photogram.stellar.comparator_frame import comparator_frame
+from photogram.show.quantity import Axis, Quantity, Table, of_each
+from photogram.stellar.camera_tables import parameter_table
 from photogram.stellar.curves import (
     distortion_curves,
     histogram,
@@ -19,359 +21,443 @@ from photogram.stellar.curves import (
     star_means,
 )
 from photogram.stellar.movement import fictitious_points
-from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
+from photogram.stellar.outliers import studentized
+from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.result import Ellipse, Result, ellipse
 
-_AZIMUTHS = "azimuth S: from south, positive west; elevation: above the horizon"
+_AZIMUTHS = "Azimuths from south, positive west; elevations above the horizon."
+_UM = (Axis.of("x", "um"), Axis.of("y", "um"))
+_MM = tuple(Axis(name, "m", small="mm", factor=1e3) for name in "xy")
+_PLACE = (Axis.of("ra", "arcsec"), Axis.of("dec", "arcsec"))
 
 
-def _shown(name: str, value: float) -> float:
-    return value / GRAD if UNITS[name] == "rad" else value
+def _axis(unit: str, small: str, factor: float, *names: str) -> tuple[Axis, ...]:
+    return tuple(Axis(name, unit, small=small, factor=factor) for name in names or ("",))
 
 
-def parameters(result: Result) -> list[str]:
-    """Weighted parameters have residuals and mean errors before, free ones corrections (section 5.9a)."""
-    problem, errors = result.problem, result.mean_errors
-    lines = [
-        _head(
-            "<12",
-            "unit<8",
-            "given>20",
-            "computed>20",
-            "weight>14",
-            "residual>18",
-            "correction>18",
-            "before>14",
-            "mean error>18",
-        )
+def _angles(*names: str) -> tuple[Axis, ...]:
+    return _axis("rad", "arcsec", 1 / ARCSEC, *names)
+
+
+def _degrees(*names: str) -> tuple[Axis, ...]:
+    return _axis("rad", "deg", math.degrees(1), *names)
+
+
+_UM_OF_M = _axis("m", "um", 1e6)
+_NONE = np.zeros(0)
+_ATTITUDE = ("alpha", "omega", "kappa")
+
+
+def _named(
+    values: Sequence[Any] | np.ndarray, name: str, head: str = "", member: str | None = None
+) -> Quantity:
+    texts = np.array(values, dtype=object)
+    return Quantity(texts, (), "name", name or None, name if member is None else member, head=head)
+
+
+def parameters(result: Result) -> Table:
+    """Return the parameters: given, adjusted, and the change (section 5.9a)."""
+    problem, count = result.problem, len(NAMES) if result.problem.options.refraction else 22
+    names, free = NAMES[:count], result.solved.free[:count]
+    weights = np.diag(problem.parameter_weights)[:count]
+    with np.errstate(divide="ignore"):
+        before = np.where(weights > 0, result.mean_error / np.sqrt(weights), np.where(free, np.inf, 0.0))
+    axes = tuple(
+        Axis(name, "rad", small="grads", factor=1 / GRAD)
+        if UNITS[name] == "rad"
+        else Axis.of(name, UNITS[name])
+        for name in names
+    )
+    of, given = np.arange(count), problem.initial[:count]
+    values = result.solved.parameters[:count]
+    more = [
+        Quantity(given, member="given"),
+        Quantity(weights, name="weight", member="weight", head="Weight" * bool(weights.any()), figures=6),
+        Quantity(values - given, axes, "deviation", head="Change", figures=6, of=of),
+        Quantity(free, name="estimated", member="estimated"),
     ]
-    for name in NAMES:
-        i = INDEX[name]
-        if name not in result.estimated and name in NAMES[22:]:
-            continue
-        weight, change = problem.parameter_weights[i, i], result.solved.parameters[i] - problem.initial[i]
-        cells = [f"{_shown(name, v):20.10G}" for v in (problem.initial[i], result.parameters[name])]
-        residual, correction = (change, 0.0) if weight else (0.0, change)
-        moved = "".join(f"{_shown(name, v):18.8G}" for v in (residual, correction))
-        after = f"{_shown(name, errors[name]):18.8G}" if name in result.estimated else f"{'held':>18}"
-        before = f"{_shown(name, result.mean_error / math.sqrt(weight)):14.6G}" if weight else f"{'-':>14}"
-        unit = "grads" if UNITS[name] == "rad" else UNITS[name]
-        lines.append(f"{name:<12}{unit:<8}{''.join(cells)}{weight:14.6G}{moved}{before}{after}")
-    for axis, centre, offset in (("XS", "xp", "dx"), ("YS", "yp", "dy")):
-        row = np.zeros(len(NAMES))
-        row[[INDEX[centre], INDEX[offset]]] = 1.0
-        error = math.sqrt(max(float(row @ result.covariance @ row), 0.0))
-        lines.append(
-            f"{axis:<12}{'m':<8}{'':>20}{row @ result.solved.parameters:20.10G}{'':>64}{error:18.8G}"
+    errors = np.sqrt(np.maximum(np.diag(result.covariance), 0))[:count]
+    about = "Lengths in metres, angles in grads (400 to the circle)."
+    return parameter_table(
+        axes, values, errors, np.array([given, before]), result.significance(), more, about=about
+    )
+
+
+def stages(result: Result) -> list[Table]:
+    """Return the solutions of the run, and the levels of discrepancies of all iterations."""
+    rows = [
+        {
+            "solution": stage.solution,
+            **asdict(stage.counts),
+            "degrees_of_freedom": stage.counts.degrees_of_freedom,
+            "iterations": len(stage.levels) - 1,
+            "stop": stage.stop,
+            "converged": stage.converged,
+            "log10_determinant": stage.log_determinant / math.log(10),
+        }
+        for stage in result.stages
+    ]
+    heads = {"log10_determinant": "Log10 of the determinant"}
+    columns = [
+        Quantity(
+            [row[name] for row in rows],
+            (),
+            "name" if name in ("solution", "stop", "converged") else "number",
+            member=name,
+            head=heads.get(name, name.capitalize().replace("_", " ")),
+            figures=10,
         )
-    return lines
+        for name in rows[0]
+    ]
+    levels = [
+        of_each(result.levels, "solution", kind="name", head="Solution"),
+        of_each(result.levels, "number", head="Iteration"),
+        of_each(result.levels, "level", head="Level of discrepancies", figures=9),
+    ]
+    note = "The determinant is of the reduced normal equations, in the units of the parameters."
+    return [Table("solutions", "Solutions", columns, note), Table("iterations", "Iterations", levels)]
 
 
-def transformed(result: Result) -> list[str]:
-    """Attitudes in the system of the reference station and the mean pole."""
-    options = result.problem.options
+def transformed_attitudes(result: Result) -> dict[str, Floats]:
+    """Return attitudes in the system of the reference station and the mean pole; none without a station."""
+    options, site = result.problem.options, result.problem.site
     if options.reference is None:
-        return []
-    lines = [_head("<8", "alpha>16", "omega>16", "kappa>16")]
-    for g in _groups(result):
-        angles = result.solved.parameters[3 * g : 3 * g + 3]
-        found = transformed_angles(angles, result.problem.site, options.reference, options.pole)
-        lines.append(f"{GROUPS[g]:<8}" + "".join(f"{angle / GRAD:16.9f}" for angle in found))
-    return lines
+        return {}
+    angles = result.solved.parameters[:9].reshape(3, 3)
+    return {
+        name: transformed_angles(angles[g], site, options.reference, options.pole)
+        for name, g in solved_groups(result).items()
+    }
 
 
-def comparator(result: Result) -> list[str]:
-    """Scales and nonperpendicularity in the axes of the comparator (equation 42)."""
-    angle = result.problem.options.comparator_angle
-    if angle is None:
-        return []
-    found = comparator_frame(result, angle)
-    x, y, oblique = found.mean_errors
+def transformed(result: Result) -> Table:
+    """Return the transformed attitudes."""
+    attitudes, grads = transformed_attitudes(result), _axis("rad", "grads", 1 / GRAD, *_ATTITUDE)
+    angles = np.reshape([*attitudes.values()], (-1, 3))
+    columns = [
+        _named([*attitudes], "", "Orientation"),
+        Quantity(angles, grads, "deviation", head="{}", decimals=9),
+    ]
+    return Table("transformed-angles", "Transformed angles", columns)
+
+
+def solved_groups(result: Result) -> dict[str, int]:
+    """Return the orientations whose attitude was estimated, by name."""
+    free = result.solved.free[:9].reshape(3, 3)
+    return {name: g for g, name in enumerate(GROUPS) if free[g].any()}
+
+
+def stars(result: Result) -> Table:
+    """Return the stars: residuals of known ones, corrections and ellipses of unknown directions.
+
+    People see the known ones; `directions` has the others.
+    """
+    problem, known = result.problem, result.problem.known
+    residuals = np.where(known[:, None], result.star_residuals / ARCSEC, np.nan)
+    before = _before(result, problem.star_weights)
+    columns = [
+        _named(problem.star_ids, "id", "Star"),
+        _named(problem.star_names or problem.star_ids, "name", "Name"),
+        Quantity(known, name="known", member="known"),
+        Quantity(result.solved.places, _degrees("ra", "dec"), member="place_rad"),
+        Quantity([*map(_ellipse, result.ellipses())], member="ellipse"),
+        Quantity(residuals[:, 0] / 15, _axis("s", "s", 1.0), "deviation", head="Residual ra", decimals=6),
+        Quantity(residuals, _PLACE, "deviation", "residual", "residual", head="Residual {}", decimals=4),
+        _known(known, result.solved.star_redundancy, "redundancy", "r {}"),
+        _known(known, result.star_standardized, "standardized", "w {}"),
+        Quantity(
+            before, _angles("ra", "dec"), "deviation", head="Before {}", decimals=3, words={0.0: "fixed"}
+        ),
+    ]
+    if not known.all():
+        columns += _unknown(result)
+    about = "Adjusted minus catalogue; redundancy numbers r, standardized residuals w, mean errors before."
+    return Table("stars", "Star data", columns, about=about, shown=np.flatnonzero(known))
+
+
+def _known(known: Bools, values: Floats, name: str, head: str) -> Quantity:
+    values = np.where(known[:, None], values, np.nan)
+    return Quantity(values, _PLACE, "number", name, name, head=head, decimals=2)
+
+
+def _unknown(result: Result) -> list[Quantity]:
+    """Return members of the stars with unknown directions, absent for known stars."""
+    rows = {
+        direction.star: {
+            "correction": [value / ARCSEC for value in direction.correction],
+            "azimuth_rad": direction.azimuth,
+            "elevation_rad": direction.elevation,
+            "m_i": direction.image_mean_error,
+            "orientation_ellipse": _ellipse(direction.orientation),
+            "published_ellipse": _ellipse(direction.published),
+        }
+        for direction in result.directions()
+    }
+    names = next(iter(rows.values()))
+    of_stars = [rows.get(star, {}) for star in result.problem.star_ids]
+    return [Quantity([row.get(name) for row in of_stars], member=name) for name in names]
+
+
+def _ellipse(e: Ellipse) -> dict[str, float]:
+    return {
+        "major_arcsec": e.major / ARCSEC,
+        "minor_arcsec": e.minor / ARCSEC,
+        "direction_rad": e.direction,
+    }
+
+
+def _ellipses(ellipses: Sequence[Ellipse], of: str) -> list[Quantity]:
+    values = np.reshape([(e.major, e.minor, e.direction) for e in ellipses], (-1, 3))
     return [
-        f"angle x to y      {angle / GRAD:16.9f} grads",
-        f"scale x           {found.scale_x:16.12f}  mean error {x:.3E}",
-        f"scale y           {found.scale_y:16.12f}  mean error {y:.3E}",
-        f"epsilon           {found.epsilon / GRAD:16.9f} grads  mean error {oblique / GRAD:.3E}",
+        Quantity(values[:, :2], _angles("a", "b"), "deviation", head=f"{{}}, {of}", decimals=4),
+        Quantity(values[:, 2], _degrees(), "deviation", head="Direction", decimals=2),
     ]
 
 
-def axis(result: Result) -> list[str]:
-    """Show the direction of the axis that was given, and its residuals."""
-    given, residual = result.problem.axis, result.solved.axis_residual
-    if given is None or residual is None:
-        return []
-    (x, y), (vx, vy), weight = 1e3 * given.xy, 1e6 * residual, given.weight
+def directions(result: Result) -> Table:
+    """Return unknown directions; ellipses from the orientation alone, in total, and in total with m_i."""
+    found = result.directions()
+    places = np.reshape([d.place for d in found], (-1, 2))
+    columns = [
+        _named([d.star for d in found], "", "Star"),
+        *_places(places),
+        *_horizontal([d.azimuth for d in found], [d.elevation for d in found]),
+        Quantity(
+            np.reshape([d.mean_errors for d in found], (-1, 2)),
+            _angles("ra", "dec"),
+            "deviation",
+            head="Mean error {}",
+            decimals=4,
+        ),
+        Quantity(
+            np.array([d.image_mean_error for d in found]), _UM_OF_M, "deviation", head="m_i", decimals=3
+        ),
+        *_ellipses([d.orientation for d in found], "orientation"),
+        *_ellipses([d.total for d in found], "total"),
+        *_ellipses([d.published for d in found], "with m_i"),
+    ]
+    about = (
+        "Stars with estimated places, mean errors, and semi-axes and directions of their ellipses: from the"
+        " orientation alone, in total, and in total with m_i, the mean error of their own images."
+        f" {_AZIMUTHS}"
+    )
+    return Table("directions", "Unknown directions", columns, about=about)
+
+
+def _places(places: Floats) -> list[Quantity]:
     return [
-        f"attitude          {GROUPS[given.group]}",
-        f"azimuth           {degrees(given.azimuth)} from south, positive west",
-        f"elevation         {degrees(math.pi / 2 - given.zenith_distance)}",
-        f"plate x, y        {x:.6f}, {y:.6f} mm",
-        f"weights           {weight[0, 0]:.6G}, {weight[1, 1]:.6G}, {weight[0, 1]:.6G}",
-        f"residuals         {vx:.3f}, {vy:.3f} um",
+        _named([hours(ra % math.tau) for ra in places[:, 0].tolist()], "", "Right ascension"),
+        _named([degrees(dec) for dec in places[:, 1].tolist()], "", "Declination"),
     ]
 
 
-def inverse(result: Result) -> list[str]:
-    """Write the cofactors of the estimated parameters, six to a line."""
-    lines = []
-    for i, name in enumerate(result.estimated):
-        row = [result.solved.cofactors[INDEX[name], INDEX[other]] for other in result.estimated[: i + 1]]
-        for start in range(0, len(row), 6):
-            label = name if start == 0 else ""
-            lines.append(f"{label:<12}" + "".join(f"{value:18.9E}" for value in row[start : start + 6]))
-    return lines
+def _horizontal(azimuths: Sequence[float], elevations: Sequence[float], **member: str) -> list[Quantity]:
+    return [
+        Quantity(np.array(values), _degrees(), "deviation", member=name, head=head, decimals=5)
+        for values, name, head in (
+            (azimuths, member.get("azimuth", ""), "Azimuth S"),
+            (elevations, member.get("elevation", ""), "Elevation"),
+        )
+    ]
 
 
-def residual_histogram(result: Result) -> list[str]:
-    """Classes of the residuals of known stars, with as many as the normal curve puts there."""
-    if not result.problem.options.histogram:
-        return []
-    lines = []
+def fictitious(result: Result) -> Table:
+    """Return directions of plate points under every attitude, with ellipses from the orientation."""
+    points = fictitious_points(result) if result.movement else ()
+    places = np.reshape([p.place for p in points], (-1, 2))
+    covariances = np.reshape([p.covariance for p in points], (-1, 2, 2))
+    errors = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    errors = errors * np.column_stack([np.cos(places[:, 1]), np.ones(len(places))])
+    columns = [
+        _named([p.group for p in points], "group", "Orientation"),
+        Quantity(
+            np.array([p.xy for p in points]), _MM[:1], "deviation", member="xy", head="x = y", decimals=0
+        ),
+        Quantity(places, member="place"),
+        *_places(places),
+        *_horizontal(
+            [p.azimuth for p in points],
+            [p.elevation for p in points],
+            azimuth="azimuth",
+            elevation="elevation",
+        ),
+        Quantity(errors, _angles("ra", "dec"), "deviation", head="Mean error {}", decimals=4),
+        *_ellipses([ellipse(p.covariance, p.place[1]) for p in points], "orientation"),
+        Quantity(covariances, member="covariance"),
+    ]
+    return Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)
+
+
+def images(result: Result) -> Table:
+    """Return plate coordinates with residuals, redundancy numbers r and standardized residuals w."""
+    problem, solved = result.problem, result.solved
+    columns = [
+        *_images_of(result),
+        Quantity(problem.image_xy, _MM, "deviation", "", "xy_m", head="{}", decimals=5),
+        _named([hours(time) for time in problem.image_times.tolist()], "", "Time"),
+        Quantity(
+            _before(result, problem.image_weights),
+            _axis("m", "um", 1e6, "x", "y"),
+            "deviation",
+            head="Before {}",
+            decimals=3,
+        ),
+        Quantity(
+            1e6 * solved.residuals,
+            _UM,
+            "deviation",
+            "residual_um",
+            "residual_um",
+            head="Residual {}",
+            decimals=3,
+        ),
+        Quantity(solved.redundancy, _UM, "number", "redundancy", "redundancy", head="r {}", decimals=3),
+        Quantity(result.standardized, _UM, "number", "standardized", "standardized", head="w {}", decimals=2),
+    ]
+    about = "Computed minus measured; redundancy numbers r, standardized residuals w, mean errors before."
+    return Table("images", "Plate data", columns, about=about)
+
+
+def _images_of(result: Result) -> list[Quantity]:
+    problem = result.problem
+    return [
+        _named(problem.image_points, "point", "Point"),
+        _named([problem.star_ids[star] for star in problem.image_stars], "star", "Star"),
+        _named([GROUPS[group] for group in problem.image_groups], "orientation", "Orientation"),
+    ]
+
+
+def worst(result: Result, most: int) -> Table:
+    """Return the plate coordinates with the largest test values."""
+    tests = studentized(result)
+    sizes = np.nan_to_num(np.abs(tests.images))
+    order: Indices = np.argsort(-sizes, axis=None, kind="stable")[:most]
+    point, star, _ = (replace(column, member="") for column in _images_of(result))
+    columns = [
+        point,
+        star,
+        Quantity(1e6 * result.solved.residuals, _UM, "deviation", head="Residual", decimals=2),
+        Quantity(tests.images, _UM, head=f"Test value {'w' if tests.known else 't'}", decimals=2),
+    ]
+    note = f"The {len(order)} plate coordinates of the largest test values."
+    places = np.column_stack(np.unravel_index(order, sizes.shape))
+    return Table("worst", "Worst observations", columns, note, shown=places)
+
+
+def _before(result: Result, weights: Floats) -> Floats:
+    """Return the (n, 2) mean errors before the adjustment."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(result.mean_error / np.sqrt(np.diagonal(weights, axis1=1, axis2=2)), float)
+
+
+def means(result: Result) -> Table:
+    """Return means of stars with two images at least, and radial and tangential parts of their residuals."""
+    rows = list(star_means(result))
+    values = np.reshape([[*xy, *v, *parts] for _, xy, v, parts in rows], (-1, 6))
+    um: Any = {"kind": "deviation", "decimals": 3}
+    columns = [
+        _named([star for star, *_ in rows], "star", "Star"),
+        Quantity(values[:, :2], _MM, "deviation", member="xy_m", head="{}", decimals=5),
+        Quantity(1e6 * values[:, 2:4], _UM, member="residual_um", head="Residual {}", **um),
+        Quantity(1e6 * values[:, 4], _UM[:1], member="radial_um", head="Radial", **um),
+        Quantity(1e6 * values[:, 5], _UM[:1], member="tangential_um", head="Tangential", **um),
+    ]
+    return Table("star_means", "Mean plate coordinates", columns)
+
+
+def pre_run(result: Result) -> Table:
+    """Return residuals of the images without a part in the minimum solution."""
+    found = result.pre_run
+    residuals = np.zeros((0, 2)) if found is None else found.residuals
+    columns = [
+        _named(found.stars if found else [], "", "Star"),
+        _named(found.points if found else [], "", "Point"),
+        Quantity(residuals, _axis("m", "um", 1e6, "x", "y"), "deviation", head="Residual {}", decimals=3),
+    ]
+    return Table("pre-run", "Images that took no part in the minimum solution", columns)
+
+
+def movement(result: Result) -> Table:
+    """Return angles between the directions of a point under two attitudes."""
+    found = result.movement
+    names = ("ra cos dec", "declination", "azimuth sin z", "elevation")
+    differences = np.reshape([m.differences for m in found], (-1, 4))
+    columns = [
+        _named([f"{m.second} - {m.first}" for m in found], "", "Pair"),
+        of_each(found, "first"),
+        of_each(found, "second"),
+        of_each(found, "xy", _MM[:1], "deviation", head="x = y", decimals=0),
+        of_each(found, "angle", _angles(), "deviation", head="Angle", decimals=3),
+        of_each(found, "mean_error", _angles(), "deviation", head="Mean error", decimals=3),
+        Quantity(differences, _angles(*names), "deviation", member="differences", head="{}", decimals=3),
+    ]
+    about = "Angles between the directions of a point of the plate under two attitudes."
+    return Table("movement", "Movement of the camera", columns, about=about)
+
+
+def distortion(result: Result) -> Table:
+    """Return distortion and its mean errors over the distance from its centre."""
+    curves = distortion_curves(result) if result.problem.options.curves else None
+    columns = [
+        Quantity(getattr(curves, name, _NONE), axes, "deviation", head=head, decimals=decimals)
+        for name, head, axes, decimals in (
+            ("distance", "Distance", _MM[:1], 1),
+            ("radial", "Radial", _UM_OF_M, 3),
+            ("radial_error", "Mean error", _UM_OF_M, 3),
+            ("transformed", "Transformed", _UM_OF_M, 3),
+            ("transformed_error", "Mean error", _UM_OF_M, 3),
+            ("decentering", "Decentering", _UM_OF_M, 3),
+            ("decentering_error", "Mean error", _UM_OF_M, 3),
+        )
+    ]
+    about = (
+        "Over the distance from its centre, with mean errors. Transformed: for the calibrated principal"
+        " distance, with which it is zero at the crossover."
+    )
+    return Table("distortion", "Distortion", columns, about=about)
+
+
+def refraction(result: Result) -> Table:
+    """Return refraction around the axes with the given and the corrected coefficients."""
+    groups = solved_groups(result) if result.problem.options.refraction else {}
+    curves = [refraction_curves(result, group) for group in groups.values()]
+    names = np.repeat([*groups], [len(curve.zenith_distance) for curve in curves])
+    columns = [
+        _named(names, "", "Orientation"),
+        *(
+            Quantity(
+                np.concatenate([_NONE, *(getattr(curve, name) for curve in curves)]),
+                axes,
+                "deviation",
+                head=head,
+                decimals=decimals,
+            )
+            for name, head, axes, decimals in (
+                ("zenith_distance", "Zenith distance", _degrees(), 3),
+                ("given", "Given", _angles(), 4),
+                ("corrected", "Corrected", _angles(), 4),
+                ("error", "Mean error", _angles(), 4),
+            )
+        ),
+    ]
+    return Table("refraction", "Refraction curves", columns)
+
+
+def histograms(result: Result) -> list[Table]:
+    """Return classes of the residuals of known stars, with the numbers of the normal curve."""
+    tables = []
     for name, values in residual_classes(result).items():
         found = histogram(1e6 * values)
-        lines += [
-            f"residuals in {name}: mean {found.mean:.4f} um, standard deviation {found.sd:.4f} um",
-            _head("from um>10", "to um>10", "number>8", "normal>9"),
+        columns = [
+            Quantity(found.edges[:-1], _UM[:1], "deviation", head="From", decimals=3),
+            Quantity(found.edges[1:], _UM[:1], "deviation", head="To", decimals=3),
+            Quantity(found.counts, head="Number"),
+            Quantity(found.expected, head="Normal", decimals=2),
         ]
-        rows = zip(found.edges[:-1], found.edges[1:], found.counts, found.expected, strict=True)
-        lines += [f"{low:10.3f}{high:10.3f}{count:8d}{expected:9.2f}" for low, high, count, expected in rows]
-    return lines
-
-
-def _groups(result: Result) -> list[int]:
-    return [g for g in range(3) if result.solved.free[3 * g : 3 * g + 3].any()]
-
-
-def stars(result: Result) -> list[str]:
-    """Residuals of right ascension (seconds of time, of arc) and declination (of arc)."""
-    problem = result.problem
-    names = problem.star_names or problem.star_ids
-    (star, *ids), (name, *own) = padded(["star", *problem.star_ids], 8), padded(["name", *names], 8)
-    lines = [
-        star
-        + name
-        + _head(
-            "ra s>14",
-            "ra arcsec>12",
-            "dec arcsec>12",
-            "r ra>8",
-            "r dec>8",
-            "w ra>8",
-            "w dec>8",
-            "before ra arcsec>18",
-            "dec>9",
-        )
-    ]
-    for i in np.flatnonzero(problem.known):
-        ra, dec = result.star_residuals[i] / ARCSEC
-        tests = (*result.solved.star_redundancy[i], *result.star_standardized[i])
-        before = (
-            "held"
-            if problem.held[i]
-            else "".join(f"{value:9.3f}" for value in _before(result, problem.star_weights[i], ARCSEC))
-        )
-        lines.append(
-            f"{ids[i]}{own[i]}{ra / 15:14.6f}{ra:12.4f}{dec:12.4f}"
-            + "".join(f"{value:8.2f}" for value in tests)
-            + f"{before:>27}"
-        )
-    return lines if len(lines) > 1 else []
-
-
-def directions(result: Result) -> list[str]:
-    """Unknown directions; ellipses from the orientation alone, in total, and in total with m_i."""
-    rows = result.directions()
-    number, *ids = padded(["number", *(d.star for d in rows)], 8)
-    head = number + _head(
-        "right ascension>18",
-        "declination>18",
-        "azimuth S deg>15",
-        "elevation deg>15",
-        "m ra arcsec>13",
-        "m dec>9",
-        "m_i um>9",
-    )
-    kinds = [f"{kind + ' a, b, deg':>30}" for kind in ("orientation", "total", "with m_i")]
-    lines = [head + "".join(kinds)]
-    for star, d in zip(ids, rows, strict=True):
-        ellipses = "".join(_ellipse(e) for e in (d.orientation, d.total, d.published))
-        lines.append(
-            f"{star}{hours(d.place[0] % math.tau):>18}{degrees(d.place[1]):>18}"
-            f"{math.degrees(d.azimuth):15.5f}{math.degrees(d.elevation):15.5f}"
-            f"{d.mean_errors[0] / ARCSEC:13.4f}{d.mean_errors[1] / ARCSEC:9.4f}"
-            f"{1e6 * d.image_mean_error:9.3f}{ellipses}"
-        )
-    return [*lines, _AZIMUTHS] if rows else []
-
-
-def _ellipse(e: Ellipse) -> str:
-    return f"{e.major / ARCSEC:12.4f}{e.minor / ARCSEC:9.4f}{math.degrees(e.direction):9.2f}"
-
-
-def fictitious(result: Result) -> list[str]:
-    """Directions of plate points under every attitude, with ellipses from the orientation."""
-    lines = [
-        _head(
-            "group<8",
-            "x = y mm>9",
-            "right ascension>18",
-            "declination>18",
-            "azimuth S deg>15",
-            "elevation deg>15",
-            "m ra arcsec>13",
-            "m dec>9",
-            "ellipse a, b, deg>30",
-        )
-    ]
-    for p in fictitious_points(result):
-        ra, dec = p.place
-        sd = np.sqrt(np.diag(p.covariance)) / ARCSEC * [math.cos(dec), 1.0]
-        lines.append(
-            f"{p.group:<8}{1e3 * p.xy:9.0f}{hours(ra % math.tau):>18}{degrees(dec):>18}"
-            f"{math.degrees(p.azimuth):15.5f}{math.degrees(p.elevation):15.5f}"
-            f"{sd[0]:13.4f}{sd[1]:9.4f}{_ellipse(ellipse(p.covariance, dec))}"
-        )
-    return [*lines, _AZIMUTHS]
-
-
-def images(result: Result) -> list[str]:
-    """Plate coordinates with residuals, redundancy numbers r and standardized residuals w."""
-    problem = result.problem
-    star, *stars_ = padded(["star", *(problem.star_ids[k] for k in problem.image_stars)], 8)
-    head, *points = padded(["point", *problem.image_points], 8)
-    lines = [
-        star
-        + head
-        + _head(
-            "group<7",
-            "x mm>13",
-            "y mm>13",
-            "time>18",
-            "before x>10",
-            "y um>8",
-            "vx um>9",
-            "vy um>9",
-            "r x>7",
-            "r y>7",
-            "w x>8",
-            "w y>8",
-        )
-    ]
-    for i, point in enumerate(points):
-        x, y = problem.image_xy[i] * 1e3
-        vx, vy = result.solved.residuals[i] * 1e6
-        time = hours(problem.image_times[i])
-        before = _before(result, problem.image_weights[i], 1e-6)
-        lines.append(
-            f"{stars_[i]}{point}{GROUPS[problem.image_groups[i]]:<7}{x:13.5f}{y:13.5f}{time:>18}"
-            f"{before[0]:10.3f}{before[1]:8.3f}{vx:9.3f}{vy:9.3f}"
-            + "".join(f"{value:7.3f}" for value in result.solved.redundancy[i])
-            + "".join(f"{value:8.2f}" for value in result.standardized[i])
-        )
-    return lines
-
-
-def _before(result: Result, weight: Floats, unit: float) -> Floats:
-    """Return mean errors before the adjustment in a unit."""
-    return np.asarray(result.mean_error / np.sqrt(np.diag(weight)) / unit, float)
-
-
-def means(result: Result) -> list[str]:
-    """Means of stars with two images at least, and the radial and tangential parts of their residuals."""
-    rows = list(star_means(result))
-    head, *names = padded(["star", *(star for star, *_ in rows)], 8)
-    lines = [head + _head("x mm>13", "y mm>13", "vx um>9", "vy um>9", "radial>9", "tangential>12")]
-    for star, (_, (x, y), (vx, vy), (radial, tangential)) in zip(names, rows, strict=True):
-        lines.append(
-            f"{star}{1e3 * x:13.5f}{1e3 * y:13.5f}{1e6 * vx:9.3f}{1e6 * vy:9.3f}"
-            f"{1e6 * radial:9.3f}{1e6 * tangential:12.3f}"
-        )
-    return lines if len(lines) > 1 else []
-
-
-def pre_run(result: Result) -> list[str]:
-    """Residuals of the images that took no part in the minimum solution."""
-    if result.pre_run is None:
-        return []
-    star, *stars_ = padded(["star", *result.pre_run.stars], 8)
-    head, *points = padded(["point", *result.pre_run.points], 8)
-    rows = zip(stars_, points, 1e6 * result.pre_run.residuals, strict=True)
-    lines = [f"{own}{point}{vx:12.3f}{vy:12.3f}" for own, point, (vx, vy) in rows]
-    return [star + head + _head("vx um>12", "vy um>12"), *lines]
-
-
-def movement(result: Result) -> list[str]:
-    """Angles between the directions of a point under two attitudes."""
-    if not result.movement:
-        return []
-    lines = [
-        _head(
-            "pair<14",
-            "x = y mm>9",
-            "angle arcsec>14",
-            "mean error>12",
-            "ra cos dec>12",
-            "dec>12",
-            "az sin z>12",
-            "elevation>12",
-        )
-    ]
-    for m in result.movement:
-        values = "".join(f"{value / ARCSEC:12.3f}" for value in m.differences)
-        lines.append(
-            f"{m.second + ' - ' + m.first:<14}{m.xy * 1e3:9.0f}"
-            f"{m.angle / ARCSEC:14.3f}{m.mean_error / ARCSEC:12.3f}{values}"
-        )
-    return lines
-
-
-def distortion(result: Result) -> list[str]:
-    """Distortion and its mean errors (um) over the distance from its centre."""
-    options = result.problem.options
-    if not options.curves:
-        return []
-    curves = distortion_curves(result)
-    lines = [
-        f"calibrated principal distance {curves.calibrated:.9f} m, "
-        f"mean error {curves.calibrated_error:.3E} m; crossover {options.crossover} m",
-        _head("d mm>8", "radial um>12", "m>9", "transformed>13", "m>9", "decentering>13", "m>9"),
-    ]
-    table = np.column_stack(
-        [
-            curves.radial,
-            curves.radial_error,
-            curves.transformed,
-            curves.transformed_error,
-            curves.decentering,
-            curves.decentering_error,
-        ]
-    )
-    for d, row in zip(curves.distance, 1e6 * table, strict=True):
-        a, b, c, e, f, g = row
-        lines.append(f"{1e3 * d:8.1f}{a:12.3f}{b:9.3f}{c:13.3f}{e:9.3f}{f:13.3f}{g:9.3f}")
-    return lines
-
-
-def refraction(result: Result) -> list[str]:
-    """Refraction around the axes with the given and the corrected coefficients, seconds of arc."""
-    if not result.problem.options.refraction:
-        return []
-    lines = [_head("group<8", "z deg>9", "given>12", "corrected>12", "mean error>12")]
-    for g in _groups(result):
-        curves = refraction_curves(result, g)
-        rows = zip(curves.zenith_distance, curves.given, curves.corrected, curves.error, strict=True)
-        lines += [
-            f"{GROUPS[g]:<8}{math.degrees(z):9.3f}{a / ARCSEC:12.4f}{b / ARCSEC:12.4f}{m / ARCSEC:12.4f}"
-            for z, a, b, m in rows
-        ]
-    return lines
-
-
-def _head(*cells: str) -> str:
-    """Write the head of a table: each cell is its name with its format, as in `ra s>14`."""
-    named = (re.fullmatch(r"(.*)([<>]\d+)", cell) for cell in cells)
-    return "".join(format(cell[1], cell[2]) for cell in named if cell)
+        note = f"mean {found.mean:.4f} µm, standard deviation {found.sd:.4f} µm"
+        tables.append(Table(f"histogram-{name}", f"Residuals in {name}", columns, note))
+    return tables
 
 
 def degrees(angle: float) -> str:

@@ -1,0 +1,102 @@
+"""Parameters of a calibrated camera for plates and nights: their table, correlations, significance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.show.quantity import Axis, Quantity, Table, component
+
+CORRELATED = 0.95
+"""Correlations above this are named."""
+
+
+def correlations(covariance: Floats) -> Floats:
+    """Return the correlations of a covariance matrix; zero for parameters that are fixed."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0))
+    scale = np.divide(1.0, sd, out=np.zeros_like(sd), where=sd > 0)
+    return np.asarray(covariance * np.outer(scale, scale), float)
+
+
+def correlated(names: Sequence[str], covariance: Floats) -> list[tuple[str, str, float]]:
+    """Return the pairs of parameters whose correlation exceeds 0.95, with the correlation."""
+    found = correlations(covariance)
+    pairs = np.argwhere(np.triu(np.abs(found) > CORRELATED, 1)).tolist()
+    return [(names[i], names[j], float(found[i, j])) for i, j in pairs]
+
+
+def significance(names: Sequence[str], values: Floats, covariance: Floats) -> dict[str, float]:
+    """Return the ratio of each estimated parameter to its mean error."""
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0))
+    rows = zip(names, np.abs(values), errors, strict=True)
+    return {name: float(value / error) for name, value, error in rows if error > 0}
+
+
+def correlated_members(pairs: Sequence[tuple[str, str, float]]) -> list[dict[str, object]]:
+    """Return correlated pairs as in JSON documents."""
+    return [{"parameters": [a, b], "correlation": correlation} for a, b, correlation in pairs]
+
+
+def parameter_table(
+    axes: tuple[Axis, ...],
+    values: Floats,
+    errors: Floats,
+    given: Floats | None,
+    ratios: Mapping[str, float],
+    more: Sequence[Quantity] = (),
+    *,
+    note: str = "",
+    about: str = "",
+) -> Table:
+    """Return the parameters of a camera.
+
+    Parameters
+    ----------
+    axes
+        (n,) names and units of the parameters.
+    values, errors
+        (n,) with mean errors, 0 of fixed parameters.
+    given
+        (2, n) values and mean errors before the adjustment: infinite if free, 0 if fixed.
+    ratios
+        Terms over their mean errors by name.
+    more, note, about
+        Further columns; remarks of the table.
+    """
+    of = np.arange(len(axes))
+    before = []
+    if given is not None:
+        words = {0.0: "fixed", np.inf: "free"}
+        before = [
+            Quantity(given[0], axes, "difference", head="Given", figures=9, of=of),
+            Quantity(given[1], axes, "deviation", head="Mean error before", words=words, of=of),
+        ]
+    columns = [
+        Quantity([axis.name for axis in axes], kind="name", name="parameter"),
+        component(axes, of)[0],
+        *before,
+        Quantity(values, axes, "difference", "value", "value", head="Value", figures=9, of=of),
+        Quantity(
+            errors,
+            axes,
+            "deviation",
+            "mean_error",
+            "mean_error",
+            head="Mean error",
+            words={0.0: "fixed"},
+            of=of,
+        ),
+        Quantity([ratios.get(axis.name, np.nan) for axis in axes], head="Over its mean error", decimals=1),
+        Quantity([axis.unit for axis in axes], kind="name", name="unit", member="unit"),
+        *more,
+    ]
+    return Table("parameters", "Parameters", columns, note, about, errors, keyed=True)
+
+
+def matrix_table(key: str, title: str, names: Sequence[str], matrix: Floats, **form: Any) -> Table:
+    """Return a matrix of parameters with a row and a column for each name."""
+    heads = Quantity([*names], kind="name", head="Parameter")
+    return Table(key, title, [heads, Quantity(matrix, tuple(map(Axis, names)), head="{}", **form)])

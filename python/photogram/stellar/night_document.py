@@ -1,0 +1,147 @@
+"""The document of a camera that was calibrated by exposures of the sky."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from photogram.show.angles import ARCSEC
+from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section, significant
+from photogram.show.quantity import members
+from photogram.show.sketch.declared import Sketch
+from photogram.stellar import night_tables as tables
+from photogram.stellar.camera_tables import correlated_members, correlations, matrix_table
+from photogram.stellar.lens_choice import LensTest
+from photogram.stellar.night_plots import sketches
+from photogram.stellar.night_result import CalibratedNight
+
+MAX_WORST_IMAGES = 25
+MAX_EXPOSURES = 200
+
+CONVENTIONS = {
+    "frame": "north, east, zenith (left-handed); azimuth from south, positive west",
+    "pixels": "right and down",
+    "residual": "measured minus computed; of stars adjusted minus catalogue",
+    "standardized": "residual over its mean error",
+    "covariance": "cofactors times m squared, in the units of the parameters",
+    "icrs": "quaternion w, x, y, z from ICRS to the camera (x right, y down, z along the axis);"
+    " covariance of the turn about these axes, radians squared",
+}
+
+
+def night_document(result: CalibratedNight) -> Document:
+    """Return the document of a night."""
+    much, good = tables.facts(result)
+    camera = result.camera
+    free = np.flatnonzero(camera.known)
+    matrix = correlations(camera.covariance)[np.ix_(free, free)]
+    names = [camera.names[row] for row in free]
+    lens = "Which lens the data prefer, and which of its terms are significant."
+    sections = [
+        Section("pictures", "Stars and residuals", [pictures(sketches(result))]),
+        Section("size", "How much, how good", [Facts("How much", much), Facts("How good", good)]),
+        Section(
+            "camera",
+            "Camera",
+            [
+                tables.parameters(result),
+                matrix_table("correlations", "Correlations", names, matrix, decimals=3),
+            ],
+        ),
+        Section(
+            "exposures", "Exposures", [Layers("exposure-layers", tables.exposures(result, MAX_EXPOSURES))]
+        ),
+        Section("lens", "Lens", [tables.lens_tests(result), tables.lenses(result)], lens),
+        Section.of(tables.worst(result, MAX_WORST_IMAGES)),
+        tests_section(result.verdict),
+        remarks_section(result.messages),
+    ]
+    details = [
+        tables.exposure_table(result),
+        *tables.attitudes(result),
+        tables.stars(result),
+        tables.images(result),
+    ]
+    return Document(
+        what="Calibration of a camera by exposures of the sky",
+        title=result.night.title,
+        judgements=[judged(result.verdict)],
+        advice=result.verdict.next,
+        highlights=_highlights(result),
+        sections=sections,
+        members=_members(result),
+        details=[*map(Section.of, details)],
+    )
+
+
+def pictures(drawn: dict[str, Sketch]) -> Layers:
+    """Return pictures by their names as layers of a page."""
+    layers = [
+        Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", partial(drawn.get, name))
+        for name in drawn
+    ]
+    return Layers("picture-layers", layers)
+
+
+def _members(result: CalibratedNight) -> dict[str, Any]:
+    found, night, camera, test = result.calibration, result.night, result.camera, result.test
+    own = members(result, "converged", "usable", "doubtful", "falsely_identified")
+    return {
+        "title": night.title,
+        "conventions": CONVENTIONS,
+        "m": found.mean_error,
+        "m_unit": "standard deviation of an image coordinate",
+        "sd_px": night.pixel_sd,
+        **members(found, "degrees_of_freedom", "iterations", stop="status"),
+        **own,
+        "verdict": result.verdict.document(),
+        "global_test": test and members(test, "limits", "probability", variance_of_unit_weight="variance"),
+        "lens": {
+            "name": camera.lens,
+            **members(camera, "common_scale", model="facts.model", formula="facts.formula"),
+            "tried": result.lenses,
+            "scale_test": result.scale_test and _test(result.scale_test),
+            "term_tests": [*map(_test, result.term_tests)],
+        },
+        "effects": night.site.effects,
+        "standstill": _standstill(result),
+        "messages": [*map(str, result.messages)],
+        "covariance": {"order": camera.names, "matrix": camera.covariance},
+        "correlated": correlated_members(result.correlated()),
+        "significance": result.significance(),
+    }
+
+
+def _test(test: LensTest) -> dict[str, Any]:
+    return asdict(test) | {"verdict": test.verdict}
+
+
+def _standstill(result: CalibratedNight) -> dict[str, Any] | None:
+    test = result.standstill
+    if test is None:
+        return None
+    return {
+        **members(
+            test, "probability", chi_square="statistic", degrees_of_freedom="dimension", own_probability="own"
+        ),
+        "turn_arcsec": test.turns / ARCSEC,
+        "moved": [result.names[k] for k in test.moved],
+    }
+
+
+def _highlights(result: CalibratedNight) -> list[Fact]:
+    found, test = result.calibration, result.test
+    rms = float(np.sqrt(np.mean(found.residuals**2)))
+    expected = test and f"{test.limits[0]:.3f} to {test.limits[1]:.3f} expected of its square"
+    of = f"of {len(result.night.exposures)}; {len(found.xy)} images of {len(found.catalogue)} stars"
+    falsely = f"{result.falsely_identified:.0e}"
+    return [
+        Fact("Mean error of unit weight", f"{found.mean_error:.3f}", note=expected or ""),
+        Fact("rms of image residuals", significant(rms, 3), "px"),
+        Fact("Exposures", f"{len(result.exposures)}", note=of),
+        Fact("Any exposure falsely identified", falsely, note="probability, at most"),
+    ]
