@@ -31,7 +31,7 @@ def calibration(columns: int) -> None:
     )
     comparator.listing(made)
     report("and listing", begun)
-    comparator.to_json(made)
+    made.to_json()
     report("and document", begun)
 
 

@@ -14,6 +14,8 @@ from photogram.comparator.fits import fit_rigid
 from photogram.comparator.gridfile import adjusted_grid, corrected_grid
 from photogram.comparator.listing.parameters import combined_linear_page, tests_page, variance_lines
 from photogram.comparator.simulation import simulated_years
+from photogram.show.cells import written
+from photogram.show.forms import table_text
 
 
 @cache
@@ -73,7 +75,9 @@ def grid_lines() -> list[str]:
 def years_lines() -> list[str]:
     """Compare the simulated calibrations of the example of `comparator compare`."""
     found = comparator.compare(simulated_years())
-    return [*wrap(found.verdict.headline, 118), "", *found.report().splitlines()]
+    tables = [found.document().table(key) for key in ("calibrations", "series")]
+    lines = [line for table in tables for line in ("", *table_text(written(table)))]
+    return [*wrap(found.verdict.headline, 118), *lines]
 
 
 BLOCKS = {

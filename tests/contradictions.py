@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Iterator
 
+from photogram.show import quantity
 from photogram.show.cells import written
 from photogram.show.forms import PLAIN
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Table, Text
@@ -120,6 +121,8 @@ def _of_page(page: Document) -> Iterator[str]:
 
 
 def _of_part(part: Part) -> Iterator[str]:
+    if isinstance(part, quantity.Table) and not part.visible:
+        return
     part = written(part)
     if isinstance(part, Facts):
         for fact in part.facts:

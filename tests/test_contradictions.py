@@ -16,7 +16,7 @@ from photogram.absolute_orientation import read_csv as read_stations
 from photogram.cli import app
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
-from photogram.comparator import Grid, compare, listing, simulate_calibration, to_json
+from photogram.comparator import Grid, compare, listing, simulate_calibration
 from photogram.comparator import calibrate as calibrate_comparator
 from photogram.giant import Project, write_project
 from photogram.perspective_center import run_deck
@@ -39,7 +39,7 @@ def see(result, document=True):
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
     """Leave the pictures out that pages draw at once: they have no sentences."""
-    monkeypatch.setattr("photogram.comparator.pictures.book.sketches", lambda _: {})
+    monkeypatch.setattr("photogram.comparator.document.sketches", lambda _: {})
     monkeypatch.setattr("photogram.stellar.document.sketches", lambda _: {})
     monkeypatch.setattr("photogram.stellar.night_document.sketches", lambda _: {})
 
@@ -327,9 +327,9 @@ COMPARATORS = {
 def test_comparators(state):
     make, code = COMPARATORS[state]
     found = calibrate_comparator(make())
-    assert_one_judgement(found.verdict, page_of(found), listing(found), to_json(found))
+    assert_one_judgement(found.verdict, page_of(found), listing(found), found.to_json())
     assert found.verdict.code == code
-    assert (json.loads(to_json(found))["correction"] is None) == (found.verdict.exit != 0)
+    assert (json.loads(found.to_json())["correction"] is None) == (found.verdict.exit != 0)
 
 
 @pytest.mark.parametrize("change", [{}, {"scale": 20e-6}, {"random_um": 4.0}])

@@ -8,7 +8,7 @@ import pytest
 from plates import QUICK, case_2_session, noisy
 
 from photogram import InputError
-from photogram.comparator import Correction, Grid, Options, calibrate, simulate_calibration, to_csv, to_json
+from photogram.comparator import Correction, Grid, Options, calibrate, simulate_calibration, to_csv
 from photogram.comparator.combined_solution import CombinedPolynomial
 from photogram.comparator.outliers import far_pointings, pointing_tests, screen
 from photogram.comparator.reduction import Reduction
@@ -227,7 +227,7 @@ def test_a_grid_that_is_worse_than_it_should_be_comes_first():
         "plate 1, corrections against 0.300 um a priori: the global test fails"
     )
     assert texts(calibration)[1].startswith("case 3, point 9")
-    assert json.loads(to_json(calibration))["joint"]["plates"][0]["test"]["probability_above"] < 1e-6
+    assert json.loads(calibration.to_json())["joint"]["plates"][0]["test"]["probability_above"] < 1e-6
 
 
 def test_the_test_of_the_grid_holds_its_level():

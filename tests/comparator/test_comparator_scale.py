@@ -8,7 +8,7 @@ import pytest
 from plates import QUICK, STRAIGHT, noisy
 
 from photogram import OutOfMemoryError
-from photogram.comparator import Grid, calibrate, listing, simulate_calibration, to_json
+from photogram.comparator import Grid, calibrate, listing, simulate_calibration
 from photogram.comparator.averages import unbiased_grid_sigma
 from photogram.comparator.calibration import needed_memory
 from photogram.comparator.case import locations
@@ -32,7 +32,7 @@ def peak(session):
     try:
         calibration = calibrate(session, QUICK)
         listing(calibration)
-        to_json(calibration)
+        calibration.to_json()
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

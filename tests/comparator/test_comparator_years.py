@@ -17,7 +17,6 @@ from photogram.comparator import (
     compare,
     read_grid,
     simulate_calibration,
-    to_json,
 )
 from photogram.comparator.years.joint import adjust_together
 from photogram.comparator.years.record import day_of
@@ -139,7 +138,7 @@ def test_the_command_names_a_step_and_writes_the_grid(run, tmp_path):
     paths = []
     for k in range(4):
         paths.append(tmp_path / f"year-{k}.json")
-        paths[-1].write_bytes(to_json(year(k, scale=20e-6 if k > 1 else 0.0)))
+        paths[-1].write_bytes(year(k, scale=20e-6 if k > 1 else 0.0).to_json())
     result = run("comparator", "compare", *paths, "--out", "out", "--json", "all.json")
     assert result.exit_code == 4, result.output
     assert "scale x steps by" in result.stdout
@@ -189,7 +188,7 @@ def test_dates_are_those_of_the_report_or_of_today():
 
 
 def test_damaged_documents_are_refused_with_what_is_wrong(tmp_path):
-    good = json.loads(to_json(year(0)))
+    good = json.loads(year(0).to_json())
     for member, value, words in (
         (("joint", "sigma_random_um"), 0.0, "0 is not positive"),
         (("cases", 0, "points", 3), 99, "points|99"),

@@ -144,9 +144,10 @@ def test_files_of_certificates_and_of_stars(run, tmp_path):
     for year in (80, 85):
         text = head.format(year) + "angle = [10, 20, 30, 40]\ndistortion = [1, 2, 1, -2]\n"
         (tmp_path / f"{year}.toml").write_text(text)
-    done = run("camera", "80.toml", "85.toml", "--no-html")
+    done = run("camera", "80.toml", "85.toml", "--no-html", "--json", "r.json")
     assert done.exit_code == 0, done.output
-    assert "nothing changed between 1980-05-11 and 1985-05-11" in done.stdout
+    verdict = json.loads((tmp_path / "r.json").read_bytes())["verdict"]
+    assert "nothing changed between 1980-05-11 and 1985-05-11" in str(verdict["lines"])
     (tmp_path / "camera.json").write_text("{}")
     done = run("camera", "80.toml", "camera.json")
     assert done.exit_code == 1

@@ -99,7 +99,6 @@ def compare(
     """
     with job:
         from photogram.film.years import compare_cameras
-        from photogram.show.sections import verdict_sections
 
         if example:
             from photogram.film.years.example import simulated_certificates
@@ -111,8 +110,8 @@ def compare(
             read = _read(paths, day or [], name)
             folder = out or default_out(paths[0], "-compared")
         found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
-        above = verdict_sections(found.verdict)
-        documents.conclude(job, "camera compare", found, folder, text=False, above=above)
+        tables = ("calibrations", "series")
+        documents.conclude(job, "camera compare", found, folder, text=False, tables=tables)
 
 
 def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:

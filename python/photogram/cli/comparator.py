@@ -7,14 +7,13 @@ import time
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import output, print_remark, print_sections, print_withheld
+from photogram.cli.console import output, print_remark, print_withheld
 from photogram.cli.documents import Documents, PageAndJson
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
 from photogram.cli.options import Quiet, default_out, out_option
@@ -72,7 +71,9 @@ def comparator(
         ),
     ] = None,
     documents: Annotated[PageAndJson, Without("json")],
-    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf instead of report.html.")] = False,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Write report.pdf instead of report.html (needs the extra `pdf`).")
+    ] = False,
     plots: Annotated[
         bool,
         typer.Option(
@@ -190,20 +191,25 @@ def _results(placed: dict[Path, Calibration], run_date: str, *, pdf: bool, quiet
     """Make everything that goes to the output directory, before anything is written."""
     from photogram.comparator import listing
 
-    if pdf and find_spec("matplotlib") is None:
-        pdf = False
-        if not quiet:
-            print_remark("no pictures: pip install 'photogram[plots]'")
     written: dict[Path, bytes] = {}
     for place, calibration in placed.items():
         written[place / "listing.txt"] = listing(calibration, run_date).encode()
         if calibration.usable:
             written |= _corrections(calibration, place)
-        if pdf:
-            from photogram.comparator.pictures import pdf_report
-
-            written[place / "report.pdf"] = pdf_report(calibration, run_date)
+    if pdf:
+        try:
+            written |= {place / "report.pdf": _pdf(one, run_date) for place, one in placed.items()}
+        except ModuleNotFoundError:
+            if not quiet:
+                print_remark("no report.pdf: pip install 'photogram[pdf]'")
     return written
+
+
+def _pdf(calibration: Calibration, run_date: str) -> bytes:
+    from photogram.show.page import Fact
+    from photogram.show.pdf import page_pdf
+
+    return page_pdf(replace(calibration.document(), head=[Fact("Date of the run", run_date)]))
 
 
 def _pages(job: Job, placed: dict[Path, Calibration], documents: Documents) -> dict[Path, bytes]:
@@ -219,36 +225,19 @@ def _pages(job: Job, placed: dict[Path, Calibration], documents: Documents) -> d
 
 
 def _document(calibrations: list[Calibration]) -> bytes:
-    from photogram.comparator import to_json
-
-    documents = [to_json(calibration) for calibration in calibrations]
+    documents = [calibration.to_json() for calibration in calibrations]
     return documents[0] if len(documents) == 1 else b"[" + b",\n".join(documents) + b"]\n"
 
 
 def _summarize(calibrations: list[Calibration]) -> None:
-    """Print problems, the analysis of variance and the linear parameters of each."""
+    """Print verdict, analysis of variance, linear parameters and problems of each."""
+    from photogram.show.forms import summary
+
     for calibration in calibrations:
-        _summarize_one(calibration)
-
-
-def _summarize_one(calibration: Calibration) -> None:
-    from photogram.comparator.listing.parameters import summary_page
-    from photogram.show.sections import problems_or_none
-
-    session = calibration.session
-    output.print(f"[bold]Comparator {session.comparator}, {len(calibration.cases)} cases[/]")
-    verdict = calibration.verdict
-    told = problems_or_none([message.text for message in calibration.messages], verdict)
-    sections = [("Verdict", [verdict.headline]), ("What to do next", list(verdict.next)), ("Problems", told)]
-    print_sections(sections, "listing.txt", len(told))
-    for line in summary_page(calibration)[4:]:
-        output.print(escape(line))
-    if calibration.joint:
-        joint = calibration.joint
-        output.print(
-            f"  JOINT ADJUSTMENT: STANDARD ERROR OF UNIT WEIGHT {joint.sigma0:.4f},"
-            f" RANDOM COMPARATOR {joint.random_um:.3f} MICRONS"
-        )
+        for line in summary(calibration.document(), "variance", "linear"):
+            output.print(escape(line))
+        for message in calibration.messages:
+            print_remark(message.text)
 
 
 @with_job
@@ -323,7 +312,6 @@ def compare(
     """
     with job:
         from photogram.comparator import compare as compared
-        from photogram.show.sections import verdict_sections
 
         if example:
             from photogram.comparator.simulation import simulated_years
@@ -342,5 +330,5 @@ def compare(
             folder,
             text=False,
             more={folder / f"grid-{plate}.csv": grid.to_csv() for plate, grid in grids.items()},
-            above=verdict_sections(found.verdict),
+            tables=("calibrations", "series"),
         )

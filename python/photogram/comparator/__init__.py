@@ -7,9 +7,6 @@ calibration.correction.apply(xy_um)
 
 from photogram.arguments.on_demand import attach_checked
 
-WAYS = {"findings_of": ("tables",), "page_of": ("page",)}
-"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""
-
 __getattr__, __dir__, __all__ = attach_checked(
     __name__, __file__, given={"Correction", "Frame", "Grid", "Options", "Polynomial"}
 )

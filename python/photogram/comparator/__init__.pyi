@@ -8,7 +8,6 @@ from .cards import read_cards as read_cards
 from .cards import to_cards as to_cards
 from .correction import Correction as Correction
 from .correction import Identity as Identity
-from .document import to_json as to_json
 from .fits import Decomposition as Decomposition
 from .grid import Grid as Grid
 from .grid import built_in_grid as built_in_grid

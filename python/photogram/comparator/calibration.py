@@ -53,8 +53,10 @@ from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import require
 from photogram.messages import Message
-from photogram.show.methods import Judged, Paged
+from photogram.show.methods import Documented, Judged
+from photogram.show.page import Document
 from photogram.show.summary import Brief
+from photogram.statistics.findings import Findings
 
 BASE, PER_POINTING = 64 << 20, 3500
 """Bytes that any calibration takes, and what each pointing adds, with listing and document."""
@@ -124,7 +126,7 @@ class PlateResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Judged, Paged, Brief):
+class Calibration(Documented, Judged, Brief):
     """A calibrated comparator.
 
     Attributes
@@ -210,6 +212,17 @@ class Calibration(Judged, Paged, Brief):
     def sigma_grid_um(self, plate: int) -> float:
         """Return the computed standard deviation of a grid coordinate, in the way that the options name."""
         return _chosen_sigma(self.plates[plate], self.options)
+
+    def document(self) -> Document:
+        """Return the document of the calibration: analysis of variance, parameters, tests, pictures."""
+        from photogram.comparator.document import calibration_document
+
+        return calibration_document(self)
+
+    def _findings(self) -> Findings:
+        from photogram.comparator.findings import comparator_findings
+
+        return comparator_findings(self)
 
 
 def _chosen_sigma(result: PlateResult, options: Options) -> float:

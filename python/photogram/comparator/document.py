@@ -1,20 +1,33 @@
-"""The JSON document of a calibration; `docs/comparator.md` lists its members."""
+"""The document of a calibration; `docs/comparator.md` lists the members of its JSON form."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from photogram import _photocore
-from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
-from photogram.comparator.closeout import Closeout
-from photogram.comparator.correction import Correction
-from photogram.comparator.fits import Decomposition, Residuals, RigidFit
+import numpy as np
+
 from photogram.comparator.joint import JointFit
+from photogram.comparator.pictures.book import sketches
 from photogram.comparator.pointing import Precision
-from photogram.comparator.tables import precisions, terms
-from photogram.io import json
-from photogram.show.quantity import Quantity, of_each, records
+from photogram.comparator.tables import (
+    LINEAR,
+    cases,
+    coefficients,
+    far_pointings,
+    linear,
+    outliers,
+    terms,
+    variance,
+)
+from photogram.show.angles import ARCSEC
+from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Section, significant
+from photogram.show.quantity import members
 
+if TYPE_CHECKING:
+    from photogram.comparator import Calibration, PlateResult
+
+UM = "µm"
 CONVENTIONS = {
     "residuals_comparator_um": "grid transformed into the comparator system less measured: to be added to"
     " the measurement",
@@ -35,264 +48,228 @@ CONVENTIONS = {
     "screening": "measured points that do not agree with the adjustment of the others; off_um: measured less"
     " expected; change_um: what they change corrected coordinates by",
 }
+POLYNOMIALS = (
+    "What is added to linearly corrected coordinates: polynomials of fourth degree in metres. Each term"
+    " is tested with"
+    " its argument from -1 to 1 over the measured range, so that its coefficient is its effect at the edge."
+)
+JOINT = "All cases, comparator, polynomials and grid in one adjustment, with the accuracy of the grid."
 
 
-def to_json(calibration: Calibration) -> bytes:
-    """Return the whole calibration as JSON (UTF-8). What is not a number is null."""
-    return json.to_json(_document(calibration))
+def calibration_document(calibration: Calibration) -> Document:
+    """Return the document of a calibration."""
+    session, verdict, screening = calibration.session, calibration.verdict, calibration.screening
+    own, nonlinear, tests = calibration.linear, calibration.nonlinear, calibration.polynomial_tests
+    by_variance, of_cases = variance(calibration), cases(calibration)
+    polynomials = [terms(tests), coefficients(nonlinear)] if nonlinear and tests else []
+    disagreeing = [outliers(screening), far_pointings(calibration.far_pointings)]
+    date = f", {session.date}" if session.date else ""
+    return Document(
+        what=f"Calibration of comparator {session.comparator}",
+        title=f"{len(calibration.cases)} cases{date}",
+        judgements=[judged(verdict)],
+        advice=verdict.next,
+        highlights=_highlights(calibration),
+        sections=[
+            Section("variance", "Where the errors come from", [by_variance], by_variance.about),
+            Section("pictures", "Pictures", _pictures(calibration)),
+            Section.of(linear(own.correction, own.covariance, own.degrees_of_freedom)),
+            Section("polynomials", "Polynomials", polynomials, POLYNOMIALS),
+            Section.of(of_cases),
+            Section("outliers", "Readings that do not agree", disagreeing),
+            Section(
+                "joint", "Joint adjustment", _joint(calibration.joint) if calibration.joint else [], JOINT
+            ),
+            tests_section(verdict),
+            remarks_section(calibration.messages),
+        ],
+        members=_members(calibration),
+    )
 
 
-def _document(calibration: Calibration) -> dict[str, Any]:
-    session, linear, nonlinear = calibration.session, calibration.linear, calibration.nonlinear
-    plates = list(calibration.plates.values())
-    coefficients = nonlinear.polynomial.coefficients if nonlinear else [None, None]
-    return {
-        "program": f"photogram {_photocore.__version__}",
-        "comparator": session.comparator,
-        "secondary_stage": session.secondary,
-        "date": session.date,
-        "left_handed": calibration.cases[0].placed.orientation.left_handed,
-        "options": calibration.options,
-        "conventions": CONVENTIONS,
-        "messages": [str(message) for message in calibration.messages],
-        "usable": calibration.usable,
-        "verdict": calibration.verdict.document(),
-        "screening": calibration.screening,
-        "far_pointings": calibration.far_pointings,
-        "linear": {
-            **_linear(linear.correction),
-            "covariance": linear.covariance,
-            "sigma0_um": linear.sigma0_um,
-            "degrees_of_freedom": linear.degrees_of_freedom,
-        },
-        "cases": [_case(calibration, index) for index in range(len(calibration.cases))],
-        "polynomial_x": coefficients[0],
-        "polynomial_y": coefficients[1],
-        "polynomial": _polynomial(calibration),
-        "pointing": _pointing(calibration),
-        "grid_points": plates[0].averages.points,
-        "grid_corrections_um": plates[0].averages.grid_um,
-        "sigma_grid_um": calibration.sigma_grid_um(plates[0].averages.plate),
-        "plates": [_plate(calibration, result) for result in plates],
-        "variance_components_um": calibration.variance.components_um,
-        "variance_analysis_um": _variance(calibration),
-        "case_variances": calibration.case_test,
-        "joint": _joint(calibration.joint, usable=calibration.usable) if calibration.joint else None,
-        "joint_check_sd": calibration.joint_check,
-        "correction": calibration.correction.document() if calibration.usable else None,
+def _highlights(calibration: Calibration) -> list[Fact]:
+    variance, joint = calibration.variance, calibration.joint
+    after = variance.after_nonlinear or variance.after_linear
+    lack = calibration.linear.correction.nonorthogonality_rad / ARCSEC
+    before = significant(variance.before.total, 3)
+    found = [
+        Fact("A coordinate before", before, UM, "standard deviation of one axis"),
+        Fact("After the calibration", significant(after.total, 3), UM),
+        Fact("Random comparator", significant(variance.random, 3), UM),
+        Fact("Pointing, mean of a point", significant(variance.pointing.total, 3), UM),
+        Fact("Lack of orthogonality", significant(lack, 3), "″"),
+    ]
+    return found + ([Fact("Joint adjustment, unit weight", f"{joint.sigma0:.4f}")] if joint else [])
+
+
+def _joint(joint: JointFit) -> list[Part]:
+    """Return facts and linear parameters of the joint adjustment."""
+    freedom = joint.degrees_of_freedom
+    facts = [
+        Fact(
+            "Standard deviation of unit weight", f"{joint.sigma0:.4f}", note=f"{freedom} degrees of freedom"
+        ),
+        Fact("Random comparator, estimated", significant(joint.random_um, 4), UM),
+    ]
+    for plate, own in joint.plates.items():
+        how = "estimated" if own.estimated else "given"
+        facts.append(Fact(f"Grid {plate}, standard deviation", significant(own.sigma_um, 4), UM, how))
+    return [
+        Facts("Joint adjustment", facts),
+        linear(joint.correction, joint.covariance, freedom, "joint_parameters"),
+    ]
+
+
+def _pictures(calibration: Calibration) -> list[Part]:
+    """Return the pictures of the calibration as layers."""
+    layers = [
+        Drawing(f"picture-{name}", name.replace("-", " ").capitalize(), "", sketch)
+        for name, sketch in sketches(calibration).items()
+    ]
+    return [Layers("picture-layers", layers)]
+
+
+def _members(calibration: Calibration) -> dict[str, Any]:
+    """Return the members of the JSON document that are no tables."""
+    own, usable, joint = calibration.linear, calibration.usable, calibration.joint
+    plates = [_plate(calibration, result) for result in calibration.plates.values()]
+    lines = {
+        "before": calibration.variance.before,
+        "after_linear": calibration.variance.after_linear,
+        "after_nonlinear": calibration.variance.after_nonlinear,
+        "mean_pointing": calibration.variance.pointing,
     }
-
-
-def _linear(found: Correction | Decomposition) -> dict[str, float]:
-    return {
-        "scale_x": found.scale_x,
-        "scale_y": found.scale_y,
-        "nonorthogonality_rad": found.nonorthogonality_rad,
-    }
-
-
-def _case(calibration: Calibration, index: int) -> dict[str, Any]:
-    case, last = calibration.cases[index], calibration.last_fits[index]
-    combined = calibration.linear.cases[index]
-    placed = case.placed
-    parameters = case.linear.parameters
-    return {
-        "case": case.number,
-        "operator": placed.case.operator,
-        "plate": placed.case.plate,
-        "points": placed.points,
-        "nearest_point": placed.orientation.nearest_point,
-        "corner": placed.orientation.corner,
-        "left_handed": placed.orientation.left_handed,
-        "rotation_rad": combined.rotation_rad,
-        "translation_um": combined.translation_um,
-        "sigma0_um": {
-            "free": case.free.residuals.sigma0_um,
-            "linear": case.linear.residuals.sigma0_um,
-            "nonlinear": case.polynomial.residuals.sigma0_um if case.polynomial else None,
-        },
-        "sigma0_combined_um": {
-            "linear": combined.residuals.sigma0_um,
-            "nonlinear": last.residuals.sigma0_um if calibration.nonlinear else None,
-        },
-        "means_um": placed.means_um,
-        "corrected_um": last.residuals.xy_um,
-        "residuals_comparator_um": last.residuals.comparator_um,
-        "residuals_grid_um": last.residuals.grid_um,
-        "stages": _stages(case, combined, last),
-        "linear": {
-            **_linear(parameters),
-            "rotation_rad": parameters.rotation_rad,
-            "translation_um": case.linear.translation_um,
-            "covariance": case.linear.covariance,
-        },
-        "polynomial": {
-            "coefficients_x": case.polynomial.polynomial.coefficients[0],
-            "coefficients_y": case.polynomial.polynomial.coefficients[1],
-            "covariance": case.polynomial.covariance,
-        }
-        if case.polynomial
-        else None,
-        "closeouts": [_closeout(closeout) for closeout in case.closeouts],
-    }
-
-
-def _stages(case: CaseResult, combined: RigidFit, last: RigidFit) -> dict[str, Any]:
-    """Residuals of every stage by name."""
-    stages = {
-        "free": case.free.residuals,
-        "linear": case.linear.residuals,
-        "combined_linear": combined.residuals,
-        "combined_last": last.residuals,
-    }
-    if case.polynomial:
-        stages["nonlinear"] = case.polynomial.residuals
-    return {name: _residuals(residuals) for name, residuals in stages.items()}
-
-
-def _residuals(residuals: Residuals) -> dict[str, Any]:
-    return {
-        "comparator_um": residuals.comparator_um,
-        "grid_um": residuals.grid_um,
-        "sum_vv_um2": residuals.squares_um2,
-        "sigma_um": residuals.sigma_um,
-    }
-
-
-def _closeout(closeout: Closeout) -> dict[str, Any]:
-    return {
-        "point": closeout.point,
-        "pointings": closeout.counts,
-        "sequential_shifts_um": closeout.sequential_shifts_um,
-        "total_shift_um": closeout.total_shift_um,
-        "verdict": closeout.verdict,
-    }
-
-
-def _polynomial(calibration: Calibration) -> dict[str, Any] | None:
     nonlinear, tests = calibration.nonlinear, calibration.polynomial_tests
-    if nonlinear is None or tests is None:
-        return None
+    polynomial = (
+        nonlinear
+        and tests
+        and {
+            **members(nonlinear, "sigma0_um", "sigma_um", "degrees_of_freedom", "covariance"),
+            **members(
+                tests, f_ratio="ratio", f_degrees_of_freedom="degrees_of_freedom", f_probability="probability"
+            ),
+        }
+    )
+    x, y = nonlinear.polynomial.coefficients if nonlinear else (None, None)
     return {
-        "sigma0_um": nonlinear.sigma0_um,
-        "sigma_um": nonlinear.sigma_um,
-        "degrees_of_freedom": nonlinear.degrees_of_freedom,
-        "covariance": nonlinear.covariance,
-        "f_ratio": tests.ratio,
-        "f_degrees_of_freedom": tests.degrees_of_freedom,
-        "f_probability": tests.probability,
-        "terms": records(terms(tests.terms)),
+        **members(calibration.session, "comparator", "date", secondary_stage="secondary"),
+        **members(
+            calibration,
+            "options",
+            "usable",
+            variance_components_um="variance.components_um",
+            case_variances="case_test",
+            joint_check_sd="joint_check",
+        ),
+        "left_handed": calibration.cases[0].placed.orientation.left_handed,
+        "conventions": CONVENTIONS,
+        "messages": [*map(str, calibration.messages)],
+        "verdict": calibration.verdict.document(),
+        "screening": members(calibration.screening, "limit", "change_um", "sigma_um", "ratios", "freedom"),
+        "linear": {
+            **members(own.correction, *LINEAR),
+            **members(own, "covariance", "sigma0_um", "degrees_of_freedom"),
+        },
+        "polynomial_x": x,
+        "polynomial_y": y,
+        "polynomial": polynomial,
+        "pointing": _pointing(calibration),
+        "grid_points": plates[0]["points"],
+        "grid_corrections_um": plates[0]["corrections_um"],
+        "sigma_grid_um": calibration.sigma_grid_um(plates[0]["plate"]),
+        "plates": plates,
+        "variance_analysis_um": {
+            "negative": calibration.variance.negative,
+            **{name: line and members(line, "x", "y", "total") for name, line in lines.items()},
+        },
+        "joint": joint and _joint_members(joint, usable=usable),
+        "correction": calibration.correction.document() if usable else None,
     }
 
 
 def _pointing(calibration: Calibration) -> dict[str, Any]:
-    """Precision by point (of each case, and over all cases), by case, by operator, and in all."""
-    pointing = calibration.pointing
-    read = [(case.number, each) for case in calibration.cases for each in case.placed.readings]
-    readings = [each for _, each in read]
-    points = [
-        Quantity([number for number, _ in read], member="case"),
-        of_each(readings, "point"),
-        of_each(readings, "mean_um"),
-        *precisions([each.precision for each in readings]),
-    ]
-    own = [case.placed.precision for case in calibration.cases]
+    """Return the precision by point (of each case, and over all cases), by case, by operator, and in all."""
+    pointing, placed = calibration.pointing, [case.placed for case in calibration.cases]
     return {
-        "points": records(points),
-        "cases": records([of_each(calibration.cases, "number", member="case"), *precisions(own)]),
+        "points": [
+            {"case": case.number, **members(each, "point", "mean_um"), **_precision(each.precision)}
+            for case in placed
+            for each in case.readings
+        ],
+        "cases": [{"case": case.number, **_precision(case.precision)} for case in placed],
         "operators": [
-            {"operator": operator, **_precision(total), "points": _by_point(of_points)}
-            for operator, (of_points, total) in pointing.operators.items()
+            {"operator": operator, **_precision(total), "points": _by_point(points)}
+            for operator, (points, total) in pointing.operators.items()
         ],
         "total": {**_precision(pointing.total), "by_point": _by_point(pointing.points)},
     }
 
 
-def _precision(precision: Precision) -> dict[str, Any]:
-    return records(precisions([precision]))[0]
+def _precision(found: Precision) -> dict[str, Any]:
+    own = members(
+        found,
+        *(
+            "readings",
+            "points",
+            "degrees_of_freedom",
+            "sd_um",
+            "sd_point_um",
+            "covariance_um2",
+            "correlation",
+        ),
+        correlation_percent="listed_correlation_percent",
+        sd_mean_um="mean_sd_um",
+        sd_mean_point_um="mean_sd_point_um",
+    )
+    return {**own, "ellipse": None if np.isnan(found.sd_point_um) else found.ellipse}
 
 
 def _by_point(points: dict[int, Precision]) -> list[dict[str, Any]]:
-    return records([Quantity([*points], member="point"), *precisions([*points.values()])])
+    return [{"point": point, **_precision(own)} for point, own in points.items()]
 
 
 def _plate(calibration: Calibration, result: PlateResult) -> dict[str, Any]:
     averages = result.averages
     grid = calibration.session.grids[averages.plate]
-    given = grid.xy_um[grid.rows_of(averages.points)]
-    corrections = averages.corrections_um
+    given, corrections = grid.xy_um[grid.rows_of(averages.points)], averages.corrections_um
     return {
-        "plate": averages.plate,
-        "adopted": grid.adopted,
-        "temperature_c": grid.temperature_c,
-        "expansion_per_k": grid.expansion_per_k,
-        "left_handed": averages.left_handed,
-        "points": averages.points,
-        "cases": averages.counts,
-        "corrections_um": averages.grid_um,
+        **members(grid, "adopted", "temperature_c", "expansion_per_k"),
+        **members(averages, "plate", "left_handed", "points", "by_location"),
+        **members(averages, cases="counts", corrections_um="grid_um"),
         "corrections_plate_um": corrections,
         "corrected_plate_um": given + corrections,
         "sigma_um": {
             "a_priori": grid.sigma_um,
-            "unbiased": result.unbiased_um,
-            "text": result.text_um,
-            "listing": result.listed.grid_um,
+            **members(result, unbiased="unbiased_um", text="text_um", listing="listed.grid_um"),
         },
-        "standard_deviation_um": {
-            "comparator": result.listed.mean_comparator_um,
-            "grid": result.listed.mean_grid_um,
-        },
+        "standard_deviation_um": members(result.listed, comparator="mean_comparator_um", grid="mean_grid_um"),
         "random_um": result.listed.random_um,
-        "by_location": averages.by_location,
     }
 
 
-def _variance(calibration: Calibration) -> dict[str, Any]:
-    """Return the lines of figure 30."""
-    variance = calibration.variance
-    lines = {
-        "before": variance.before,
-        "after_linear": variance.after_linear,
-        "after_nonlinear": variance.after_nonlinear,
-        "mean_pointing": variance.pointing,
-    }
-    document: dict[str, Any] = {
-        name: None if line is None else {"x": line.x, "y": line.y, "total": line.total}
-        for name, line in lines.items()
-    }
-    return {**document, "negative": variance.negative}
-
-
-def _joint(joint: JointFit, *, usable: bool) -> dict[str, Any]:
-    correction = joint.correction
+def _joint_members(joint: JointFit, *, usable: bool) -> dict[str, Any]:
     return {
-        **_linear(correction),
-        "covariance": joint.covariance,
-        "sigma0": joint.sigma0,
-        "degrees_of_freedom": joint.degrees_of_freedom,
-        "sigma_random_um": joint.random_um,
+        **members(joint.correction, *LINEAR),
+        **members(joint, "covariance", "sigma0", "degrees_of_freedom", sigma_random_um="random_um"),
         "cases": [
-            {
-                "case": case.number,
-                "rotation_rad": case.rotation_rad,
-                "translation_um": case.translation_um,
-                "residuals_comparator_um": case.residuals.comparator_um,
-                "standardized": case.standardized,
-            }
+            members(
+                case,
+                *("rotation_rad", "translation_um", "standardized"),
+                case="number",
+                residuals_comparator_um="residuals.comparator_um",
+            )
             for case in joint.cases
         ],
         "plates": [
-            {
-                "plate": number,
-                "points": plate.points,
-                "corrections_plate_um": plate.corrections_um,
-                "covariance_plate_um2": plate.covariance_um2,
-                "sigma_um": plate.sigma_um,
-                "sigma_estimated": plate.estimated,
-                "variance_ratio": plate.variance_ratio,
-                "test": plate.test,
-            }
-            for number, plate in joint.plates.items()
+            members(
+                own,
+                *("points", "sigma_um", "variance_ratio", "test"),
+                corrections_plate_um="corrections_um",
+                covariance_plate_um2="covariance_um2",
+                sigma_estimated="estimated",
+            )
+            | {"plate": plate}
+            for plate, own in joint.plates.items()
         ],
-        "correction": correction.document() if usable else None,
+        "correction": joint.correction.document() if usable else None,
     }

@@ -1,88 +1,92 @@
-"""What is known of a calibration, quantity by quantity, and what the verdict on it rests on."""
+"""The tables of a calibration, each declared once: document and listing are written from them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.comparator.calibration import Calibration
 from photogram.comparator.combined_solution import CombinedPolynomial
 from photogram.comparator.correction import Correction
-from photogram.comparator.joint import JointFit
-from photogram.comparator.outliers import FarPointing, Outlier
-from photogram.comparator.pointing import Precision
+from photogram.comparator.fits import Decomposition, Residuals
+from photogram.comparator.outliers import FarPointing, Screening
 from photogram.comparator.polynomial import TERMS
-from photogram.comparator.variance import TermTest
-from photogram.show.angles import ARCSEC
-from photogram.show.methods import findings_of
-from photogram.show.quantity import Axis, Quantity, component, of_each
-from photogram.statistics.findings import Findings, Systematic, Tested
+from photogram.comparator.variance import PolynomialTest
+from photogram.show.page import probability_written
+from photogram.show.quantity import Axis, Quantity, Table, component, members, members_of_each, of_each
+
+if TYPE_CHECKING:
+    from photogram.comparator import Calibration, CaseResult
 
 UM = (Axis.of("", "um"),)
 XY = (Axis.of("x", "um"), Axis.of("y", "um"))
-_LINEAR = (
-    Axis.of("Scale x", ""),
-    Axis.of("Scale y", ""),
-    Axis.of("Scale x over scale y", ""),
-    Axis.of("Lack of orthogonality α", "arcsec"),
+LINEAR = ("scale_x", "scale_y", "nonorthogonality_rad")
+LINEAR_AXES = (
+    Axis("Scale x"),
+    Axis("Scale y"),
+    Axis("Scale x over scale y"),
+    Axis.turned("Lack of orthogonality α"),
 )
 
 
-def variance(calibration: Calibration) -> list[Quantity]:
+def variance(calibration: Calibration) -> Table:
     """Return the analysis of variance: standard deviations of each axis and of both, line by line."""
-    own = calibration.variance
+    own, plates = calibration.variance, calibration.plates
     stages = {
         "Before the calibration, everything": own.before,
         "After the linear parameters": own.after_linear,
         "After linear parameters and polynomials": own.after_nonlinear,
         "Pointing, mean of a point": own.pointing,
     }
-    rows = {name: (each.x, each.y, each.total) for name, each in stages.items() if each is not None}
-    totals: dict[str, float | None] = {}
-    for plate in calibration.plates:
-        totals[f"Grid {plate}, given"] = calibration.session.grids[plate].sigma_um
-        totals[f"Grid {plate}, computed without bias"] = calibration.sigma_grid_um(plate)
-    totals["Systematic comparator, linear"] = own.linear
-    totals["Systematic comparator, polynomials"] = own.nonlinear
-    totals["Random comparator"] = own.random
-    values = np.array([*rows.values(), *((None, None, total) for total in totals.values())], dtype=float)
-    axes = (*XY, Axis.of("Total", "um"))
-    return [
-        Quantity([*rows, *totals], kind="name", head="Standard deviation"),
-        Quantity(values, axes, "deviation", head="{}", decimals=3),
+    totals: dict[str, float | None] = {
+        **{f"Grid {plate}, given": calibration.session.grids[plate].sigma_um for plate in plates},
+        **{f"Grid {plate}, computed without bias": calibration.sigma_grid_um(plate) for plate in plates},
+        "Systematic comparator, linear": own.linear,
+        "Systematic comparator, polynomials": own.nonlinear,
+        "Random comparator": own.random,
+    }
+    rows = [(each.x, each.y, each.total) if each else (None,) * 3 for each in stages.values()]
+    values = np.array([*rows, *((None, None, total) for total in totals.values())], dtype=float)
+    columns = [
+        Quantity([*stages, *totals], kind="name", head="Standard deviation"),
+        Quantity(values, (*XY, Axis.of("Total", "um")), "deviation", head="{}", decimals=3),
     ]
+    note = f"Negative variances, set to 0: {', '.join(own.negative)}." if own.negative else ""
+    about = (
+        "Standard deviations: what a coordinate is uncertain by before and after each step, and the parts of"
+        " comparator, grid and pointing in it."
+    )
+    return Table("variance", "Analysis of variance", columns, note, about)
 
 
-def linear(correction: Correction, covariance: Floats) -> list[Quantity]:
-    """Return scales, their ratio and the lack of orthogonality, each in a row, with standard deviations.
-
-    Parameters
-    ----------
-    correction
-        What has them.
-    covariance
-        (3, 3) of scale x, scale y, lack of orthogonality (rad).
-    """
-    x, y, lean = correction.scale_x, correction.scale_y, correction.nonorthogonality_rad
+def linear(
+    found: Correction | Decomposition, covariance: Floats, freedom: int = 0, key: str = "linear"
+) -> Table:
+    """Return scales, their ratio, lack of orthogonality with deviations by the covariance of the three."""
+    x, y, lean = (getattr(found, name) for name in LINEAR)
     of_ratio = np.array([1 / y, -x / y**2])
-    variances = [*np.diag(covariance)[:2], of_ratio @ covariance[:2, :2] @ of_ratio]
-    sd = np.array([*np.sqrt(variances), np.sqrt(covariance[2, 2]) / ARCSEC])
-    scales, of = np.array([x, y, x / y]), np.arange(4)
-    less_one = np.array([*(1e6 * (scales - 1)), np.nan])
-    axis = (Axis.of("", "um/m"),)
-    return [
-        component(_LINEAR, of)[0],
-        Quantity(np.array([*scales, lean / ARCSEC]), _LINEAR, "value", head="Value", of=of),
-        Quantity(sd, _LINEAR, "deviation", head="sd", of=of),
-        Quantity(less_one, axis, "deviation", head="Less one", decimals=2),
+    sd = np.sqrt([*np.diag(covariance)[:2], of_ratio @ covariance[:2, :2] @ of_ratio, covariance[2, 2]])
+    values, of = np.array([x, y, x / y, lean]), np.arange(4)
+    less_one = np.array([*(1e6 * (values[:3] - 1)), np.nan])
+    columns = [
+        component(LINEAR_AXES, of)[0],
+        Quantity(values, LINEAR_AXES, "difference", head="Value", of=of),
+        Quantity(sd, LINEAR_AXES, "deviation", head="sd", of=of),
+        Quantity(less_one, (Axis.of("", "um/m"),), "deviation", head="Less one", decimals=2),
     ]
+    about = (
+        "Scales by which readings are multiplied, less one in micrometres a metre, and the lack of"
+        " orthogonality of the axes."
+    )
+    return Table(key, "Linear parameters", columns, f"{freedom} degrees of freedom", about, sd)
 
 
-def terms(found: Sequence[TermTest]) -> list[Quantity]:
+def terms(test: PolynomialTest) -> Table:
     """Return the terms of the polynomials with their tests."""
-    return [
+    found, (first, second) = test.terms, test.degrees_of_freedom
+    columns = [
         of_each(found, "axis", kind="name", head="Axis"),
         of_each(found, "term", kind="name"),
         _powers([each.term for each in found]),
@@ -91,150 +95,145 @@ def terms(found: Sequence[TermTest]) -> list[Quantity]:
         of_each(found, "ratio", head="t", decimals=2),
         of_each(found, "probability", head="p", figures=2),
     ]
+    p = "" if test.probability is None else f", p = {probability_written(test.probability)}"
+    note = f"All terms together: F = {test.ratio:.2f} with {first} and {second} degrees of freedom{p}."
+    return Table("polynomial.terms", "Terms and their tests", columns, note)
 
 
-def coefficients(found: CombinedPolynomial) -> list[Quantity]:
+def coefficients(found: CombinedPolynomial) -> Table:
     """Return the coefficients of the polynomials, arguments in metres."""
     axis, sd = (Axis.of("", "m"),), np.sqrt(np.diag(found.covariance)).reshape(2, -1)
-    table = [_powers(TERMS)]
+    columns = [_powers(TERMS)]
     for name, values, own in zip("xy", found.polynomial.coefficients, sd, strict=True):
-        table += [
+        columns += [
             Quantity(values, axis, "value", head=f"In {name}", figures=6),
             Quantity(own, axis, "deviation", head="sd"),
         ]
-    return table
+    return Table("coefficients", "Coefficients, arguments in metres", columns)
 
 
-def _powers(terms: Sequence[str]) -> Quantity:
+def _powers(names: Sequence[str]) -> Quantity:
     raised = str.maketrans({"^": "", "2": "²", "3": "³", "4": "⁴"})
-    return Quantity([each.translate(raised) for each in terms], kind="name", head="Term")
+    return Quantity([each.translate(raised) for each in names], kind="name", head="Term")
 
 
-def cases(calibration: Calibration) -> list[Quantity]:
-    """Return the cases with what each adjustment of them alone left."""
-    found = calibration.cases
-    stages = {"Unit weight, free": "free", "after linear": "linear", "after polynomials": "polynomial"}
-    fits = {head: [getattr(each, name) for each in found] for head, name in stages.items()}
-    sigmas = {
-        head: np.array([each.residuals.sigma0_um if each else np.nan for each in own])
-        for head, own in fits.items()
-    }
-    measured = [each.placed.case for each in found]
-    return [
-        of_each(found, "number", kind="name", head="Case"),
-        of_each(measured, "plate", kind="name", head="Plate"),
-        of_each(measured, "operator", kind="name", head="Operator"),
-        Quantity([len(each.placed.points) for each in found], head="Points"),
-        *(Quantity(own, UM, "deviation", head=head, decimals=3) for head, own in sigmas.items()),
+def cases(calibration: Calibration) -> Table:
+    """Return the cases with the adjustments of each alone, and with their parts in those of all."""
+    found, last, combined = calibration.cases, calibration.last_fits, calibration.linear.cases
+    heads = {"free": "Unit weight, free", "linear": "after linear", "nonlinear": "after polynomials"}
+    alone = [
+        members(case, free="free.residuals.sigma0_um", linear="linear.residuals.sigma0_um")
+        | {"nonlinear": case.polynomial and case.polynomial.residuals.sigma0_um}
+        for case in found
     ]
+    together = [
+        {
+            "linear": one.residuals.sigma0_um,
+            "nonlinear": two.residuals.sigma0_um if calibration.nonlinear else None,
+        }
+        for one, two in zip(combined, last, strict=True)
+    ]
+    stages = [
+        {"combined_linear": one.residuals, "combined_last": two.residuals, **_stages(case)}
+        for case, one, two in zip(found, combined, last, strict=True)
+    ]
+    columns = [
+        of_each(found, "number", kind="name", member="case", head="Case"),
+        of_each(found, "placed.case.plate", kind="name", member="plate", head="Plate"),
+        of_each(found, "placed.case.operator", kind="name", member="operator", head="Operator"),
+        Quantity([len(each.placed.points) for each in found], head="Points"),
+        *(
+            Quantity(
+                np.array([each[stage] for each in alone], dtype=float), UM, "deviation", head=head, decimals=3
+            )
+            for stage, head in heads.items()
+        ),
+        *members_of_each(
+            found,
+            points="placed.points",
+            means_um="placed.means_um",
+            nearest_point="placed.orientation.nearest_point",
+            corner="placed.orientation.corner",
+            left_handed="placed.orientation.left_handed",
+        ),
+        *members_of_each(combined, "rotation_rad", "translation_um"),
+        *members_of_each(
+            last,
+            corrected_um="residuals.xy_um",
+            residuals_comparator_um="residuals.comparator_um",
+            residuals_grid_um="residuals.grid_um",
+        ),
+        Quantity(alone, member="sigma0_um"),
+        Quantity(together, member="sigma0_combined_um"),
+        Quantity([{name: _residuals(each) for name, each in own.items()} for own in stages], member="stages"),
+        Quantity([_linear(case) for case in found], member="linear"),
+        Quantity([_polynomial(case) for case in found], member="polynomial"),
+        Quantity([_closeouts(case) for case in found], member="closeouts"),
+    ]
+    note, test = "", calibration.case_test
+    if test is not None and test.f_max_limit is not None:
+        same = "are" if test.f_max <= test.f_max_limit else "are not"
+        note = (
+            f"F-max = {test.f_max:.2f}, limit {test.f_max_limit:.2f}: the cases {same} of one population"
+            " (95 percent)."
+        )
+    return Table("cases", "Cases", columns, note)
 
 
-def outliers(found: Sequence[Outlier]) -> list[Quantity]:
+def _stages(case: CaseResult) -> dict[str, Residuals]:
+    """Return the residuals of the adjustments of a case alone."""
+    found = {"free": case.free.residuals, "linear": case.linear.residuals}
+    return found | ({"nonlinear": case.polynomial.residuals} if case.polynomial else {})
+
+
+def _residuals(found: Residuals) -> dict[str, object]:
+    return members(found, "comparator_um", "grid_um", "sigma_um", sum_vv_um2="squares_um2")
+
+
+def _linear(case: CaseResult) -> dict[str, object]:
+    own = members(case.linear.parameters, *LINEAR, "rotation_rad")
+    return own | members(case.linear, "translation_um", "covariance")
+
+
+def _polynomial(case: CaseResult) -> dict[str, object] | None:
+    if case.polynomial is None:
+        return None
+    x, y = case.polynomial.polynomial.coefficients
+    return {"coefficients_x": x, "coefficients_y": y, "covariance": case.polynomial.covariance}
+
+
+def _closeouts(case: CaseResult) -> list[dict[str, object]]:
+    names = ("point", "sequential_shifts_um", "total_shift_um", "verdict")
+    return [members(each, *names, pointings="counts") for each in case.closeouts]
+
+
+def outliers(screening: Screening) -> Table:
     """Return measured points that do not agree with the adjustment of the others."""
+    found = screening.outliers
     instead = ["none" if each.instead is None else str(each.instead) for each in found]
-    return [
+    columns = [
         of_each(found, "case", kind="name", head="Case"),
         of_each(found, "point", kind="name", head="Point"),
         of_each(found, "off_um", XY, "deviation", head="Off in {}", decimals=2),
         of_each(found, "ratio", head="Test value t", decimals=2),
+        of_each(found, "instead", kind="name"),
         Quantity(instead, kind="name", head="Point that is expected there"),
     ]
+    note = (
+        f"Beyond {screening.limit:.2f} the test rejects. They change corrected coordinates by"
+        f" {screening.change_um:.2f} µm (root mean square)."
+    )
+    return Table("screening.outliers", "Points", columns, note)
 
 
-def far_pointings(found: Sequence[FarPointing]) -> list[Quantity]:
+def far_pointings(found: Sequence[FarPointing]) -> Table:
     """Return single pointings that do not agree with the others of their case."""
-    return [
+    columns = [
         of_each(found, "case", kind="name", head="Case"),
         of_each(found, "point", kind="name", head="Point"),
         Quantity([each.row + 1 for each in found], head="Pointing"),
         of_each(found, "deviation_um", UM, "deviation", head="Deviation from the mean", decimals=2),
         of_each(found, "ratio", head="Over its sd", decimals=2),
+        *members_of_each(found, "row", "limit"),
     ]
-
-
-def precisions(found: Sequence[Precision]) -> list[Quantity]:
-    """Return precisions of pointing, of whatever they are."""
-    ellipses = [None if np.isnan(each.sd_point_um) else each.ellipse for each in found]
-    return [
-        of_each(found, "readings"),
-        of_each(found, "points"),
-        of_each(found, "degrees_of_freedom"),
-        of_each(found, "sd_um"),
-        of_each(found, "sd_point_um"),
-        of_each(found, "covariance_um2"),
-        of_each(found, "correlation"),
-        of_each(found, "listed_correlation_percent", member="correlation_percent"),
-        of_each(found, "mean_sd_um", member="sd_mean_um"),
-        of_each(found, "mean_sd_point_um", member="sd_mean_point_um"),
-        Quantity(ellipses, member="ellipse"),
-    ]
-
-
-FAR = 3.0
-"""A grid that differs from its values by so many times their standard deviation is another grid."""
-
-
-@findings_of.register(Calibration)
-def comparator_findings(calibration: Calibration) -> Findings:
-    """Return the tests of a calibration: readings have no standard deviation of their own, t decides."""
-    screening = calibration.screening
-    places = [
-        (case.number, point, axis)
-        for case in calibration.cases
-        for point in case.placed.points.tolist()
-        for axis in "xy"
-    ]
-
-    def name(index: tuple[int, ...]) -> str:
-        case, point, axis = places[index[0]]
-        return f"{axis} of point {point} of case {case}"
-
-    values = np.vstack(screening.ratios).ravel()
-    readings = Tested("readings of the grid", values, name, "t", second=max(screening.freedom - 1, 1))
-    tests = calibration.pointing_tests
-    rows = [(each.case, row, axis) for each in tests for row in range(len(each.ratios)) for axis in "xy"]
-
-    def pointing(index: tuple[int, ...]) -> str:
-        case, row, axis = rows[index[0]]
-        return f"{axis} of pointing {row + 1}, point {case.points[row]} of case {case.number}"
-
-    ratios = np.concatenate([each.ratios.ravel() for each in tests])
-    freedom = np.repeat([each.freedom for each in tests], [each.ratios.size for each in tests])
-    pointings = Tested("pointings", ratios, pointing, "t", second=np.maximum(freedom - 1.0, 1.0))
-    return Findings(
-        status="converged",
-        observations=[readings, pointings],
-        degrees_of_freedom=screening.freedom,
-        untested="readings have no standard deviation of their own",
-        spoiled=f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
-        f" and a coordinate is uncertain by {screening.sigma_um:.3f} um"
-        if screening.harmful
-        else "",
-        systematic=_grids(calibration.joint) if calibration.joint else [],
-        if_usable=[
-            "Correct measurements with `photogram comparator correct correction.json FILE`.",
-            "Keep the document of `--json`: `photogram comparator compare` finds what changes over years.",
-        ],
-        if_withheld=[
-            "The correction is withheld: measure the readings that are named again, or leave them out."
-        ],
-    )
-
-
-def _grids(joint: JointFit) -> list[Systematic]:
-    """Return the tests of the corrections of the plates against their standard deviations."""
-    return [
-        Systematic(
-            name=f"corrections of plate {plate}",
-            sentence=f"the grid of plate {plate} is off by {own.test.factor:.3g} standard deviations",
-            statistic="s^2",
-            distribution="chi2/f",
-            dof=(own.test.degrees_of_freedom,),
-            value=own.test.variance,
-            probability=own.test.probability_above,
-            level=own.test.level / 2,
-            large=own.test.factor > FAR,
-        )
-        for plate, own in joint.plates.items()
-        if own.test is not None
-    ]
+    return Table("far_pointings", "Single pointings", columns)

@@ -8,6 +8,7 @@ from typing import Any
 
 from photogram import _photocore
 from photogram.io import json
+from photogram.show import quantity
 from photogram.show.cells import written
 from photogram.show.lines import fact_lines
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Section, Table, Text
@@ -77,6 +78,8 @@ def _spaced(parts: Iterable[list[str]]) -> list[str]:
 
 def part_lines(part: Part, title: str = "") -> list[str]:
     """Return the lines of a part below a title; none for plots."""
+    if isinstance(part, quantity.Table) and not part.visible:
+        return []
     match written(part):
         case Table() as table if table.rows:
             caption = [table.caption] if table.caption not in ("", title) else []
@@ -94,11 +97,11 @@ def part_lines(part: Part, title: str = "") -> list[str]:
 
 
 def summary(document: Document, *keys: str) -> list[str]:
-    """Return the lines of a summary: verdict, advice, tables with these keys, highlights."""
+    """Return the lines of a summary: verdict, advice, tables with these keys (also in layers), highlights."""
     lines = [f"verdict: {each.headline}" for each in document.judgements]
     lines += [f"next: {sentence}" for sentence in document.advice]
-    for table in document.tables():
-        if table.key in keys:
+    for table in document.tables(layers=True):
+        if table.key in keys and table.visible:
             lines += [each for each in (table.note, *table_text(written(table))) if each]
     lines += [line.translate(PLAIN) for line in fact_lines(document.highlights)]
     return [f"{document.what}: {document.title}", *(f"  {line}" for line in lines)]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.show.cells import page_table, unit_written
+from photogram.show import quantity
+from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, tests_section
-from photogram.show.lines import Field, field, table_lines
-from photogram.show.page import Document, Drawing, Fact, Part, Section, Table, decimals_of
-from photogram.show.quantity import Axis, Quantities, Quantity, component, members, of_each, records
+from photogram.show.page import Document, Drawing, Section, layered
+from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each
 from photogram.show.sketch.declared import Panel, Sketch, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers, Segments, error_bars
 from photogram.show.style import FAINT, INK, MARKED
@@ -26,15 +26,35 @@ ACROSS = 3
 """Charts beside each other."""
 
 
-def series(history: History) -> list[Quantity]:
-    """Return a row for each quantity: mean, drift, the largest test of a step, and what was found."""
+def history_part(history: History, whose: str, about: str = "", **members: object) -> Document:
+    """Return the document of a thing: changes, introduced by `about`, all values, and further members."""
+    sums = history.constancy
+    return Document(
+        what="",
+        title=whose,
+        judgements=[],
+        advice=[],
+        highlights=[],
+        sections=[Section.of(series(history, about)), Section.of(values(history))],
+        members={
+            **members,
+            **quantity.members(history, "occasions", "times", "tests", "level", "limit"),
+            "constancy": quantity.members(
+                sums, "variance", "degrees_of_freedom", probability="probability_above"
+            ),
+        },
+    )
+
+
+def series(history: History, about: str = "") -> Table:
+    """Return a row for each quantity: mean, drift, the largest test of a step, and the changes."""
     own = history.series
     axes = tuple(Axis.of(each.name, each.unit) for each in own)
-    of, found = np.arange(len(own)), [", ".join(change.kind for change in each.changes) for each in own]
+    of, changes = np.arange(len(own)), [", ".join(change.kind for change in each.changes) for each in own]
     steps = [max((t for t in each.steps.tolist() if t == t), key=abs, default=np.nan) for each in own]
     p = [each.test.probability_above if each.test else None for each in own]
-    names = [found_ or "constant" for found_ in found]
-    return [
+    columns = [
+        *members_of_each(own, "name", "unit", "values", "sd", "model", "off", "off_sd", steps_t="steps"),
         component(axes, of)[0],
         of_each(own, "mean", axes, "value", of=of, head="Mean"),
         of_each(own, "mean_sd", axes, "deviation", of=of, head="sd", figures=2),
@@ -42,92 +62,31 @@ def series(history: History) -> list[Quantity]:
         of_each(own, "drift_sd", axes, "deviation", of=of, head="sd", figures=2),
         Quantity(np.array(steps), head="Largest t of a step", decimals=2),
         Quantity(p, head="p of constancy", member="probability", figures=2),
-        Quantity(names, kind="name", head="Found", marked=np.array([bool(each) for each in found])),
+        Quantity(
+            [kinds or "constant" for kinds in changes],
+            kind="name",
+            head="Found",
+            marked=np.array([bool(kinds) for kinds in changes]),
+        ),
+        Quantity([_changes(history, each) for each in own], member="changes"),
     ]
-
-
-def series_table(history: History, whose: str) -> Table:
-    """Return one line for each quantity: mean, drift, the largest test of a step, and what was found."""
     note = (
         f"Of {history.tests} single tests together one rejects by chance with probability {history.level:g}:"
         f" |t| beyond {history.limit:.3g} is accepted. Drift and steps as if nothing else changed."
     )
-    return page_table(f"What changed in {whose}", series(history), note, _deviations(history))
+    return Table("series", "What changed", columns, note, about, _deviations(history))
 
 
-def series_lines(history: History) -> list[str]:
-    """Return the same as lines of text; times are years."""
-    components, mean, mean_sd, drift, drift_sd, steps, _, found = series(history)
-    forms = [f".{decimals_of(each.sd)}f" for each in history.series]
-    return table_lines(
-        [
-            *field(components, 36, gap="  "),
-            *field(mean, 9, forms, "mean"),
-            *field(mean_sd, 9, forms, "sd"),
-            *field(drift, 14, forms, "drift a year"),
-            *field(drift_sd, 9, forms, "sd"),
-            *field(steps, 8, ".2f", "step t"),
-            *field(found, 0, head="found", gap="  "),
-        ]
-    )
-
-
-def history_text(calibrations: Sequence[Field], histories: Mapping[str, History]) -> list[str]:
-    """Return calibrations as lines of text, and what changed in some things, by what stands above each."""
-    lines = table_lines(calibrations)
-    for whose, own in histories.items():
-        lines += ["", whose, *series_lines(own)]
-    return lines
-
-
-def history_page(
-    what: str,
-    calibrations: Quantities,
-    histories: Mapping[str, History],
-    verdict: Verdict,
-    highlights: Sequence[Fact],
-    *,
-    intro: str = "",
-    more: Sequence[Section] = (),
-) -> Document:
-    """Return the page of calibrations in the order of their days, with what changed and `more` sections."""
-    days = next(each.values for each in calibrations if each.member == "day")
-    named = histories.items()
-    sections = [
-        charts_section(histories),
-        Section("changes", "What changed", [series_table(own, name) for name, own in named], intro),
-        Section("calibrations", "Calibrations", [page_table("Calibrations", calibrations)]),
-        *more,
-        Section("values", "All values", [values_table(own, name) for name, own in named]),
-        tests_section(verdict),
+def _changes(history: History, own: Series) -> list[dict[str, object]]:
+    return [
+        quantity.members(change, "kind", "size", "sd", "log10_p", "sentence", t="statistic")
+        | {"occasion": None if change.at is None else history.occasions[change.at]}
+        for change in own.changes
     ]
-    return Document(
-        what=what,
-        title=f"{len(days)} calibrations, {days[0]} to {days[-1]}",
-        judgements=[judged(verdict)],
-        advice=verdict.next,
-        highlights=highlights,
-        sections=sections,
-    )
 
 
-def charts_section(histories: Mapping[str, History]) -> Section:
-    """Return the control charts of some things, by their names, as a section of a page."""
-    charts: list[Part] = [
-        Drawing(f"charts-{k}", name, "", partial(control_charts, own, name[:1].upper() + name[1:]))
-        for k, (name, own) in enumerate(histories.items())
-    ]
-    return Section("charts", "Control charts", charts, _CHARTS)
-
-
-_CHARTS = (
-    "Each value with its standard deviation; the line is the mean of all. Dashed: beyond, a value differs"
-    " from all others, whose common errors are taken into account. Coloured: what was accepted as a change."
-)
-
-
-def values_table(history: History, whose: str) -> Table:
-    """Return all values: what was determined on each occasion, and how far it is from the others."""
+def values(history: History) -> Table:
+    """Return all values: each occasion, and the difference from the others."""
     own, occasions = history.series, history.occasions
     axes = tuple(Axis.of(each.name, each.unit) for each in own)
     of = np.repeat(np.arange(len(own)), len(occasions))
@@ -135,7 +94,7 @@ def values_table(history: History, whose: str) -> Table:
         np.concatenate([getattr(each, name) for each in own]) for name in ("values", "sd", "off", "off_sd")
     )
     t = off / off_sd
-    table = [
+    columns = [
         component(axes, of)[0],
         Quantity([*occasions] * len(own), kind="name", head="Occasion"),
         Quantity(values, axes, "value", head="Value", of=of),
@@ -143,11 +102,54 @@ def values_table(history: History, whose: str) -> Table:
         Quantity(off, axes, "deviation", head="Less the others", of=of),
         Quantity(t, head="t", decimals=2, marked=np.abs(t) > history.limit),
     ]
-    return page_table(f"All values of {whose}", table, by=_deviations(history))
+    return Table("values", "All values", columns, deviations=_deviations(history))
 
 
 def _deviations(history: History) -> Floats:
     return np.array([each.sd for each in history.series]).T
+
+
+def history_document(
+    what: str,
+    calibrations: Table,
+    histories: Mapping[str, History],
+    parts: Sequence[Document],
+    verdict: Verdict,
+    *,
+    more: Sequence[Section] = (),
+    **fields: Any,
+) -> Document:
+    """Return the document of calibrations in the order of their days, with what changed and `more` sections.
+
+    `parts` are the documents of the histories; their tables are layers. `fields` are further fields.
+    """
+    days = next(column.values for column in calibrations.columns if column.member == "day")
+    changes = layered("", "", parts).sections
+    charts = [
+        Drawing(f"charts-{k}", name, "", partial(control_charts, own, name[:1].upper() + name[1:]))
+        for k, (name, own) in enumerate(histories.items())
+    ]
+    return Document(
+        what=what,
+        title=f"{len(days)} calibrations, {days[0]} to {days[-1]}",
+        judgements=[judged(verdict)],
+        advice=verdict.next,
+        sections=[
+            Section("charts", "Control charts", charts, _CHARTS),
+            *changes[:1],
+            Section.of(calibrations),
+            *more,
+            *changes[1:],
+            tests_section(verdict),
+        ],
+        **fields,
+    )
+
+
+_CHARTS = (
+    "Each value with its standard deviation; the line is the mean of all. Dashed: beyond, a value differs"
+    " from all others, whose common errors are taken into account. Coloured: what was accepted as a change."
+)
 
 
 def control_charts(history: History, title: str) -> Sketch:
@@ -181,25 +183,3 @@ def _chart(history: History, own: Series) -> Panel:
         marks.append(Markers(places[beyond], "o", 6.0, MARKED, "none"))
     up = spread(own.values - own.sd, own.values + own.sd, expected - room, expected + room)
     return Panel(np.column_stack([spread(t), up]), marks, own.name, "", unit_written(own.unit))
-
-
-def history_document(history: History) -> dict[str, object]:
-    """Return a history as plain values for a JSON document."""
-    own = history.series
-    changes = [
-        [
-            members(change, "kind", "size", "sd", t="statistic", log10_p="log10_p")
-            | {"occasion": None if change.at is None else history.occasions[change.at]}
-            | {"sentence": change.sentence}
-            for change in each.changes
-        ]
-        for each in own
-    ]
-    more = [of_each(own, name) for name in ("name", "unit", "values", "sd", "model", "off", "off_sd")]
-    table = [*more, *series(history), of_each(own, "steps", member="steps_t")]
-    return {
-        **members(history, "occasions", "times", "tests", "level", "limit"),
-        "constancy": members(history.constancy, "variance", "degrees_of_freedom")
-        | {"probability": history.constancy.probability_above},
-        "series": records([*table, Quantity(changes, member="changes")]),
-    }

@@ -300,14 +300,16 @@ class Document:
         """Return the page with more sections at its end."""
         return replace(self, sections=[*self.sections, *more])
 
-    def tables(self) -> list[quantity.Table]:
-        """Return the tables of all sections and details, without those in layers."""
-        parts = (part for section in (*self.sections, *self.details) for part in section.parts)
+    def tables(self, *, layers: bool = False) -> list[quantity.Table]:
+        """Return the tables of all sections and details, with those in layers on request."""
+        parts = [part for section in (*self.sections, *self.details) for part in section.parts]
+        if layers:
+            parts = [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]
         return [part for part in parts if isinstance(part, quantity.Table)]
 
     def table(self, key: str) -> quantity.Table:
-        """Return the table with a key."""
-        return next(table for table in self.tables() if table.key == key)
+        """Return the table with a key, the first of several layers."""
+        return next(table for table in self.tables(layers=True) if table.key == key)
 
 
 def layered(what: str, title: str, documents: Sequence[Document], **more: Any) -> Document:

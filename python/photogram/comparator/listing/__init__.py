@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from photogram.comparator.calibration import Calibration, CaseResult
+from typing import TYPE_CHECKING
+
 from photogram.comparator.listing.forms import residual_page
 from photogram.comparator.listing.parameters import (
     case_linear_page,
@@ -15,6 +16,9 @@ from photogram.comparator.listing.parameters import (
     tests_page,
 )
 from photogram.comparator.listing.readings import averages_page, input_page, pointing_pages, title_page
+
+if TYPE_CHECKING:
+    from photogram.comparator import Calibration, CaseResult
 
 __all__ = ["listing"]
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.comparator.calibration import CaseResult
 from photogram.comparator.fits import Residuals
 from photogram.show.angles import degrees_minutes_seconds
+
+if TYPE_CHECKING:
+    from photogram.comparator import CaseResult
 
 WIDTH = 110
 

@@ -3,41 +3,43 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.comparator.calibration import Calibration, CaseResult
 from photogram.comparator.combined_solution import SinglePolynomial
+from photogram.comparator.correction import Correction
+from photogram.comparator.fits import Decomposition
 from photogram.comparator.joint import JointFit, JointPlate
 from photogram.comparator.listing.forms import angle, centred, nearest, number, residual_lines, triangle
 from photogram.comparator.polynomial import TERMS, Polynomial
-from photogram.comparator.tables import terms
-from photogram.comparator.variance import AxisSigma, CaseVarianceTest, PolynomialTest
+from photogram.comparator.tables import linear, terms, variance
+from photogram.comparator.variance import CaseVarianceTest, PolynomialTest
 from photogram.show.angles import ARCSEC
 from photogram.show.lines import field, table_lines
 from photogram.show.page import probability_written
 
+if TYPE_CHECKING:
+    from photogram.comparator import Calibration, CaseResult
+
 NAMES = ("SCALE X", "SCALE Y", "ALPHA")
 LETTERS = "ABCDEFGHJ"
+STAGES = 4  # lines of the analysis of variance with values of both axes
 
 
-def linear_lines(scale_x: float, scale_y: float, lean: float, covariance: Floats) -> list[str]:
+def linear_lines(found: Correction | Decomposition, covariance: Floats) -> list[str]:
     """Return scales and lack of orthogonality with their standard deviations and covariances."""
-    sd = np.sqrt(np.diag(covariance))
-    ratio = scale_x / scale_y
+    (x, y, ratio, lean), sd, less_one = (column.values for column in linear(found, covariance).columns[1:])
+    of_x, of_y, of_ratio = (f"{value:10.4f} MICRONS/METER" for value in less_one[:3])
     return [
-        f"  SCALER X {scale_x:14.8f}   SIGMA {sd[0]:12.5E}   SX - 1 = {_ppm(scale_x)}",
-        f"  SCALER Y {scale_y:14.8f}   SIGMA {sd[1]:12.5E}   SY - 1 = {_ppm(scale_y)}",
-        f"  SX/SY    {ratio:14.8f}   {'':18}   SX/SY-1= {_ppm(ratio)}",
-        f"  LACK OF ORTHOGONALITY ALPHA {angle(lean)}   SIGMA {sd[2] / ARCSEC:8.3f} SEC",
+        f"  SCALER X {x:14.8f}   SIGMA {sd[0]:12.5E}   SX - 1 = {of_x}",
+        f"  SCALER Y {y:14.8f}   SIGMA {sd[1]:12.5E}   SY - 1 = {of_y}",
+        f"  SX/SY    {ratio:14.8f}   {'':18}   SX/SY-1= {of_ratio}",
+        f"  LACK OF ORTHOGONALITY ALPHA {angle(lean)}   SIGMA {sd[3] / ARCSEC:8.3f} SEC",
         "  VARIANCES AND COVARIANCES (ALPHA IN RADIANS)",
         *triangle(NAMES, covariance[:3, :3]),
     ]
-
-
-def _ppm(scale: float) -> str:
-    return f"{1e6 * (scale - 1):10.4f} MICRONS/METER"
 
 
 def polynomial_lines(x: Floats, y: Floats, covariance: Floats) -> list[str]:
@@ -61,7 +63,7 @@ def case_linear_page(case: CaseResult) -> list[str]:
         *centred(f"CASE NUMBER {case.number} LINEAR ADJUSTMENT"),
         nearest(case),
         "",
-        *linear_lines(own.scale_x, own.scale_y, own.nonorthogonality_rad, fit.covariance),
+        *linear_lines(own, fit.covariance),
         f"  ROTATION {angle(own.rotation_rad)}   SIGMA {math.sqrt(fit.covariance[3, 3]) / ARCSEC:8.3f} SEC",
         "",
         *residual_lines(fit.residuals),
@@ -85,19 +87,18 @@ def case_polynomial_page(case: CaseResult, single: SinglePolynomial) -> list[str
 
 def combined_linear_page(calibration: Calibration) -> list[str]:
     """Return the combined linear adjustment."""
-    linear = calibration.linear
-    own = linear.correction
+    combined = calibration.linear
     placements = [
         f"  CASE {case.number:3d}  ROTATION {angle(fit.rotation_rad)}   TRANSLATION"
         f"{fit.translation_um[0]:14.2f}{fit.translation_um[1]:14.2f} MICRONS"
-        for case, fit in zip(calibration.cases, linear.cases, strict=True)
+        for case, fit in zip(calibration.cases, combined.cases, strict=True)
     ]
     return [
         *centred(f"COMBINED LINEAR ADJUSTMENT OF {len(calibration.cases)} CASES"),
-        *linear_lines(own.scale_x, own.scale_y, own.nonorthogonality_rad, linear.covariance),
+        *linear_lines(combined.correction, combined.covariance),
         "",
-        f"  STANDARD ERROR OF UNIT WEIGHT = {linear.sigma0_um:.4f} MICRONS"
-        f"   DEGREES OF FREEDOM = {linear.degrees_of_freedom}",
+        f"  STANDARD ERROR OF UNIT WEIGHT = {combined.sigma0_um:.4f} MICRONS"
+        f"   DEGREES OF FREEDOM = {combined.degrees_of_freedom}",
         "",
         *placements,
     ]
@@ -172,10 +173,9 @@ def _inside(polynomial: Polynomial, places_um: Floats) -> list[bool]:
 
 def summary_page(calibration: Calibration) -> list[str]:
     """Return the summary: analysis of variance, linear parameters, polynomials."""
-    session, linear, nonlinear = calibration.session, calibration.linear, calibration.nonlinear
+    session, combined, nonlinear = calibration.session, calibration.linear, calibration.nonlinear
     operators = ", ".join(str(operator) for operator in calibration.pointing.operators)
     plates = ", ".join(str(plate) for plate in calibration.plates)
-    own = linear.correction
     lines = [
         *centred("CALIBRATION SUMMARY"),
         f"  COMPARATOR NUMBER {session.comparator}   {len(calibration.cases)} CASES   OPERATOR {operators}"
@@ -184,7 +184,7 @@ def summary_page(calibration: Calibration) -> list[str]:
         *variance_lines(calibration),
         "",
         "LINEAR PARAMETERS",
-        *linear_lines(own.scale_x, own.scale_y, own.nonorthogonality_rad, linear.covariance),
+        *linear_lines(combined.correction, combined.covariance),
     ]
     if nonlinear:
         x, y = nonlinear.polynomial.coefficients
@@ -194,42 +194,22 @@ def summary_page(calibration: Calibration) -> list[str]:
 
 def variance_lines(calibration: Calibration) -> list[str]:
     """Return the analysis of variance, standard deviations in micrometres."""
-    variance = calibration.variance
-    head = f"STATISTICAL SUMMARY (MICRONS){'X':>30}{'Y':>10}{'TOTAL':>10}"
-    sigmas = [session_sigma(calibration, plate) for plate in calibration.plates]
-    return [
-        head,
-        _line("RMS ERROR BEFORE CALIBRATION", variance.before),
-        _line("AFTER LINEAR CORRECTIONS", variance.after_linear),
-        _line("AFTER LINEAR AND NONLINEAR CORRECTIONS", variance.after_nonlinear),
-        _line("MEAN POINTING", variance.pointing),
-        *(
-            _total(f"A PRIORI GRID {plate}", sigma)
-            for plate, sigma in zip(calibration.plates, sigmas, strict=True)
-        ),
-        *(
-            _total(f"COMPUTED UNBIASED GRID {plate}", calibration.sigma_grid_um(plate))
-            for plate in calibration.plates
-        ),
-        _total("SYSTEMATIC COMPARATOR, LINEAR", variance.linear),
-        _total("SYSTEMATIC COMPARATOR, NONLINEAR", variance.nonlinear),
-        _total("RANDOM COMPARATOR", variance.random),
+    names = [
+        "RMS ERROR BEFORE CALIBRATION",
+        "AFTER LINEAR CORRECTIONS",
+        "AFTER LINEAR AND NONLINEAR CORRECTIONS",
+        "MEAN POINTING",
+        *(f"A PRIORI GRID {plate}" for plate in calibration.plates),
+        *(f"COMPUTED UNBIASED GRID {plate}" for plate in calibration.plates),
+        "SYSTEMATIC COMPARATOR, LINEAR",
+        "SYSTEMATIC COMPARATOR, NONLINEAR",
+        "RANDOM COMPARATOR",
     ]
-
-
-def session_sigma(calibration: Calibration, plate: int) -> float:
-    """Return the known standard deviation of a plate; NaN where there is none."""
-    sigma = calibration.session.grids[plate].sigma_um
-    return math.nan if sigma is None else sigma
-
-
-def _line(name: str, sigma: AxisSigma | None) -> str:
-    values = (sigma.x, sigma.y, sigma.total) if sigma else (None, None, None)
-    return f"  {name:<47}" + "".join(number(value, 10, 3) for value in values)
-
-
-def _total(name: str, value: float) -> str:
-    return f"  {name:<67}{number(value, 10, 3)}"
+    lines = [f"STATISTICAL SUMMARY (MICRONS){'X':>30}{'Y':>10}{'TOTAL':>10}"]
+    for row, (name, values) in enumerate(zip(names, variance(calibration).columns[1].values, strict=True)):
+        axes = "".join(number(value, 10, 3) for value in values[:2]) if row < STAGES else ""
+        lines.append(f"  {name:<47}{axes:20}{number(values[2], 10, 3)}")
+    return lines
 
 
 def tests_page(calibration: Calibration) -> list[str]:
@@ -244,7 +224,7 @@ def tests_page(calibration: Calibration) -> list[str]:
 
 def _polynomial(test: PolynomialTest) -> list[str]:
     first, second = test.degrees_of_freedom
-    axis, term, _, coefficient, sd, ratio, p = terms(test.terms)
+    axis, term, _, coefficient, sd, ratio, p = terms(test).columns
     row = [*field(axis, 6, head="AXIS", gap="  "), *field(term, 6, head="TERM")]
     row += [*field(coefficient, 12, ".3f", "COEFFICIENT"), *field(sd, 10, ".3f", "SIGMA")]
     row += [*field(ratio, 10, ".2f", "T"), *field(p, 14, ".2g", "PROBABILITY")]
@@ -283,9 +263,7 @@ def joint_page(calibration: Calibration, joint: JointFit) -> list[str]:
         f"  RANDOM COMPARATOR {joint.random_um:.3f} MICRONS (ESTIMATED)",
         *(line for number_, plate in joint.plates.items() for line in _plate(number_, plate)),
         "",
-        *linear_lines(
-            correction.scale_x, correction.scale_y, correction.nonorthogonality_rad, joint.covariance
-        ),
+        *linear_lines(correction, joint.covariance),
         f"  WEIGHTED MEAN OF THE REPORT AGAINST A JOINT ADJUSTMENT UNDER ITS ASSUMPTIONS: WITHIN"
         f" {number(calibration.joint_check, 0, 6)} SIGMA",
     ]

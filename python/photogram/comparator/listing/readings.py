@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.comparator.averages import LocationAverages
-from photogram.comparator.calibration import Calibration, CaseResult, PlateResult
 from photogram.comparator.case import exchanged
 from photogram.comparator.closeout import Closeout
 from photogram.comparator.grid import Grid
 from photogram.comparator.listing.forms import centred, nearest, number
 from photogram.comparator.pointing import Precision
+
+if TYPE_CHECKING:
+    from photogram.comparator import Calibration, CaseResult, PlateResult
 
 COLUMNS = 3
 """Readings in a line of the input listing."""

@@ -1,5 +1,5 @@
 """Pictures of a calibration, made with matplotlib (`pip install 'photogram[plots]'`)."""
 
-from photogram.comparator.pictures.book import figures, pdf_report
+from photogram.comparator.pictures.book import figures
 
-__all__ = ["figures", "pdf_report"]
+__all__ = ["figures"]

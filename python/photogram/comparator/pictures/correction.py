@@ -15,7 +15,7 @@ from photogram.show.style import FAINT, INK
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.comparator.calibration import Calibration
+    from photogram.comparator import Calibration
     from photogram.comparator.polynomial import Polynomial
 
 FINE = 121

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +25,7 @@ from photogram.show.style import FAINT
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.comparator.calibration import Calibration
+    from photogram.comparator import Calibration
     from photogram.comparator.pointing import Ellipse, Precision
 
 LEVELS = " / ".join(str(percent) for percent in CONFIDENCE_FACTORS)
@@ -56,12 +56,12 @@ def pointing_ellipses(calibration: Calibration) -> Sketch:
     )
 
 
-def operator_ellipses(calibration: Calibration) -> Iterator[tuple[int, Sketch]]:
-    """Draw for each operator the ellipses of his pointings, point by point over his cases, on the grid."""
-    for operator, (points, total) in calibration.pointing.operators.items():
-        own = [case for case in calibration.cases if case.placed.case.operator == operator]
-        title = f"Pointings of operator {operator}, {len(own)} cases"
-        yield operator, _on_grid(calibration, own[0].placed.case.plate, points, total, title)
+def operator_ellipses(calibration: Calibration, operator: int) -> Sketch:
+    """Draw the ellipses of the pointings of an operator, point by point over his cases, on the grid."""
+    points, total = calibration.pointing.operators[operator]
+    own = [case for case in calibration.cases if case.placed.case.operator == operator]
+    title = f"Pointings of operator {operator}, {len(own)} cases"
+    return _on_grid(calibration, own[0].placed.case.plate, points, total, title)
 
 
 def total_ellipses(calibration: Calibration) -> Sketch:

@@ -14,7 +14,7 @@ from photogram.show.style import INK
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.comparator.calibration import Calibration
+    from photogram.comparator import Calibration
 
 
 def residual_histogram(calibration: Calibration) -> Sketch:

@@ -27,7 +27,7 @@ from photogram.show.style import FAINT, SOFT
 
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
-    from photogram.comparator.calibration import Calibration
+    from photogram.comparator import Calibration
 
 
 def comparator_vectors(calibration: Calibration) -> Sketch:

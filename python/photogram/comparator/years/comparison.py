@@ -25,9 +25,11 @@ from photogram.comparator.years.joint import Together, adjust_together
 from photogram.comparator.years.record import RecordedCalibration
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.show.methods import Shown
+from photogram.show.methods import Documented, Judged
+from photogram.show.page import Document
 from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
+from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history
 
 DEGREE = 4
@@ -163,7 +165,7 @@ def _share(record: RecordedCalibration) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Shown, Brief):
+class Comparison(Documented, Judged, Brief):
     """Calibrations over years.
 
     Attributes
@@ -197,6 +199,17 @@ class Comparison(Shown, Brief):
     def corrections(self) -> list[Correction]:
         """Return the corrections of all calibrations as adjusted together, with their covariances."""
         return _corrections(self.calibrations, self.together)
+
+    def document(self) -> Document:
+        """Return the document of the comparison: changes, control charts, grids, all values."""
+        from photogram.comparator.years.document import comparison_document
+
+        return comparison_document(self)
+
+    def _findings(self) -> Findings:
+        from photogram.comparator.years.document import comparison_findings
+
+        return comparison_findings(self)
 
 
 def compare(

@@ -15,7 +15,6 @@ import orjson
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction
-from photogram.comparator.document import to_json
 from photogram.comparator.grid import Grid
 from photogram.errors import InputError
 from photogram.io import json
@@ -125,7 +124,7 @@ class RecordedCalibration:
     def of(cls, calibration: Calibration, name: str) -> RecordedCalibration:
         """Return a calibration as its document says it."""
         with json.holding(_WHAT):
-            return _from_document(orjson.loads(to_json(calibration)), name)
+            return _from_document(orjson.loads(calibration.to_json()), name)
 
 
 def day_of(text: str) -> date:

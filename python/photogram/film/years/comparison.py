@@ -22,9 +22,11 @@ from photogram.film.certificate import Certificate
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
 from photogram.network.cameras import Camera
-from photogram.show.methods import Shown
+from photogram.show.methods import Documented, Judged
+from photogram.show.page import Document
 from photogram.show.summary import Brief
 from photogram.statistics.distributions import LEVEL
+from photogram.statistics.findings import Findings
 from photogram.statistics.history import History, dates_of, history
 
 NODES = 9
@@ -192,7 +194,7 @@ class DatedCamera:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CameraComparison(Shown, Brief):
+class CameraComparison(Documented, Judged, Brief):
     """Cameras over years.
 
     Attributes
@@ -211,6 +213,17 @@ class CameraComparison(Shown, Brief):
     histories: Mapping[str, History]
     angles: Mapping[str, float]
     remarks: tuple[str, ...]
+
+    def document(self) -> Document:
+        """Return the document of the comparison: changes, control charts, calibrations, all values."""
+        from photogram.film.years.document import comparison_document
+
+        return comparison_document(self)
+
+    def _findings(self) -> Findings:
+        from photogram.film.years.document import comparison_findings
+
+        return comparison_findings(self)
 
 
 def compare_cameras(

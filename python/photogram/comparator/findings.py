@@ -1,0 +1,81 @@
+"""The tests that the verdict on a calibration rests on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.comparator.joint import JointFit
+from photogram.statistics.findings import Findings, Systematic, Tested
+
+if TYPE_CHECKING:
+    from photogram.comparator import Calibration
+
+FAR = 3.0
+"""A grid that differs from its values by so many times their standard deviation is another grid."""
+
+
+def comparator_findings(calibration: Calibration) -> Findings:
+    """Return the tests of a calibration: readings have no standard deviation of their own, t decides."""
+    screening = calibration.screening
+    places = [
+        (case.number, point, axis)
+        for case in calibration.cases
+        for point in case.placed.points.tolist()
+        for axis in "xy"
+    ]
+
+    def name(index: tuple[int, ...]) -> str:
+        case, point, axis = places[index[0]]
+        return f"{axis} of point {point} of case {case}"
+
+    values = np.vstack(screening.ratios).ravel()
+    readings = Tested("readings of the grid", values, name, "t", second=max(screening.freedom - 1, 1))
+    tests = calibration.pointing_tests
+    rows = [(each.case, row, axis) for each in tests for row in range(len(each.ratios)) for axis in "xy"]
+
+    def pointing(index: tuple[int, ...]) -> str:
+        case, row, axis = rows[index[0]]
+        return f"{axis} of pointing {row + 1}, point {case.points[row]} of case {case.number}"
+
+    ratios = np.concatenate([each.ratios.ravel() for each in tests])
+    freedom = np.repeat([each.freedom for each in tests], [each.ratios.size for each in tests])
+    pointings = Tested("pointings", ratios, pointing, "t", second=np.maximum(freedom - 1.0, 1.0))
+    return Findings(
+        status="converged",
+        observations=[readings, pointings],
+        degrees_of_freedom=screening.freedom,
+        untested="readings have no standard deviation of their own",
+        spoiled=f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
+        f" and a coordinate is uncertain by {screening.sigma_um:.3f} um"
+        if screening.harmful
+        else "",
+        systematic=_grids(calibration.joint) if calibration.joint else [],
+        if_usable=[
+            "Correct measurements with `photogram comparator correct correction.json FILE`.",
+            "Keep the document of `--json`: `photogram comparator compare` finds what changes over years.",
+        ],
+        if_withheld=[
+            "The correction is withheld: measure the readings that are named again, or leave them out."
+        ],
+    )
+
+
+def _grids(joint: JointFit) -> list[Systematic]:
+    """Return the tests of the corrections of the plates against their standard deviations."""
+    return [
+        Systematic(
+            name=f"corrections of plate {plate}",
+            sentence=f"the grid of plate {plate} is off by {own.test.factor:.3g} standard deviations",
+            statistic="s^2",
+            distribution="chi2/f",
+            dof=(own.test.degrees_of_freedom,),
+            value=own.test.variance,
+            probability=own.test.probability_above,
+            level=own.test.level / 2,
+            large=own.test.factor > FAR,
+        )
+        for plate, own in joint.plates.items()
+        if own.test is not None
+    ]
