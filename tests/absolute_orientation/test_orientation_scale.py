@@ -105,4 +105,4 @@ def test_the_command_holds_it(given, run, tmp_path):
     (tmp_path / "stations.csv").write_text("\n".join(lines) + "\n")
     done = run("absolute-orientation", "stations.csv", "--scale", "2", "--out", "o")
     assert done.exit_code == 0, done.output
-    assert "            held" in (tmp_path / "o" / "report.txt").read_text()
+    assert " held " in (tmp_path / "o" / "report.txt").read_text()

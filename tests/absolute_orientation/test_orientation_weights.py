@@ -43,7 +43,7 @@ def test_each_horizontal_coordinate_counts_by_itself():
     assert result.similarity.scale == pytest.approx(scale, rel=1e-8)
     assert result.weighted_sum_of_squares == pytest.approx(squares, rel=1e-8)
     assert np.nansum(result.redundancy) == pytest.approx(result.degrees_of_freedom)
-    assert "known coordinates                   13 (4 X, 4 Y, 5 Z)" in result.report()
+    assert "known coordinates                   13 (4 X, 4 Y, 5 Z)\n" in result.report()
     axes = Figure().subplots()
     assert result.plot(axes) is axes
     report = orient(given, method="report", former=result)

@@ -2,9 +2,8 @@
 
 from photogram.absolute_orientation.cards import read_cards
 from photogram.absolute_orientation.csv_files import read_csv
-from photogram.absolute_orientation.document import read_similarity
 from photogram.absolute_orientation.models import Model, Strip, relative_model, strip_of
-from photogram.absolute_orientation.similarity import Similarity
+from photogram.absolute_orientation.similarity import Similarity, read_similarity
 from photogram.absolute_orientation.stations import Stations
 from photogram.absolute_orientation.stream import transform_file
 from photogram.arguments.annotations import check_arguments
@@ -25,13 +24,3 @@ __all__ = [
 check_arguments(
     globals(), ["read_cards", "read_csv", "read_similarity", "relative_model", "strip_of", "transform_file"]
 )
-
-WAYS = {
-    "axes_of": ("plot",),
-    "columns_of": ("tables",),
-    "document_of": ("document",),
-    "findings_of": ("tables",),
-    "page_of": ("page",),
-    "report_of": ("report",),
-}
-"""The files that show a result, by the names of the ways: see `photogram.show.methods`."""

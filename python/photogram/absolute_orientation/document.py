@@ -1,111 +1,146 @@
-"""The JSON document of an orientation; `docs/absolute-orientation.md` describes it."""
+"""The document of an orientation; `docs/absolute-orientation.md` describes its JSON form."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
-from pathlib import Path
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING
 
-import numpy as np
 import orjson
 
 from photogram import _photocore
-from photogram.absolute_orientation.orientation import Orientation
-from photogram.absolute_orientation.similarity import Similarity
-from photogram.absolute_orientation.tables import left_out, stations
+from photogram.absolute_orientation.plot import residuals_sketch
+from photogram.absolute_orientation.tables import (
+    control,
+    cycles,
+    model_residuals,
+    parameters,
+    points,
+    rejected,
+    rotation,
+)
 from photogram.arguments.types import Floats
-from photogram.errors import InputError
 from photogram.io import json
-from photogram.io.files import read_bytes
-from photogram.show.methods import document_of
-from photogram.show.quantity import records
-from photogram.statistics.limits import GlobalTest
+from photogram.show.forms import record
+from photogram.show.judgement import judged, remarks_section, tests_section
+from photogram.show.page import Document, Drawing, Fact, Facts, Section, significant
+from photogram.show.quantity import members
+
+if TYPE_CHECKING:
+    from photogram import Orientation
+
+STARTS = {
+    "restart": "a former result",
+    "report": "the first two stations",
+    "closed-form": "the closed form",
+}
+CONVENTIONS = {
+    "model": "x = s A X + B, A = K(kappa) Phi(phi) Omega(omega); x model, X control",
+    "covariance": "omega, phi, kappa, scale, b1, b2, b3; cofactors times covariance_scale",
+    "residual": "u = s X - A^T (x - B): control axes, model units; null where unknown",
+    "residual_ground": "u / s: given minus transformed, ground units",
+    "residual_model": "v = s A X + B - x with the adjusted X: model axes, model units",
+    "standardized": "residual / its standard deviation: a priori if any were given, else by sigma0",
+    "studentized": "residual / its standard deviation by sigma0 of all others: Student",
+    "deviation_factor": "what standard deviations of points to be transformed are multiplied by",
+}
 
 
-@document_of.register(Orientation)
-def to_json(result: Orientation) -> bytes:
-    """Return the whole result as JSON (UTF-8); its points are the stations without control."""
-    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}\n"])
-
-
-def without_points(result: Orientation) -> Iterator[bytes]:
-    """Return the document up to the first of its points, so that any number of them can follow."""
-    yield json.to_json(_head(result)).removesuffix(b"\n}\n")
-    yield b',\n  "points": ['
-
-
-def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> bytes:
-    """Return points as JSON objects, one a line, with commas between them."""
-    rows = zip(ids, positions.tolist(), covariances.tolist(), strict=True)
-    objects = (
-        orjson.dumps({"id": name, "position": position, "covariance": covariance})
-        for name, position, covariance in rows
+def orientation_document(result: Orientation) -> Document:
+    """Return the document of an orientation."""
+    stations, (size, quality) = result.stations, _facts(result)
+    caption = "The control in plan with its residuals, given minus transformed, enlarged as the scale says."
+    drawing = Drawing(
+        "picture-residuals", "Residuals of the control in plan", caption, partial(residuals_sketch, result)
     )
-    return b"\n    " + b",\n    ".join(objects) if len(positions) else b""
+    of_parameters, unit = parameters(result), f"{stations.model_unit} / {stations.ground_unit}"
+    return Document(
+        what="Absolute orientation of a model",
+        title="",
+        judgements=[judged(result.verdict)],
+        advice=result.verdict.next,
+        highlights=[
+            *quality[:2],
+            Fact("Scale", significant(result.similarity.scale, 6), unit),
+            *size[3:],
+            size[0],
+        ],
+        sections=[
+            Section("residuals", "Residuals in plan", [drawing]),
+            Section("parameters", "Parameters", [of_parameters, rotation(result)], of_parameters.about),
+            Section.of(control(result)),
+            Section.of(model_residuals(result)),
+            Section.of(rejected(result)),
+            Section("size", "How much, how good", [Facts("How much", size), Facts("How good", quality)]),
+            tests_section(result.verdict),
+            Section.of(points(result)),
+            Section.of(cycles(result)),
+            remarks_section(result.problems),
+        ],
+        members=_members(result),
+    )
 
 
-def _head(result: Orientation) -> dict[str, Any]:
-    similarity = result.similarity
+def _facts(result: Orientation) -> tuple[list[Fact], list[Fact]]:
+    """Return how much there is, and how good it is."""
+    given, scale = result.used.sum(axis=0).tolist(), result.similarity.scale
+    model, ground = result.stations.model_unit, result.stations.ground_unit
+    done = len(result.iterations) if result.cycles is None else len(result.cycles)
+    known = ", ".join(f"{count} {axis}" for count, axis in zip(given, "XYZ", strict=True))
+    much = [
+        Fact("Status", f"{result.status} after {done} iterations", note=f"method {result.method}"),
+        Fact("Initial values", STARTS[result.started]),
+        Fact("Stations that took part", f"{int(result.took_part.sum())} of {len(result.stations.ids)}"),
+        Fact("Known coordinates", f"{result.known}", note=known),
+        Fact("Degrees of freedom", f"{result.degrees_of_freedom}"),
+    ]
+    in_model = f"{significant(result.rms, 6)} {model} in the model"
+    sigma0, unit, note = "undefined", "", ""
+    if result.sigma0 is not None:
+        sigma0 = significant(result.sigma0, 6)
+        if not result.weighted:
+            unit, note = model, f"{significant(result.sigma0 / scale, 6)} {ground} on the ground"
+    condition = "of the equations: rotations, relative scale, shifts"
+    good = [
+        Fact("rms of residuals on the ground", significant(result.rms / scale, 6), ground, in_model),
+        Fact("Standard deviation of unit weight", sigma0, unit, note),
+        Fact("Condition number", f"{result.condition:.1f}", note=condition),
+    ]
+    return much, good
+
+
+def _members(result: Orientation) -> dict[str, object]:
+    test, similarity = result.test, result.similarity
     return {
         "program": f"photogram {_photocore.__version__} absolute-orientation",
         "units": _units(result),
-        "conventions": {
-            "model": "x = s A X + B, A = K(kappa) Phi(phi) Omega(omega); x model, X control",
-            "covariance": "omega, phi, kappa, scale, b1, b2, b3; cofactors times covariance_scale",
-            "residual": "u = s X - A^T (x - B): control axes, model units; null where unknown",
-            "residual_ground": "u / s: given minus transformed, ground units",
-            "residual_model": "v = s A X + B - x with the adjusted X: model axes, model units",
-            "standardized": "residual / its standard deviation: a priori if any were given, else by sigma0",
-            "studentized": "residual / its standard deviation by sigma0 of all others: Student",
-            "deviation_factor": "what standard deviations of points to be transformed are multiplied by",
-        },
-        "method": result.method,
-        "start": result.started,
-        "status": result.status,
-        "usable": result.usable,
-        "messages": result.problems,
-        "iterations": len(result.iterations) if result.cycles is None else len(result.cycles),
-        "initial": {
-            "scale": result.initial.scale,
-            "angles_rad": result.initial.angles,
-            "translation": result.initial.translation,
-        },
-        "scale": similarity.scale,
-        "scale_held": result.scale_held,
-        "rotation": similarity.rotation,
+        "conventions": CONVENTIONS,
+        **members(
+            result,
+            *("method", "status", "usable", "scale_held", "covariance_scale", "rms", "sigma0", "condition"),
+            *("degrees_of_freedom", "weighted_sum_of_squares"),
+            start="started",
+            messages="problems",
+            known_coordinates="known",
+        ),
+        **members(similarity, "scale", "rotation", "translation", "covariance", "deviation_factor"),
         "angles_rad": similarity.angles,
-        "translation": similarity.translation,
-        "covariance": similarity.covariance,
-        "covariance_scale": result.covariance_scale,
-        "deviation_factor": similarity.deviation_factor,
-        "rms": result.rms,
-        "sigma0": result.sigma0,
-        "degrees_of_freedom": result.degrees_of_freedom,
-        "known_coordinates": result.known,
-        "weighted_sum_of_squares": result.weighted_sum_of_squares,
-        "global_test": _global_test(result.test),
+        "iterations": len(result.iterations) if result.cycles is None else len(result.cycles),
+        "initial": members(result.initial, "scale", "translation", angles_rad="angles"),
+        "global_test": test
+        and members(
+            test,
+            *("limits", "probability", "rejected_high", "rejected_low"),
+            variance_of_unit_weight="variance",
+        ),
         "verdict": result.verdict.document(),
         "test": {
             "of": "standardized" if result.decided_by_w else "studentized",
-            "limit": result.limit if np.isfinite(result.limit) else None,
+            "limit": result.limit if math.isfinite(result.limit) else None,
             "outliers": [[result.stations.ids[row], "XYZ"[axis]] for row, axis in result.outliers],
         },
-        "condition": result.condition,
-        "centres": {"control": similarity.control_centre, "model": similarity.model_centre},
-        "control": records(stations(result)),
-        "rejected": records(left_out(result)),
-    }
-
-
-def _global_test(test: GlobalTest | None) -> dict[str, Any] | None:
-    if test is None:
-        return None
-    return {
-        "variance_of_unit_weight": test.variance,
-        "limits": test.limits,
-        "probability": test.probability,
-        "rejected_high": test.rejected_high,
-        "rejected_low": test.rejected_low,
+        "centres": members(similarity, control="control_centre", model="model_centre"),
     }
 
 
@@ -127,38 +162,22 @@ def _units(result: Orientation) -> dict[str, str]:
     }
 
 
-def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
-    """Read the parameters, with their covariance, out of a JSON document.
-
-    Raises InputError: the file cannot be read, is no such document, or holds an orientation that is not to be
-    used.
-
-    Parameters
-    ----------
-    path
-        The document.
-    usable
-        Whether to refuse an orientation that has not converged, or in which something grave was found.
-    """
-    with json.holding("result of an absolute orientation", path):
-        found = orjson.loads(read_bytes(path))
-        if usable and not found["usable"]:
-            reasons = "; ".join(map(str, found["messages"])) or found["status"]
-            raise InputError(f"holds an orientation that is not to be used: {reasons}")
-        centres = found["centres"]
-        return Similarity.from_parameters(
-            found["scale"],
-            found["rotation"],
-            found["translation"],
-            _known(found["covariance"]),
-            control_centre=centres["control"],
-            model_centre=centres["model"],
-            deviation_factor=found["deviation_factor"],
-        )
+def to_json(result: Orientation) -> bytes:
+    """Return the whole result as JSON (UTF-8); its points are the stations without control."""
+    return b"".join([*without_points(result), point_rows(*result.transform_points()), b"\n  ]\n}\n"])
 
 
-def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:
-    """Return a covariance; None when it, or an element of it, is unknown."""
-    if covariance is None or any(value is None for row in covariance for value in row):
-        return None
-    return covariance
+def without_points(result: Orientation) -> Iterator[bytes]:
+    """Return the document up to the first of its points, so that any number of them can follow."""
+    yield json.to_json(record(result.document())).removesuffix(b"\n}\n")
+    yield b',\n  "points": ['
+
+
+def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> bytes:
+    """Return points as JSON objects, one a line, with commas between them."""
+    rows = zip(ids, positions.tolist(), covariances.tolist(), strict=True)
+    objects = (
+        orjson.dumps({"id": name, "position": position, "covariance": covariance})
+        for name, position, covariance in rows
+    )
+    return b"\n    " + b",\n    ".join(objects) if len(positions) else b""

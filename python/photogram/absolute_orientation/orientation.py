@@ -13,8 +13,10 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.results.iteration import Iteration
-from photogram.show.methods import Shown, axes_of
+from photogram.show.methods import Documented, Judged
+from photogram.show.page import Document
 from photogram.show.summary import Brief
+from photogram.statistics.findings import Findings
 from photogram.statistics.limits import GlobalTest, normal_limit, studentized_limit
 from photogram.statistics.reliability import TESTABLE
 
@@ -57,7 +59,7 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Orientation(Shown, Brief):
+class Orientation(Documented, Judged, Brief):
     """An absolutely oriented model; arrays in the order of the n stations, NaN for what took no part.
 
     Covariances are cofactors times `covariance_scale`.
@@ -276,12 +278,30 @@ class Orientation(Shown, Brief):
 
     def control_table(self) -> pd.DataFrame:
         """Return stations as a data frame: residuals in both units, redundancy numbers, test values."""
-        return self._table("control")
+        return self.document().table("control").frame()
+
+    def document(self) -> Document:
+        """Return the document of the orientation: parameters, control with tests, transformed points."""
+        from photogram.absolute_orientation.document import orientation_document
+
+        return orientation_document(self)
+
+    def to_json(self) -> bytes:
+        """Return the whole result as a JSON document (UTF-8), with the transformed points."""
+        from photogram.absolute_orientation.document import to_json
+
+        return to_json(self)
+
+    def _findings(self) -> Findings:
+        from photogram.absolute_orientation.findings import orientation_findings
+
+        return orientation_findings(self)
 
     def plot(self, ax: Where = None) -> Axes:
         """Draw a plan of the residuals of the control into axes, or a new figure; return the axes.
 
         Needs matplotlib (`pip install 'photogram[plots]'`).
         """
-        drawn: Axes = axes_of(self, ax)
-        return drawn
+        from photogram.absolute_orientation.plot import residuals
+
+        return residuals(self, ax)

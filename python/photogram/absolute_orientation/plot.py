@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.absolute_orientation.orientation import Orientation
 from photogram.arguments.types import Floats
 from photogram.show.axes import Where
-from photogram.show.methods import axes_of
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, Sketch, around
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Names, Segments
@@ -20,11 +18,12 @@ from photogram.show.style import INK, PURPLE, VERMILION
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from photogram import Orientation
+
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
 
 
-@axes_of.register(Orientation)
 def residuals(result: Orientation, ax: Where = None) -> Axes:
     """Draw plan residuals as arrows and those of elevations as bars, given minus transformed.
 

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
+import orjson
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import is_covariance, number, numbers, shaped
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.io import json
+from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.geometry import rotation_angles
 
-__all__ = ["Similarity"]
+__all__ = ["Similarity", "read_similarity"]
 
 
 ORTHOGONAL = 1e-6
@@ -213,3 +217,40 @@ def _rows(name: str, values: ArrayLike) -> Floats:
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"{name} has the shape {array.shape}, not (n, 3)")
     return array
+
+
+def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
+    """Read the parameters, with their covariance, out of a JSON document.
+
+    Raises InputError: the file cannot be read, is no such document, or holds an orientation that is not to be
+    used.
+
+    Parameters
+    ----------
+    path
+        The document.
+    usable
+        Whether to refuse an orientation that has not converged, or in which something grave was found.
+    """
+    with json.holding("result of an absolute orientation", path):
+        found = orjson.loads(read_bytes(path))
+        if usable and not found["usable"]:
+            reasons = "; ".join(map(str, found["messages"])) or found["status"]
+            raise InputError(f"holds an orientation that is not to be used: {reasons}")
+        centres = found["centres"]
+        return Similarity.from_parameters(
+            found["scale"],
+            found["rotation"],
+            found["translation"],
+            _known(found["covariance"]),
+            control_centre=centres["control"],
+            model_centre=centres["model"],
+            deviation_factor=found["deviation_factor"],
+        )
+
+
+def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:
+    """Return a covariance; None when it, or an element of it, is unknown."""
+    if covariance is None or any(value is None for row in covariance for value in row):
+        return None
+    return covariance

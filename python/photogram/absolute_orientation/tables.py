@@ -1,212 +1,150 @@
-"""What is known of an orientation, quantity by quantity, and what the verdict on it rests on."""
+"""The tables of an orientation, each declared once."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.absolute_orientation.orientation import Orientation
-from photogram.arguments.types import Floats
 from photogram.results.iteration_text import iteration_table
-from photogram.show.methods import columns_of, findings_of
-from photogram.show.page import Fact, significant
-from photogram.show.quantity import Axis, Quantity, chosen, frame, long
-from photogram.statistics.findings import Findings, Tested
+from photogram.show.quantity import Axis, Quantity, Table, attribute, chosen
 from photogram.statistics.reliability import TESTABLE
 
-_STARTS = {
-    "restart": "a former result",
-    "report": "the first two stations",
-    "closed-form": "the closed form",
-}
+if TYPE_CHECKING:
+    from photogram import Orientation
+
+LISTED = 300  # transformed points that people see at most
 
 
-@columns_of.register(Orientation)
-def _columns(result: Orientation, what: str) -> dict[str, Any]:
-    """Return the columns of the stations that took part; there is no other table."""
-    return frame(stations(result))
-
-
-def stations(result: Orientation) -> list[Quantity]:
-    """Return the stations that took part: residuals, redundancy numbers, test values, adjusted control."""
-    ground, model = _axes("XYZ", result.stations.ground_unit), _axes("XYZ", result.stations.model_unit)
-    test = "w" if result.decided_by_w else "t"
-    decides = {
-        "seen": result.redundancy >= TESTABLE,
-        "marked": np.abs(result.tested) > result.limit,
-        "head": f"Test value {test}",
-        "decimals": 2,
-    }
-    table = [
-        _names(result, "Station"),
-        _residual(result.residuals, model, name="residual", member="residual", head="Residual"),
-        _residual(
-            result.residuals_ground,
-            ground,
-            name="residual_ground",
-            member="residual_ground",
+def control(result: Orientation) -> Table:
+    """Return the control that took part: residuals, redundancy numbers, test values, adjusted control."""
+    numbers, ground, model = (
+        _axes("XYZ", unit) for unit in ("", result.stations.ground_unit, result.stations.model_unit)
+    )
+    seen, marked = result.redundancy >= TESTABLE, np.abs(result.tested) > result.limit
+    of_w, of_t = (marked, None) if result.decided_by_w else (None, marked)
+    columns = [
+        _names(result),
+        Quantity(*(result.residuals, model, "deviation", "residual", "residual"), head="Residual", figures=4),
+        Quantity(
+            *(result.residuals_ground, ground, "deviation", "residual_ground", "residual_ground"),
             head="Residual",
+            figures=4,
         ),
-        _residual(result.model_residuals, _axes("xyz", result.stations.model_unit), member="residual_model"),
-        _test("redundancy", result.redundancy, head="Redundancy", decimals=3),
-        _test("standardized", result.standardized, **(decides if test == "w" else {})),
-        _test("studentized", result.studentized, **(decides if test == "t" else {})),
+        Quantity(result.model_residuals, _axes("xyz", model[0].unit), "deviation", member="residual_model"),
+        attribute(result, "redundancy", numbers, head="Redundancy", decimals=3),
+        attribute(result, "standardized", numbers, head="w", decimals=2, seen=seen, marked=of_w),
+        attribute(result, "studentized", numbers, head="t", decimals=2, seen=seen, marked=of_t),
         Quantity(result.adjusted_control, ground, "value", member="adjusted"),
         Quantity(result.control_covariances, member="covariance"),
     ]
-    return chosen(table, np.flatnonzero(result.took_part))
+    about = "Given minus transformed: u = s X - A^T (x - B) in units of the model, and u / s on the ground."
+    rows = np.flatnonzero(result.took_part)
+    shown = np.argwhere(result.used[rows])
+    return Table("control", "Control", chosen(columns, rows), _test(result), about, shown=shown)
 
 
-def tested_control(result: Orientation) -> list[Quantity]:
-    """Return the components of the control that took part, each in a row: residuals and test values."""
-    own, of_model, of_ground, _, *tests, _, _ = stations(result)
-    return long([own, of_model, of_ground, *tests], np.argwhere(result.used[result.took_part]))
+def _test(result: Orientation) -> str:
+    if not math.isfinite(result.limit):
+        return "No single coordinate is tested: it takes two degrees of freedom."
+    kind = (
+        "standardized residual w, normal distribution"
+        if result.decided_by_w
+        else f"studentized residual t, Student with {result.degrees_of_freedom - 1} degrees of freedom"
+    )
+    tests = int(np.isfinite(result.tested).sum())
+    return f"Test: {kind}; limit {result.limit:.2f} (5 percent for all {tests} tests together)."
 
 
-def left_out(result: Orientation) -> list[Quantity]:
+def model_residuals(result: Orientation) -> Table:
+    """Return the residuals of the control that took part in the axes of the model."""
+    residuals = Quantity(
+        result.model_residuals, _axes("xyz", result.stations.model_unit), "deviation", head="v{}", figures=4
+    )
+    columns = chosen([_names(result, member=""), residuals], np.flatnonzero(result.took_part))
+    about = "v = s A X + B - x with the adjusted control X."
+    return Table("model_residuals", "Residuals in the model", columns, "", about)
+
+
+def rejected(result: Orientation) -> Table:
     """Return control that took no part: given minus transformed."""
     there = result.stations.given & ~result.used
+    rows = np.flatnonzero(there.any(axis=1))
     differences = np.where(there, result.differences, np.nan)
-    axes = _axes("XYZ", result.stations.ground_unit)
-    head = "Given - transformed"
-    table = [
-        _names(result, "Station"),
-        _residual(differences, axes, name="d", member="residual_ground", head=head),
+    columns = [
+        _names(result),
+        Quantity(
+            *(differences, _axes("XYZ", result.stations.ground_unit), "deviation", "d", "residual_ground"),
+            head="Given - transformed",
+            figures=4,
+        ),
     ]
-    return chosen(table, np.flatnonzero(there.any(axis=1)))
+    shown = np.argwhere(there[rows])
+    return Table("rejected", "Control that took no part", chosen(columns, rows), shown=shown)
 
 
-def parameters(result: Orientation) -> list[Quantity]:
+def parameters(result: Orientation) -> Table:
     """Return the seven parameters with their standard deviations, each in a row."""
     similarity, stations = result.similarity, result.stations
-    scale = f"{stations.model_unit} / {stations.ground_unit}"
     axes = (
         *(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa")),
-        Axis.of("s", scale),
-        *_axes(("b1", "b2", "b3"), stations.model_unit),
+        Axis.of("s", f"{stations.model_unit} / {stations.ground_unit}"),
+        *(Axis.of(name, stations.model_unit) for name in ("b1", "b2", "b3")),
     )
     of, covariance = np.arange(7), similarity.covariance
     sd = np.full(7, np.nan) if covariance is None else np.sqrt(np.diag(covariance))
-    names, units = (np.array(texts, dtype=object) for texts in ([a.name for a in axes], _units(axes)))
     values = np.array([*similarity.angles, similarity.scale, *similarity.translation])
-    held = {0.0: "held"} if result.scale_held else None
-    return [
-        Quantity(names, kind="name", head="Parameter"),
+    units = ["deg, sd arcsec" if axis.angle else axis.unit for axis in axes]
+    columns = [
+        Quantity([axis.name for axis in axes], kind="name", head="Parameter"),
         Quantity(values, axes, "value", head="Value", figures=10, of=of),
-        Quantity(sd, axes, "deviation", head="sd", words=held, of=of),
+        Quantity(sd, axes, "deviation", head="sd", words={0.0: "held"} if result.scale_held else None, of=of),
         Quantity(units, kind="name", head="Unit"),
     ]
+    about = "x = s A X + B, from the ground to the model."
+    return Table("parameters", "Parameters", columns, "", about, sd)
 
 
-def _units(axes: tuple[Axis, ...]) -> list[str]:
-    return ["deg, sd arcsec" if axis.angle else axis.unit for axis in axes]
-
-
-def rotation(result: Orientation) -> Quantity:
+def rotation(result: Orientation) -> Table:
     """Return the rotation matrix A."""
-    return Quantity(result.similarity.rotation, _axes("XYZ"), head="{}", decimals=10)
+    matrix = Quantity(result.similarity.rotation, _axes("XYZ"), head="{}", decimals=12)
+    return Table("rotation_matrix", "Rotation matrix A", [matrix])
 
 
-def points(result: Orientation) -> list[Quantity]:
+def points(result: Orientation) -> Table:
     """Return the stations without control, transformed."""
     ids, positions, covariances = result.transform_points()
     sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     axes = _axes("XYZ", result.stations.ground_unit)
-    return [
-        Quantity(np.array(ids, dtype=object), kind="name", head="Point"),
-        Quantity(positions, axes, "value", head="{}"),
-        Quantity(sd, axes, "deviation", head="sd {}"),
+    columns = [
+        Quantity(np.array(ids, dtype=object), kind="name", name="id", head="Point"),
+        Quantity(positions, axes, "value", "", head="{}"),
+        Quantity(sd, axes, "deviation", "sd", head="sd {}"),
     ]
+    more = len(ids) > LISTED
+    note = f"The first {LISTED} of {len(ids)}; the JSON document contains all." if more else ""
+    shown = np.arange(LISTED) if more else None
+    return Table("points", "Transformed points", columns, note, deviations=sd, shown=shown)
 
 
-def cycles(result: Orientation) -> list[Quantity]:
+def cycles(result: Orientation) -> Table:
     """Return the iterations, or the cycles of the report's methods."""
     if result.cycles is None:
-        return iteration_table(result.iterations)
-    axis = Axis("", "rad", small="rad")
-    head = "Largest correction of an angle"
-    return [
-        Quantity(np.arange(1, len(result.cycles) + 1), head="Cycle", decimals=0),
-        Quantity(np.array(result.cycles)[:, np.newaxis], (axis,), "deviation", head=head),
-    ]
+        columns = iteration_table(result.iterations)
+    else:
+        axis, corrections = (Axis.of("", "rad"),), np.array(result.cycles)
+        head = "Largest correction of an angle"
+        columns = [
+            Quantity(np.arange(1, len(corrections) + 1), member="number", head="Cycle"),
+            Quantity(corrections, axis, "deviation", member="largest_correction_rad", head=head),
+        ]
+    return Table("cycles", "Iterations", columns)
 
 
-def facts(result: Orientation) -> tuple[list[Fact], list[Fact]]:
-    """Return how much there is, and how good it is."""
-    given, scale = result.used.sum(axis=0).tolist(), result.similarity.scale
-    model, ground = result.stations.model_unit, result.stations.ground_unit
-    done = len(result.iterations) if result.cycles is None else len(result.cycles)
-    known = ", ".join(f"{count} {axis}" for count, axis in zip(given, "XYZ", strict=True))
-    much = [
-        Fact("Status", f"{result.status} after {done} iterations", note=f"method {result.method}"),
-        Fact("Initial values", _STARTS[result.started]),
-        Fact("Stations that took part", f"{int(result.took_part.sum())} of {len(result.stations.ids)}"),
-        Fact("Known coordinates", f"{result.known}", note=known),
-        Fact("Degrees of freedom", f"{result.degrees_of_freedom}"),
-    ]
-    in_model = f"{significant(result.rms, 6)} {model} in the model"
-    sigma0, unit, note = "undefined", "", ""
-    if result.sigma0 is not None:
-        sigma0 = significant(result.sigma0, 6)
-        if not result.weighted:
-            unit, note = model, f"{significant(result.sigma0 / scale, 6)} {ground} on the ground"
-    condition = "of the equations: rotations, relative scale, shifts"
-    good = [
-        Fact("rms of residuals on the ground", significant(result.rms / scale, 6), ground, in_model),
-        Fact("Standard deviation of unit weight", sigma0, unit, note),
-        Fact("Condition number", f"{result.condition:.1f}", note=condition),
-    ]
-    return much, good
+def _names(result: Orientation, member: str = "id") -> Quantity:
+    return Quantity(np.array(result.stations.ids, dtype=object), (), "name", "id", member, head="Station")
 
 
-def _names(result: Orientation, head: str) -> Quantity:
-    ids = np.array(result.stations.ids, dtype=object)
-    return Quantity(ids, kind="name", name="id", member="id", head=head)
-
-
-def _axes(names: str | tuple[str, ...], unit: str = "") -> tuple[Axis, ...]:
+def _axes(names: str, unit: str = "") -> tuple[Axis, ...]:
     return tuple(Axis.of(name, unit) for name in names)
-
-
-def _residual(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
-    return Quantity(values, axes, "deviation", figures=4, **more)
-
-
-def _test(name: str, values: Floats, **more: Any) -> Quantity:
-    return Quantity(values, _axes("XYZ"), name=name, member=name, **more)
-
-
-@findings_of.register(Orientation)
-def orientation_findings(result: Orientation) -> Findings:
-    """Return the tests of an orientation: w with standard deviations to be relied on, else t."""
-
-    def name(index: tuple[int, ...]) -> str:
-        return f"{'XYZ'[index[1]]} of {result.stations.ids[index[0]]}"
-
-    control = Tested("control", result.tested, name, "w")
-    if not result.decided_by_w:
-        control = Tested("control", result.tested, name, "t", second=max(result.degrees_of_freedom - 1, 1))
-    if_usable = []
-    if not result.weighted and result.degrees_of_freedom:
-        if_usable.append(
-            "Give standard deviations where they are known: the residuals are tested as a whole then."
-        )
-    if result.degrees_of_freedom == 0:
-        if_usable.append("Seven known coordinates are just enough: one more makes errors visible.")
-    if_usable += [
-        f"Another orientation fits as well, with the scale {significant(each.scale, 6)}: only you know which"
-        " is meant."
-        for each in result.alternatives[:1]
-    ]
-    return Findings(
-        status=result.status,
-        observations=[control],
-        degrees_of_freedom=result.degrees_of_freedom,
-        global_test=result.test,
-        untested="no standard deviations are given" if not result.weighted else "no degrees of freedom",
-        scaled=result.unit_variance != "unity",
-        hints=[str(message) for message in result.grave],
-        take_out="`--reject ID` leaves the control of a station out; compare what it does to the others.",
-        if_usable=if_usable,
-    )

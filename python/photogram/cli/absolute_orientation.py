@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_sections
+from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_remark, print_sections
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFile, OutputFolder, Reads, Writes, with_job
 from photogram.cli.options import Quiet, Strict, default_out, out_option
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from photogram.absolute_orientation.orientation import Orientation
     from photogram.io.writing import OutputSet
 
-SHOWN = 40
-"""Lines of a section that the summary shows at most."""
 EXAMPLE = "absolute_orientation"
 """The packaged example, a directory of photogram.examples."""
 
@@ -146,7 +144,6 @@ def absolute_orientation(
         raise typer.BadParameter("goes with --method report or fill-in", param_hint="--trace")
     with job:
         from photogram import orient
-        from photogram.absolute_orientation.report import summary
         from photogram.messages import Message
         from photogram.show.methods import page_of
 
@@ -193,9 +190,19 @@ def absolute_orientation(
                 outputs.write(path, content)
         job.conclude(
             written,
-            summary=lambda: print_sections(summary(result), "the report", SHOWN),
+            summary=lambda: _summarize(result, title),
             code=result.verdict.exit_code(strict=strict),
         )
+
+
+def _summarize(result: Orientation, title: str) -> None:
+    """Print verdict, parameters, control and problems."""
+    from photogram.show.forms import summary
+
+    for line in summary(replace(result.document(), title=title), "parameters", "control"):
+        output.print(escape(line))
+    for problem in result.problems:
+        print_remark(problem)
 
 
 @with_job
@@ -219,9 +226,8 @@ def transform(
 ) -> None:
     """Transform any number of model points by a former orientation (part II)."""
     with job:
-        from photogram.absolute_orientation import transform_file
+        from photogram.absolute_orientation import read_similarity, transform_file
         from photogram.absolute_orientation.cards import read_transformation
-        from photogram.absolute_orientation.document import read_similarity
 
         similarity = (
             read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
@@ -312,8 +318,8 @@ def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_
 
 def _restart(path: Path, deck: Deck) -> Similarity | None:
     """Read a former result in either of its forms."""
+    from photogram.absolute_orientation import read_similarity
     from photogram.absolute_orientation.cards import read_restart
-    from photogram.absolute_orientation.document import read_similarity
 
     return read_similarity(path) if _is_document(path) else read_restart(path, deck.stations, deck.messages)
 
@@ -351,7 +357,7 @@ def _small_files(
         picture = figure(residuals_sketch(result))
         made |= {path: drawn(picture, path) for path in pictures}
     if trace:
-        from photogram.absolute_orientation.report import trace_text
+        from photogram.absolute_orientation.trace import trace_text
 
         made[trace] = trace_text(result).encode()
     if json:

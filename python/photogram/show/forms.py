@@ -14,6 +14,7 @@ from photogram.show.lines import fact_lines
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Section, Table, Text
 
 WIDTH = 100  # characters of a line of prose
+MAX_ROWS = 40  # of a table in a summary
 
 PLAIN = str.maketrans("µ–−ᵀ¹", "u--'1") | str.maketrans(
     {"′": "arcmin", "″": "arcsec", "°": "deg", "∞": "inf", "⁻": "^-", "²": "^2"}
@@ -102,9 +103,11 @@ def summary(document: Document, *keys: str) -> list[str]:
     lines += [f"next: {sentence}" for sentence in document.advice]
     for table in document.tables(layers=True):
         if table.key in keys and table.visible:
-            lines += [each for each in (table.note, *table_text(written(table))) if each]
+            head, *rows = table_text(written(table))
+            lines += [*([table.note] if table.note else []), head, *rows[:MAX_ROWS]]
+            lines += [f"and {len(rows) - MAX_ROWS} more rows"] if len(rows) > MAX_ROWS else []
     lines += [line.translate(PLAIN) for line in fact_lines(document.highlights)]
-    return [f"{document.what}: {document.title}", *(f"  {line}" for line in lines)]
+    return [f"{document.what}: {document.title}".removesuffix(": "), *(f"  {line}" for line in lines)]
 
 
 def table_text(table: Table) -> list[str]:
