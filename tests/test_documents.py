@@ -2,6 +2,8 @@
 
 import csv
 import json
+import re
+import zlib
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,12 +12,24 @@ import pytest
 
 import photogram
 from photogram.io import json as json_files
-from photogram.show import html
+from photogram.show import html, quantity
 from photogram.show.cells import page_table, written
 from photogram.show.forms import record, summary, table_text, text, to_json
 from photogram.show.methods import Documented, page_of
-from photogram.show.page import Document, Fact, Facts, Judgement, Layers, Remarks, Section, Text, layered
-from photogram.show.quantity import Axis, Quantity, Table, records
+from photogram.show.page import (
+    Column,
+    Document,
+    Fact,
+    Facts,
+    Judgement,
+    Layers,
+    Remarks,
+    Section,
+    Table,
+    Text,
+    layered,
+)
+from photogram.show.quantity import Axis, Quantity, records
 
 AXES = (Axis.of("x", "m"), Axis.of("y", "m"))
 VALUES = np.array([[1.25, -2.5], [3.0, 4.0]])
@@ -30,7 +44,7 @@ def table(values=VALUES):
         Quantity(DEVIATIONS, AXES, "deviation", "sd", "sd", head="sd {}"),
         Quantity(np.array([0.5, 9.0]), head="t", decimals=1, marked=np.array([False, True])),
     ]
-    return Table("points", "Points", columns, "Two points.", "In metres.", DEVIATIONS)
+    return quantity.Table("points", "Points", columns, "Two points.", "In metres.", DEVIATIONS)
 
 
 def document(name="A", values=VALUES, tone="good"):
@@ -113,7 +127,7 @@ def test_people_see_the_chosen_rows_and_components():
 
 
 def test_a_pdf_document_has_declared_tables():
-    pytest.importorskip("reportlab")
+    pytest.importorskip("typst")
     from photogram.show.pdf import page_pdf
 
     declared = table()
@@ -121,6 +135,60 @@ def test_a_pdf_document_has_declared_tables():
     by_hand = Document("Survey", "A", [], [], [], [Section("points", "Points", [written], "In metres.")])
     by_key = Document("Survey", "A", [], [], [], [Section.of(declared)])
     assert page_pdf(by_hand) == page_pdf(by_key)
+
+
+def test_a_pdf_document_is_tagged_and_contains_its_fonts():
+    pytest.importorskip("typst")
+    from photogram.show.pdf import FONTS, page_pdf
+
+    whole = layered("Surveys", "both", [document("A"), document("B", 2 * VALUES, "bad")], language="de")
+    content = page_pdf(whole, author="Survey Office")
+    assert content == page_pdf(whole, author="Survey Office")
+    entries = (r"/Lang\s?\(de\)", r"/Title\s?\(both\)", r"/Author\s?\(Survey Office\)", "/StructTreeRoot")
+    for entry in entries:
+        assert re.search(entry.encode(), content), entry
+    assert b"/CreationDate" not in content
+    fonts = re.findall(rb"/FontDescriptor\s*/FontName\s?/[A-Z]{6}[+](\w+)-", content)
+    assert {name.decode() for name in fonts} == {FONTS[0].replace(" ", "")}
+    assert content.count(b"/FontFile3") == len(fonts)
+
+
+def test_a_pdf_document_repeats_heads_of_tables_and_begins_annexes_on_pages():
+    pytest.importorskip("typst")
+    from photogram.show.pdf import page_pdf
+
+    rows = [[f"P{k}", 1.0] for k in range(150)]
+    long = Table("Points", [Column("Point", text=True), Column("x", "m", decimals=3)], rows)
+    parts = [Section("note", "", [Text("One line.")]), Section("points", "Points", [long], annex=True)]
+    pages = drawn_pages(page_pdf(Document("Survey", "A", [], [], [], parts)))
+    # The rule below a head is the only line of this width.
+    assert [b"0.8 w" in page for page in pages] == [False, *[True] * (len(pages) - 1)]
+    assert len(pages) > 3
+
+
+@pytest.mark.parametrize(
+    "name", ["#panic() $x$ *b* <l> @r \\", "\x00\x07", "caf\udce9", "写真", "0123456789abcdef" * 40, ""]
+)
+def test_a_pdf_document_has_any_name(name):
+    pytest.importorskip("typst")
+    from photogram.show.pdf import page_pdf
+
+    columns = [Column(name, text=True)] * 80
+    parts = [Table(name, [], []), Table(name, columns, []), Table("", columns, [[name] * 80] * 2, name)]
+    parts += [Facts(name, [Fact(name, name, name, name)]), Text(name), Remarks([name]), Layers("l", [*parts])]
+    judgement = Judgement(name, name, [name], "bad", name)
+    whole = Document(name, name, [judgement], [name], [Fact(name, name)], [Section("s", name, parts, name)])
+    assert page_pdf(whole, author=name).startswith(b"%PDF")
+
+
+def drawn_pages(content):
+    """Return the drawing commands of the pages of a PDF document, in their order."""
+    pages = re.findall(rb"/Type\s?/Page\b.*?/Contents (\d+) 0 R", content, re.DOTALL)
+    found = []
+    for number in pages:
+        stream = re.search(rb"\n%s 0 obj\s<<.*?>>\s?stream\n(.*?)\nendstream" % number, content, re.DOTALL)
+        found.append(zlib.decompress(stream[1]))
+    return found
 
 
 def test_a_json_document_has_members_and_tables():

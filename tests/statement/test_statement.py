@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -411,6 +412,13 @@ def test_html_and_pdf_say_the_same_and_equal_statements_give_equal_bytes(stated)
     assert pdf.startswith(b"%PDF")
     assert pdf == stated.to_pdf()
     assert b"/Lang" in pdf
+
+
+def test_a_pdf_without_its_library_names_the_extra(stated, monkeypatch):
+    monkeypatch.setitem(sys.modules, "typst", None)
+    monkeypatch.delitem(sys.modules, "photogram.show.pdf", raising=False)
+    with pytest.raises(photogram.InputError, match=r"photogram\[pdf\]"):
+        stated.to_pdf()
 
 
 def test_files_are_written_whole(stated, tmp_path):

@@ -36,6 +36,7 @@ EXTRAS = {
     "pyogrio": "gis",
     "pyproj": "gis",
     "shapely": "gis",
+    "typst": "pdf",
     "pyarrow": "parquet",
     "dask": "distributed",
     "distributed": "distributed",

@@ -166,13 +166,12 @@ def statement_files(job: Job, found: Statement, folder: Path) -> dict[Path, byte
 
     files = {folder / name: content for name, content in files_of_statement(found).items()}
     files[folder / "statement.json"] = found.to_json()
-    for name, needed, make in (
-        ("statement.html", ("jinja2",), found.to_html),
-        ("statement.pdf", ("reportlab", "matplotlib"), found.to_pdf),
+    for name, extra, library, make in (
+        ("statement.html", "report", "jinja2", found.to_html),
+        ("statement.pdf", "pdf", "typst", found.to_pdf),
     ):
-        if all(map(find_spec, needed)):
+        if find_spec(library):
             files[folder / name] = make()
         elif not job.quiet:
-            extra = "pdf" if name.endswith(".pdf") else "report"
             print_remark(f"no {name}: pip install 'photogram[{extra}]'")
     return files

@@ -8,7 +8,6 @@ from typing import Any
 
 from photogram import _photocore
 from photogram.io import json
-from photogram.show import quantity
 from photogram.show.cells import written
 from photogram.show.lines import fact_lines
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Section, Table, Text
@@ -67,7 +66,7 @@ def _sentence(line: str) -> str:
 
 def _section_lines(section: Section) -> list[str]:
     """Return the introduction and the parts of a section, with an empty line between them."""
-    parts = [lines for part in section.parts if (lines := part_lines(part, section.title))]
+    parts = [lines for part in section.visible if (lines := part_lines(part, section.title))]
     if not parts:
         return []
     return _spaced([textwrap.wrap(section.intro, WIDTH), *parts])
@@ -79,8 +78,6 @@ def _spaced(parts: Iterable[list[str]]) -> list[str]:
 
 def part_lines(part: Part, title: str = "") -> list[str]:
     """Return the lines of a part below a title; none for plots."""
-    if isinstance(part, quantity.Table) and not part.visible:
-        return []
     match written(part):
         case Table() as table if table.rows:
             caption = [table.caption] if table.caption not in ("", title) else []

@@ -10,7 +10,6 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
-from photogram.show import quantity
 from photogram.show.cells import written
 from photogram.show.page import Cell, Column, Document, Drawing, Layers, Part, Picture, Section, Table
 
@@ -114,14 +113,14 @@ def _content(column: Column, cell: Cell, known: set[str]) -> Markup:
 def _drawn(section: Section) -> Section:
     """Return a section with its pictures drawn, without those that have nothing to show."""
     parts: list[Part] = []
-    for part in section.parts:
+    for part in section.visible:
         if isinstance(part, Drawing):
             parts += [found] if (found := inlined(part)) else []
         elif isinstance(part, Layers):
             layers = [inlined(each) if isinstance(each, Drawing) else written(each) for each in part.parts]
             own = [each for each in layers if each is not None]
             parts += own if len(own) < 2 else [Layers(part.name, own)]
-        elif not isinstance(part, quantity.Table) or part.visible:
+        else:
             parts.append(written(part))
     return replace(section, parts=parts)
 

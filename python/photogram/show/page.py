@@ -223,6 +223,11 @@ class Section:
     intro: str = ""
     annex: bool = False
 
+    @property
+    def visible(self) -> list[Part]:
+        """Parts without the tables that only programs read."""
+        return [part for part in self.parts if not isinstance(part, quantity.Table) or part.visible]
+
     @classmethod
     def of(cls, table: quantity.Table) -> Section:
         """Return a section that consists of a table."""
@@ -276,9 +281,9 @@ class Document:
         Seconds that the engine spent in its phases.
     head
         For whom and by whom it is.
-    language, first, contents, more
+    language, first, contents, more, numbers
         Of its words, what the link to its top and the list of its sections are called, and what stands for
-        how many sentences are folded away: `{}` is their number.
+        how many sentences are folded away: `{}` is their number. `numbers` is at the foot of a sheet.
     """
 
     what: str
@@ -295,6 +300,7 @@ class Document:
     first: str = "Verdict"
     contents: str = "Sections"
     more: str = "{} more"
+    numbers: str = "Page {number} of {total}"
 
     def with_sections(self, *more: Section) -> Document:
         """Return the page with more sections at its end."""

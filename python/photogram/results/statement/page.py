@@ -85,6 +85,7 @@ def statement_page(found: Statement) -> Document:
         first=texts("page.first"),
         contents=texts("page.contents"),
         more=texts("page.more", count="{}"),
+        numbers=texts("page.numbers", number="{number}", total="{total}"),
     )
 
 

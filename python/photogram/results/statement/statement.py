@@ -152,12 +152,12 @@ class Statement(Grounds, Brief):
     def to_pdf(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return the page as a PDF document, and write it where a path is given.
 
-        Needs reportlab and matplotlib (`pip install 'photogram[pdf]'`).
+        Needs typst (`pip install 'photogram[pdf]'`).
         """
         try:
             from photogram.show.pdf import page_pdf
         except ModuleNotFoundError:
-            raise InputError("a PDF needs reportlab and matplotlib: pip install 'photogram[pdf]'") from None
+            raise InputError("a PDF requires typst: pip install 'photogram[pdf]'") from None
         return _written(page_pdf(page_of(self), author=self.asked.firm), path)
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
