@@ -155,7 +155,7 @@ Quantities = Sequence[Quantity]
 class Table:
     """A table of a result, declared once: all forms of a document are written from it."""
 
-    # Name in JSON documents (`a.b` for a part of member `a`; empty: another member has its rows), and key of its section
+    # Name in JSON documents: `a.b` for a part of member `a`; empty if another member has its rows
     key: str
     title: str
     columns: Quantities
