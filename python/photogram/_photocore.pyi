@@ -2588,6 +2588,35 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     (k,) numbers, and whether they are the whole text.
     """
 
+class TableReader:
+    """Columns of a table of text whose lines are all regular.
+
+    A regular line has as many cells as columns, or an empty one more. The cells of columns of numbers are
+    empty or numbers with one decimal mark throughout. Names have no control characters. A cell can be in
+    quotation marks if no quotation mark is inside. Comments, and blank lines above others, are irregular.
+
+    Parameters
+    ----------
+    delimiter
+        The code of the character between cells (ASCII).
+    numeric
+        For each column, whether its cells are numbers.
+    """
+
+    def __init__(self, delimiter: int, numeric: Sequence[bool]) -> None: ...
+    def add(self, lines: bytes) -> bool:
+        """Append whole lines. Return False if a line is irregular; the reader then has no columns."""
+
+    def columns(self) -> list[_Floats | tuple[bytes, _Indices, bool]]:
+        """Return the columns and empty the reader.
+
+        Returns
+        -------
+        Numbers, NaN for empty cells. Of names: each name once in the order of the rows, with a line feed
+        behind it; the number of the name of each row; whether it is known that no name is empty or NaN, and
+        that all differ by more than blanks and case.
+        """
+
 def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]) -> bytes:
     """Return the rows of a table as text of commas (UTF-8), a line each.
 

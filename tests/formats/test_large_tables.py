@@ -1,11 +1,13 @@
 """Large tables are read piece by piece: with the values of small ones, in memory of a few pieces."""
 
+import subprocess
+import sys
 import tracemalloc
 
 import numpy as np
 import pytest
 
-from photogram import InputError, formats
+from photogram import InputError, _photocore, formats
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
 
@@ -98,7 +100,7 @@ def test_names_of_whole_numbers_are_texts(tmp_path, monkeypatch, pieces, names, 
     path = tmp_path / "images.csv"
     path.write_text("\n".join([head, *map(row.format, names), ""]))
     fast = read(path, known=("name",))
-    assert fast.ready["name"].whole == (names is WHOLE)
+    assert not fast.cells
     monkeypatch.setattr(delimited, "LARGE", 1 << 30)
     slow = read(path, known=("name",))
     assert slow.cells
@@ -115,6 +117,71 @@ def test_a_cell_without_a_name_below_whole_numbers_has_its_record(tmp_path, piec
     with pytest.raises(InputError, match=said) as found:
         read(path).names("point")
     assert (found.value.file, found.value.record) == (path, len(WHOLE) + 3)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ['"a",1.5,2', '"b, c" ,"2.5", 3', ' " d ",-0,+1e3'],
+        ["a,1.,.5,", "b,1,2,  ", "c,0001,-1E-3"],
+        ["a;1,5;2", "b;3;-2,25"],
+        ["a;1.5;2", "b;3;-2.25"],
+        ["a\t1,500\t2", " b \t\t3\t"],
+        ["ä|1|2", "Ä |3|4", "\u00a0ä|5|6"],
+        ["x1|1|2", "X2|3|4", "nano|5|6", "7|8|9"],
+    ],
+)
+@pytest.mark.parametrize(("encoding", "end"), [("utf-8", "\n"), ("cp1252", "\r\n")])
+def test_regular_lines_have_the_values_of_single_lines(tmp_path, monkeypatch, rows, encoding, end):
+    path = tmp_path / "images.csv"
+    delimiter = next(each for each in "\t;|," if each in rows[0])
+    head = delimiter.join(["name", "column", "row"])
+    path.write_bytes(end.join([head, *rows, *rows, ""]).encode(encoding))
+    slow = read(path, known=("name",))
+    monkeypatch.setattr(delimited, "LARGE", len(head) + 2)
+    fast = read(path, known=("name",))
+    assert (bool(slow.cells), bool(fast.cells)) == (True, False)
+    assert fast.texts("name") == slow.texts("name")
+    for each in ("column", "row"):
+        np.testing.assert_array_equal(fast.numbers(each), slow.numbers(each))
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "a;1.5;2,5",
+        "a;1.500,5;2",
+        "a;1 000;2",
+        "a;nan;2",
+        "a;1e999;2",
+        'a"b";1;2',
+        'a;"1;2',
+        "a;1;2;3",
+        "a;1",
+        "a\rb;1;2",
+        "a;1;2\r\r",
+        "\x1fa;1;2",
+        f"a;{'0' * 1001};2",
+        f"{'a' * 100_000};1;2",
+    ],
+)
+def test_irregular_lines_are_read_one_by_one(row):
+    reader = _photocore.TableReader(ord(";"), [False, True, True])
+    assert reader.add(b"b;1.5;2\r\n")
+    assert not reader.add(f"{row}\nb;1;2\n".encode())
+    assert not reader.add(b"b;1;2\n")
+    assert reader.columns() == []
+
+
+def test_large_tables_are_read_without_a_data_frame(tmp_path):
+    path = written(tmp_path / "images.csv", [f"photo{row},point{row},1,2" for row in range(ROWS)])
+    program = (
+        "import sys, pathlib; from photogram.io.delimited import read_columns\n"
+        f"table = read_columns(pathlib.Path({str(path)!r}), numbers=('column', 'row'))\n"
+        "print(table.count, bool(table.cells), 'pandas' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    assert done.stdout.split() == [str(ROWS), "False", "False"]
 
 
 def test_memory_is_less_than_twice_the_file(tmp_path, monkeypatch):
@@ -156,3 +223,26 @@ def test_images_of_a_project_are_shared_by_table_and_block(tmp_path):
         each.nbytes for each in (block.image_xy, block.image_sd, block.image_photos, block.image_points)
     )
     assert peak < 3.5 * own
+
+
+def test_a_project_has_no_dictionary_of_all_points(tmp_path):
+    written(tmp_path / "images.csv", [f"photo1,point{row},{row % 3900}.5,{row / 64}" for row in range(ROWS)])
+    (tmp_path / "cameras.csv").write_text(
+        "camera,model,width,height,f,cx,cy\nc,opencv,4000,3000,3000,2000,1500\n"
+    )
+    (tmp_path / "photos.csv").write_text("photo,camera,x,y,z,omega,phi,kappa\nphoto1,c,0,0,100,0,0,0\n")
+    (tmp_path / "control.csv").write_text(
+        "point,x,y,z,sd_x,sd_y,sd_z\npoint7,-50,0,0,1,1,1\nnew,50,0,0,1,1,1\n"
+    )
+    (tmp_path / "project.toml").write_text("[project]\nformat = 1\n[sd]\nimages = 0.5\n")
+    formats.read(tmp_path)
+    tracemalloc.start()
+    try:
+        block = formats.read(tmp_path).block
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert (block.point_ids[7], block.point_ids[-1]) == ("point7", "new")
+    assert np.flatnonzero(np.isfinite(block.point_sd[:, 0])).tolist() == [7, ROWS]
+    # A dictionary of all names needs 60 bytes more for each.
+    assert peak < 345 * ROWS

@@ -100,7 +100,7 @@ mod _photocore {
         refraction, standard_coordinates, star_places,
     };
     #[pymodule_export]
-    use crate::text::{csv_rows, read_numbers};
+    use crate::text::{TableReader, csv_rows, read_numbers};
     #[pymodule_export]
     use crate::trajectories::{flown, trajectory_span};
 

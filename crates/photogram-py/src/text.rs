@@ -5,6 +5,8 @@ use std::io::{self, Write};
 
 use crate::arrays::Vector;
 use numpy::{PyArray1, PyReadonlyArray1};
+use photocore::files::delimited::{self, Table};
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedStr;
@@ -24,6 +26,44 @@ pub fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Vector<'py>, bool) {
         (numbers, bad.is_none())
     });
     (PyArray1::from_vec(py, numbers), whole)
+}
+
+#[pyclass]
+pub struct TableReader {
+    table: Option<Table>,
+}
+
+#[pymethods]
+impl TableReader {
+    #[new]
+    fn new(delimiter: u8, numeric: Vec<bool>) -> Self {
+        Self { table: Some(Table::new(delimiter, &numeric)) }
+    }
+
+    fn add(&mut self, py: Python<'_>, lines: &[u8]) -> bool {
+        let table = &mut self.table;
+        py.detach(|| {
+            let regular = table.as_mut().is_some_and(|table| table.add(lines).is_some());
+            if !regular {
+                *table = None;
+            }
+            regular
+        })
+    }
+
+    fn columns<'py>(&mut self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let columns = self.table.take().map(Table::columns).unwrap_or_default();
+        columns
+            .into_iter()
+            .map(|column| match column {
+                delimited::Column::Numbers(numbers) => Ok(PyArray1::from_vec(py, numbers).into_any()),
+                delimited::Column::Names(names) => {
+                    let (distinct, text) = (names.are_distinct(), PyBytes::new(py, &names.text));
+                    (text, PyArray1::from_vec(py, names.rows), distinct).into_bound_py_any(py)
+                }
+            })
+            .collect()
+    }
 }
 
 /// Rows that a thread writes at a time.

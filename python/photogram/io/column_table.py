@@ -27,12 +27,13 @@ TRUE, FALSE = (
 class Names:
     """A column of names: each name once, in the order in which they come, and which one each row has.
 
-    `whole` is whether all names are whole numbers: none is empty, none differs by blanks or case alone.
+    `distinct` is whether the reader knows that no name is empty, and that all differ by more than blanks and
+    case.
     """
 
     names: list[str]
     rows: Indices
-    whole: bool = False
+    distinct: bool = False
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ class ColumnTable:
         found = self.ready.get(column)
         if not isinstance(found, Names):
             found = factorised(self._cells(column))
-        if found.whole or _all_apart(found.names):
+        if found.distinct or _all_apart(found.names):
             return found
         for name in found.names:
             if not name or name.lower() == "nan":

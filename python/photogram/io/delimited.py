@@ -1,25 +1,24 @@
 """Tables as people write them: any usual delimiter, decimal point or comma, comments, columns in any order.
 
-The header says what is what. A record is a line; names may stand in quotation marks. Large tables that are
-well formed go through the parser of pandas; all others, and all that is at fault, are read line by line with
+The header says what is what. A record is a line; names may stand in quotation marks. The extension module
+reads large tables of regular lines. All other tables, and all that is at fault, are read line by line with
 the same result and the place of every cell.
 """
 
 from __future__ import annotations
 
+import codecs
 import csv
-import io
 import itertools
 import re
-from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram import _photocore
+from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.column_table import ColumnTable, Names, merged
 from photogram.io.files import read_beginning, read_text, reading
@@ -28,9 +27,9 @@ from photogram.io.rows import DELIMITERS, LONGEST_RECORD
 from photogram.messages import listed, quoted
 
 LARGE = 1 << 20
-"""Bytes from which a table is worth the parser of pandas."""
+"""Bytes of a table above which the extension module reads it."""
 PIECE = 1 << 22
-"""Characters of a large table that are parsed at a time."""
+"""Bytes of a large table that are read at a time."""
 COMMENT = "#"
 TITLES = 30
 """Lines in which a header is looked for below titles."""
@@ -39,8 +38,6 @@ NAMELESS = "?"
 Spelling = Callable[[Sequence[str]], Sequence[str]]
 _SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)
 """What Excel writes before a table."""
-_WHOLE = re.compile("0|[1-9][0-9]*")
-"""A whole number as Python writes it."""
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
 
@@ -62,7 +59,7 @@ def read_columns(
     known
         Columns of which a header has one at least: it may then begin with the mark of a comment.
     numbers
-        Columns that are numbers where they are there: for the parser of large tables.
+        Columns of numbers, if the table has them: for the reader of large tables.
     spelling
         Gives the names of all columns from what the file calls them, in small letters.
     hint
@@ -136,20 +133,14 @@ _Header = tuple[Place, tuple[str, ...], tuple[str, ...], str]
 
 
 def _read(path: Path, header: Callable[[str], _Header], numbers: Collection[str]) -> ColumnTable:
-    """Read a table; one that is large and well formed piece by piece, by its header at the beginning."""
+    """Read a table; a large regular one in pieces, by its header at the beginning."""
     if path.suffix.lower() != ".xlsx" and path.is_file() and path.stat().st_size > LARGE:
         begin = read_beginning(path, LARGE).rpartition("\n")[0]
-        for encoding in ("utf-8-sig", "cp1252"):
-            try:
-                fast = _by_pandas(path, encoding, header(begin), numbers)
-            except UnicodeDecodeError:
-                continue
-            except InputError:
-                # The whole text may have its header later.
-                break
-            if fast is not None:
-                return fast
-            break
+        # If the header is not in the beginning, it is searched in the whole text.
+        with suppress(InputError):
+            table = _regular(path, header(begin), numbers)
+            if table is not None:
+                return table
     text = read_text(path)
     head, own, columns, delimiter = header(text)
     assert head.record is not None
@@ -301,207 +292,51 @@ def _shifted(cells: Sequence[str], columns: Sequence[str], numbers: Collection[s
     return shifted and (not as_is or len(numeric) == len(columns))
 
 
-def _by_pandas(path: Path, encoding: str, header: _Header, numbers: Collection[str]) -> ColumnTable | None:
-    """Read a large table; None if anything is not as it should be: `_by_lines` then names the place."""
+def _regular(path: Path, header: _Header, numbers: Collection[str]) -> ColumnTable | None:
+    """Read a large table; None if a line is irregular: `_by_lines` then reports its location."""
     head, own, columns, delimiter = header
     assert head.record is not None
     if delimiter == " " or not all(columns):
         return None
-    most = _line_ends(path) + 1
-    values = {each: np.empty(most) for each in columns if each in numbers}
-    names = {each: _NameColumn(most) for each in columns if each not in numbers}
-    count = 0
-    for piece, frame in _parsed(path, encoding, header, numbers):
-        lines = piece.count("\n") + 1
-        if "\0" in piece or piece.startswith(COMMENT) or "\n" + COMMENT in piece:
-            return None
-        rows = slice(count, count + lines)
-        if frame is None or len(frame) != lines or rows.stop > most:
-            return None
-        empty = False
-        for each, column in values.items():
-            column[rows] = frame[each]
-            if np.isinf(column[rows]).any():
-                return None
-            empty = empty or bool(np.isnan(column[rows]).any())
-        if empty and not _empty_cells(piece, delimiter, lines, len(columns)):
-            return None
-        if not all(each.add(rows, frame[name]) for name, each in names.items()):
-            return None
-        count += lines
-    if not count:
-        return None
-    for whole in values.values():
-        whole.resize(count, refcheck=False)
-    ready: dict[str, Floats | Names] = {**values}
-    while names:
-        name, own_names = names.popitem()
-        ready[name] = own_names.names(count)
-    records = range(head.record + 1, head.record + 1 + count)
-    return ColumnTable(path, head, columns, count, {}, records, delimiter, ready, own=own)
-
-
-class _NameColumn:
-    """A column of names, built from pieces. Whole numbers are compared as numbers, all of them at once."""
-
-    def __init__(self, most: int) -> None:
-        self._rows = np.empty(most, dtype=np.int64)
-        # The rows before this one have whole numbers, the rows after it places of names.
-        self._whole = 0
-        # A new name has the next number.
-        self._places = defaultdict[str, int](itertools.count().__next__)
-
-    def add(self, rows: slice, cells: Any) -> bool:
-        """Append the cells of a piece. Return False if a cell is empty."""
-        import pandas as pd
-
-        if cells.dtype == np.int64:
-            self._rows[rows] = cells
-            self._whole = rows.stop
-            return True
-        if self._whole:
-            before = self.names(self._whole)
-            self._rows[: self._whole] = before.rows
-            for name in before.names:
-                self._places[name]
-            self._whole = 0
-        codes, texts = pd.factorize(cells)
-        if (codes < 0).any():
-            return False
-        places = map(self._places.__getitem__, map(str.strip, texts.tolist()))
-        self._rows[rows] = np.fromiter(places, np.int64, len(texts))[codes]
-        return True
-
-    def names(self, count: int) -> Names:
-        """Return the names of all rows."""
-        import pandas as pd
-
-        if self._whole:
-            codes, whole = pd.factorize(self._rows[:count])
-            return Names(list(map(str, whole.tolist())), codes, whole=True)
-        self._rows.resize(count, refcheck=False)
-        return Names(list(self._places), self._rows)
-
-
-def _line_ends(path: Path) -> int:
+    reader = _photocore.TableReader(ord(delimiter), [column in numbers for column in columns])
     with reading(path), path.open("rb") as file:
-        return sum(piece.count(b"\n") for piece in iter(partial(file.read, PIECE), b""))
-
-
-def _pieces(path: Path, encoding: str, first: int) -> Iterator[str]:
-    """Yield the lines of a file behind so many first ones in pieces, without the blank lines at the end."""
-    with reading(path), path.open(encoding=encoding) as file:
-        for _ in range(first):
-            file.readline()
-        piece = file.read(PIECE) + file.readline()
-        while piece:
-            after = file.read(PIECE) + file.readline()
-            body = piece.removesuffix("\n") if after else piece.rstrip("\n")
-            if body or after:
-                yield body
-            piece = after
-
-
-def _parsed(
-    path: Path, encoding: str, header: _Header, numbers: Collection[str]
-) -> Iterator[tuple[str, Any]]:
-    """Yield pieces of a table with their frames, None of other cells; a thread parses the next piece."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    head, _, columns, delimiter = header
-    assert head.record is not None
-    pieces = _pieces(path, encoding, head.record)
-    piece = next(pieces, "")
-    parse = _parser(path, piece, columns, delimiter, numbers)
-    with ThreadPoolExecutor(1) as pool:
-        frame = pool.submit(parse, piece)
-        for after in pieces:
-            ahead = pool.submit(parse, after)
-            yield piece, frame.result()
-            piece, frame = after, ahead
-        if piece:
-            yield piece, frame.result()
-
-
-def _parser(
-    path: Path, piece: str, columns: Sequence[str], delimiter: str, numbers: Collection[str]
-) -> Callable[[str], Any]:
-    """Return what makes a frame of a piece of a table, and None of one with other cells."""
-    import pandas as pd
-
-    # From version 3 on pandas reads every number to the last bit, and does not want to be asked.
-    exact: dict[str, Any] = (
-        {} if int(pd.__version__.partition(".")[0]) >= 3 else {"float_precision": "round_trip"}
-    )
-    sample = _split(Place(path, text=piece.partition("\n")[0]), delimiter)
-    comma = delimiter != "," and any(
-        "," in cell for each, cell in zip(columns, sample, strict=False) if each in numbers
-    )
-    form: dict[str, Any] = {
-        "sep": delimiter,
-        "names": list(columns),
-        "header": None,
-        "index_col": False,
-        "decimal": "," if comma else ".",
-        "keep_default_na": False,
-        "na_values": [""],
-        "skipinitialspace": True,
-        "skip_blank_lines": False,
-        "low_memory": False,
-        "engine": "c",
-        **exact,
-    }
-
-    kinds = {
-        each: "float64" if each in numbers else "int64" if _WHOLE.fullmatch(cell) else "object"
-        for each, cell in itertools.zip_longest(columns, sample[: len(columns)], fillvalue="")
-    }
-
-    def frame_of(cells: bytes) -> Any:
-        try:
-            return pd.read_csv(io.BytesIO(cells), dtype=kinds, **form)
-        except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning):
+        mark = codecs.BOM_UTF8
+        file.seek(len(mark) if file.read(len(mark)) == mark else 0)
+        above = b"".join(itertools.islice(file, head.record))
+        # A carriage return alone ends a line, too.
+        if b"\r" in above.replace(b"\r\n", b""):
             return None
-
-    def parsed(text: str) -> Any:
-        cells = text.encode()
-        frame = frame_of(cells)
-        whole = [each for each, kind in kinds.items() if kind == "int64"]
-        if whole and (frame is None or not _as_written(frame, whole, cells, delimiter)):
-            kinds.update(dict.fromkeys(whole, "object"))
-            frame = frame_of(cells)
-        return frame
-
-    return parsed
-
-
-def _as_written(frame: Any, columns: Sequence[str], cells: bytes, delimiter: str) -> bool:
-    """Whether whole numbers of a frame are all that their cells have: digits alone, without a leading 0."""
-    signs = np.frombuffer(cells, dtype=np.uint8)
-    bounds = np.flatnonzero((signs == ord(delimiter)) | (signs == ord("\n")))
-    shape = frame.shape
-    if b'"' in cells or len(bounds) + 1 != frame.size:
-        return False
-    starts = np.append(0, bounds + 1).reshape(shape)
-    if (signs[starts[1:, 0] - 1] != ord("\n")).any():
-        return False
-    zero = ord("0")
-    for each in columns:
-        first = starts[:, frame.columns.get_loc(each)]
-        # A blank and a sign come before 0.
-        if frame[each].dtype != np.int64 or (signs[first] < zero).any():
-            return False
-        leading = first[signs[first] == zero] + 1
-        following = signs[leading[leading < len(signs)]]
-        if ((following >= zero) & (following <= ord("9"))).any():
-            return False
-    return True
+        while lines := file.read(PIECE) + file.readline():
+            if not reader.add(lines):
+                return None
+    contents = dict(zip(columns, reader.columns(), strict=True))
+    ready = _decoded(contents, "utf-8") or _decoded(contents, "cp1252")
+    if ready is None:
+        return None
+    values = next(iter(ready.values()))
+    count = len(values.rows if isinstance(values, Names) else values)
+    records = range(head.record + 1, head.record + 1 + count)
+    return ColumnTable(path, head, columns, count, {}, records, delimiter, ready, own=own) if count else None
 
 
-def _empty_cells(body: str, delimiter: str, count: int, width: int) -> bool:
-    """Whether all that pandas has no number of must be empty cells: no row is short, and none says NaN."""
-    whole = '"' not in body and body.count(delimiter) == count * (width - 1)
-    return whole and "nan" not in body.casefold()
+def _decoded(
+    contents: Mapping[str, Floats | tuple[bytes, Indices, bool]], encoding: str
+) -> dict[str, Floats | Names] | None:
+    """Return columns with names in an encoding; None if the names have another encoding."""
+    ready: dict[str, Floats | Names] = {}
+    for column, content in contents.items():
+        if isinstance(content, np.ndarray):
+            ready[column] = content
+            continue
+        text, rows, distinct = content
+        try:
+            names = text.decode(encoding).split("\n")[:-1]
+        except UnicodeDecodeError:
+            return None
+        ready[column] = (
+            Names(names, rows, distinct) if text.isascii() else merged(rows, list(map(str.strip, names)))
+        )
+    return ready
 
 
 def _parquet(path: Path, spelling: Spelling, numbers: Collection[str]) -> ColumnTable:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -172,8 +173,7 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     if control is not None and given is not None:
         from photogram.formats.control_system import check_systems
 
-        rows = np.array([places[name] for name in given.names], dtype=np.int64)
-        check_systems(project, settings, control, rows, control.vectors(AXES), free=False)
+        check_systems(project, settings, control, points.control_rows, control.vectors(AXES), free=False)
     return project
 
 
@@ -310,10 +310,31 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     return _Given(table, names, values, held, check_sd, observed, vegetated)
 
 
+class _PointRows(Mapping[str, int]):
+    """The row of each point by its name. The first lookup makes the dictionary."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = names
+
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        return dict(zip(self._names, range(len(self._names)), strict=True))
+
+    def __getitem__(self, name: str) -> int:
+        return self._rows[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
 @dataclass(frozen=True)
 class _Points:
     names: list[str]
-    places: dict[str, int]
+    places: Mapping[str, int]
+    control_rows: Indices
     starts: Floats
     positions: Floats
     sd: Floats
@@ -324,14 +345,17 @@ class _Points:
 def _points(tables: Tables, transform: Transform, images: Images, control: _Given | None) -> _Points:
     table = tables.read("points")
     own = table.names_once("point") if table is not None else []
-    places = dict(zip(images.point_names, range(len(images.point_names)), strict=True))
-    for name in (*(control.names if control else ()), *own):
-        places.setdefault(name, len(places))
-    names = list(places)
+    listed = [*(control.names if control else ()), *own]
+    few = None if own else set(listed)
+    rows_of_names = {name: row for row, name in enumerate(images.point_names) if few is None or name in few}
+    names = list(images.point_names)
+    for name in listed:
+        if rows_of_names.setdefault(name, len(names)) == len(names):
+            names.append(name)
     starts = np.full((len(names), 3), np.nan)
     positions, sd, check_sd = starts.copy(), np.full((len(names), 3), np.inf), starts.copy()
     if table is not None:
-        rows = np.array([places[name] for name in own], dtype=np.int64)
+        rows = np.array([rows_of_names[name] for name in own], dtype=np.int64)
         given = table.vectors(AXES)
         own_sd = tables.deviations(table, "points", SD_AXES, math.inf)
         given, _ = transform.positions("points", given, None, table)
@@ -343,8 +367,8 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
         positions[rows] = np.where(held[:, np.newaxis], given, np.nan)
         sd[rows] = own_sd
     observed: list[Observation] = []
+    rows = np.array([rows_of_names[name] for name in control.names] if control else [], dtype=np.int64)
     if control is not None:
-        rows = np.array([places[name] for name in control.names], dtype=np.int64)
         apart = np.abs(starts[rows] - control.positions)
         if (apart > DIFFER).any():
             row, k = np.argwhere(apart > DIFFER)[0].tolist()
@@ -353,8 +377,9 @@ def _points(tables: Tables, transform: Transform, images: Images, control: _Give
                 f"{control.names[row]} has another {AXES[k]} in the table points, by {apart[row, k]:.6g}",
             )
         positions[rows], sd[rows], check_sd[rows] = control.positions, control.sd, control.check_sd
-        for each in control.observed:
-            positions[places[each.points[0]]] = np.nan
+        positions[[rows_of_names[each.points[0]] for each in control.observed]] = np.nan
         observed = control.observed
         starts[rows] = np.where(np.isnan(control.positions), starts[rows], control.positions)
-    return _Points(names, places, starts, positions, sd, check_sd, observed)
+    complete = len(rows_of_names) == len(names)
+    places = rows_of_names if complete else _PointRows(names)
+    return _Points(names, places, rows, starts, positions, sd, check_sd, observed)
