@@ -64,16 +64,15 @@ def measured(size: str, points: float, maps: bool, into: Path) -> Iterator[tuple
 
 def pictures(result: Result, into: Path, size: str) -> Iterator[list[str]]:
     """Give name, time and size of each picture as a PNG file, and of the same in the report."""
-    from photogram.plots import figures
     from photogram.results.page.network import drawings
     from photogram.show.html import inlined
-    from photogram.show.pictures import files
 
     for name, drawing in drawings(result).items():
         inside, picture = timed(partial(inlined, drawing))
         if picture is None:
             continue
-        seconds, written = timed(lambda name=name: files(figures(result, [name]), into, "png"))
+        seconds, content = timed(lambda name=name: getattr(result.plot, name)().render("png"))
+        written = {into / f"{name}.png": content}
         yield [name, *_kept(written, size, seconds), f"{inside:.2f}", _kilobytes(len(picture.markup))]
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from views import svg
 
-from photogram.plots.trajectories import trajectory
 from photogram.show.pictures import new_figure
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
@@ -25,7 +24,7 @@ FIGURE = Path(__file__).with_name("moving.svg")
 def draw() -> Figure:
     """Draw corrections of positions and of rotations, with their standard deviations."""
     figure = new_figure(9.0, 3.4)
-    trajectory(adjust(measured()[0]), figure)
+    adjust(measured()[0]).plot.trajectory().on(figure)
     return figure
 
 

@@ -15,8 +15,6 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
-from walk import rounded
 
 from photogram import (
     Block,
@@ -29,7 +27,7 @@ from photogram import (
     simulate,
 )
 from photogram.giant import read_project
-from photogram.plots import drawn, figures
+from photogram.plots import Plot
 from photogram.results.fitting import with_features
 from photogram.show.methods import page_of
 from photogram.show.page import Drawing
@@ -62,14 +60,14 @@ def scanned() -> Result:
     return adjust(project.block, unit_variance="unity")
 
 
-def stated() -> Figure:
+def stated() -> Plot:
     """Return the map on the first sheet of the statement of the packaged survey."""
     project = formats.read(str(files("photogram") / "examples" / "survey"))
     page = page_of(adjust(project.block, unit_variance="unity").statement(**project.statement))
     drawings = [part for section in page.sections for part in section.parts if isinstance(part, Drawing)]
-    figure = next(each for each in drawings if each.name == "map-differences").draw()
-    assert figure is not None
-    return figure
+    plot = next(each for each in drawings if each.name == "map-differences").sketch()
+    assert plot is not None
+    return plot
 
 
 def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
@@ -86,13 +84,9 @@ def results() -> dict[str, tuple[Result, tuple[str, ...]]]:
 
 def pictures() -> dict[str, str]:
     """Return the drawings by their names."""
-    every = {
-        name: figure
-        for result, names in results().values()
-        for name, figure in figures(result, names).items()
-    }
+    every = {name: getattr(result.plot, name)() for result, names in results().values() for name in names}
     every["statement"] = stated()
-    return {name: rounded(drawn(figure, FOLDER / f"{name}.svg").decode()) for name, figure in every.items()}
+    return {name: plot.render("svg").decode() for name, plot in every.items()}
 
 
 def main() -> None:

@@ -20,8 +20,8 @@ def side_by_side(result: Result) -> Figure:
     """Return the network and the correlations of the camera in one figure."""
     figure = Figure(figsize=(14.0, 6.0), layout="constrained")
     left, right = figure.subplots(1, 2)
-    result.plot.network(left)
-    result.plot.correlations(right)
+    result.plot.network().on(left)
+    result.plot.correlations().on(right)
     right.set_title("which parameters of the lens stand for one another", loc="left")
     return figure
 

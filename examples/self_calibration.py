@@ -86,9 +86,9 @@ def main(picture: Path | None = None) -> Result:
     start = report.index("Calibration of")
     print(report[start : report.index("\n\nPhotos\n", start)])
     if picture is not None:
-        from photogram.results import draw_distortion  # needs matplotlib
+        from photogram.results import plot_distortion
 
-        draw_distortion(result, result.cameras[0], picture)
+        plot_distortion(result, result.cameras[0]).save(picture)
     return result
 
 

@@ -1,7 +1,7 @@
 """Weights that are wrong, and what to do: a block whose second strip was measured by a less careful observer.
 
 Prints the variance components, the variance as a function of the radius, and the tests of sums by photo; a
-directory as argument gets the pictures (needs matplotlib).
+directory as argument gets the plots.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from photogram import Block, adjust, group_sums, simulate, variance_components, variance_function
-from photogram.results import draw_components, draw_variance_function
 
 FACTOR = 2.5
 """Of the errors of the second strip."""
@@ -49,8 +48,8 @@ def main(pictures: Path | None) -> None:
     print(function.report())
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
-        draw_components(components, pictures / "components.svg")
-        draw_variance_function(function, pictures / "radius.svg")
+        components.plot().save(pictures / "components.svg")
+        function.plot().save(pictures / "radius.svg")
 
 
 if __name__ == "__main__":

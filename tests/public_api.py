@@ -43,7 +43,7 @@ def members(name: str, kind: type) -> Iterator[str]:
         value = inspect.getattr_static(kind, attribute, None)
         if attribute in fields or isinstance(value, property | functools.cached_property):
             yield f"{name}.{attribute}"
-        elif isinstance(value, staticmethod | classmethod) or callable(value):
+        elif isinstance(value, staticmethod | classmethod) or callable(getattr(kind, attribute, None)):
             yield f"{name}.{attribute}{arguments(getattr(kind, attribute))}"
         else:
             yield f"{name}.{attribute}"

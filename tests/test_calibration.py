@@ -198,7 +198,7 @@ def test_what_comes_from_a_prior_is_said(example):
 
 
 def test_other_terms_have_a_field_of_vectors(example, result, tmp_path):
-    from photogram.results import draw_lens_field
+    from photogram.results import plot_lens_field
 
     camera = result.cameras[0]
     field = lens_field(result, camera)
@@ -210,12 +210,12 @@ def test_other_terms_have_a_field_of_vectors(example, result, tmp_path):
     np.testing.assert_allclose(field.vectors, partials @ camera.values[p], rtol=1e-8, atol=1e-14)
     covariances = partials @ camera.covariance[np.ix_(p, p)] @ partials.transpose(0, 2, 1)
     np.testing.assert_allclose(field.covariances, covariances, rtol=1e-6, atol=1e-16)
-    draw_lens_field(result, camera, tmp_path / "field.png")
+    plot_lens_field(result, camera).save(tmp_path / "field.png")
     assert (tmp_path / "field.png").read_bytes().startswith(b"\x89PNG")
     bare = adjust(example.measured().replace(cameras=[example.START.replace(sd={"c": FREE, "K1": FREE})]))
     assert lens_field(bare, bare.cameras[0]) is None
     with pytest.raises(ValueError, match="no terms beside the radial ones"):
-        draw_lens_field(bare, bare.cameras[0], tmp_path / "none.png")
+        plot_lens_field(bare, bare.cameras[0])
 
 
 def flat(example):

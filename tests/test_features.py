@@ -161,7 +161,8 @@ def test_reports_tables_and_saved_results_have_them(result, names, tmp_path):
 
 def test_deviations_are_drawn(result, names):
     told = with_features(result, {"ground": ("plane", names), "d": ("distance", names[:2])})
-    axes = told.plot.features(Figure())
+    axes = Figure().subplots()
+    told.plot.features().on(axes)
     assert axes.get_title(loc="left") == "ground: plane through 8 points"
     (marks,) = [each for each in axes.collections if isinstance(each, PathCollection)]
     drawn = marks.get_offsets()[:, 1]

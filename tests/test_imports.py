@@ -26,7 +26,7 @@ import public_api
         ("from photogram.distributed import plan_in_parts", "plan_in_parts"),
         ("from photogram.network import Film, Trajectory, project, with_gnss", "project"),
         ("import photogram", "photogram.formats.csm.read_support"),
-        ("import photogram", "photogram.comparator.pictures.figures"),
+        ("import photogram", "photogram.comparator.pictures.sketches"),
         ("import photogram.io.writing.targets", "photogram.io.writing.targets.check_outputs"),
     ],
 )

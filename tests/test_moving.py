@@ -563,9 +563,7 @@ def test_the_example_of_a_line_scanner(capsys):
     clock = next(each for each in result.unknowns if each.kind == "clock")
     assert abs(clock.position[0] - 0.012) < 3 * clock.sd[0]
     assert capsys.readouterr().out.count("\n") == 4
-    pytest.importorskip("matplotlib")
-    axes = result.plot.trajectory()
-    assert [each.get_ylabel() for each in axes] == ["position, m", "rotation, rad"]
+    assert [panel.up for panel in result.plot.trajectory().panels] == ["position, m", "rotation, rad"]
     with pytest.raises(InputError, match="no trajectory nowhere"):
         result.plot.trajectory(name="nowhere")
     with pytest.raises(InputError, match="reaches from"):

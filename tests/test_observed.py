@@ -10,7 +10,7 @@ from photogram import Orientation, Result, collection
 from photogram.collection import AdjustedCollection
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Shown, axes_of, columns_of, report_of
+from photogram.show.methods import Shown, columns_of, report_of
 
 KINDS = {
     "image": ("residuals", "redundancy", "standardized"),
@@ -152,7 +152,6 @@ def test_a_way_that_nobody_has_defined_says_so():
         Bare().report,
         Bare().to_json,
         lambda: columns_of(Bare(), "photo"),
-        lambda: axes_of(Bare()),
     ):
         with pytest.raises(NotImplementedError, match="Bare has no"):
             way()

@@ -463,8 +463,8 @@ def test_plan_writes_a_document_and_a_picture(run, tmp_path):
 
 
 def test_the_picture_has_a_panel_for_each_pattern(two_patterns):
-    pytest.importorskip("matplotlib")
-    figure = two_patterns.plot()
+    figure = pytest.importorskip("matplotlib.figure").Figure()
+    two_patterns.plot().on(figure)
     panels, bar = figure.axes[:2], figure.axes[2]
     assert [axes.get_title(loc="left").split("\n")[0] for axes in panels] == ["perimeter", "corners"]
     limits = {axes.collections[0].get_clim() for axes in panels}
@@ -482,7 +482,6 @@ def test_the_picture_has_a_panel_for_each_pattern(two_patterns):
 
 
 def test_a_picture_of_control_only_is_refused():
-    pytest.importorskip("matplotlib")
     block = network()
     made = plan({"all held": block.replace(point_sd=np.array(0.1))})
     assert made.patterns[0].points[-1].points == 0

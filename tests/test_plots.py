@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from importlib.resources import files
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,16 @@ from matplotlib.figure import Figure
 from example_scripts import EXAMPLES, load
 from photogram import InputError, adjust, collection, simulate
 from photogram.giant import read_project
-from photogram.plots import PICTURES, drawn, figures, picture_files
+from photogram.plots import Plot
+from photogram.plots.accessor import PLOTS
 from photogram.plots.cells import cells
 from photogram.plots.picture_data import pictured
-from photogram.show.axes import labels
+from photogram.show.sketch.declared import Panel
+from photogram.show.sketch.marks import Names
+from photogram.show.sketch.on_axes import figure
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}
-OF_LENSES = [name for name in PICTURES if name not in ("features", "films")]
+OF_LENSES = [name for name in PLOTS if name not in ("features", "films")]
 """Of networks with unknown lenses, to which nothing is fitted, without films."""
 
 
@@ -43,61 +47,68 @@ def large():
     return adjust(simulate(strips=8, photos_per_strip=60, points_per_photo=30, position_sd=0.1, seed=1).block)
 
 
-def written(figure):
-    """Return all letters of a figure that are seen."""
+def written(plot):
+    """Return all letters of a plot that are seen on axes."""
     found = []
-    for axes in figure.axes:
+    for axes in figure(plot).axes:
         found += [axes.get_title(loc="left"), axes.get_xlabel(), axes.get_ylabel()]
         found += [text.get_text() for text in axes.texts]
-        found += [artist.txt.get_text() for artist in axes.artists if hasattr(artist, "txt")]
         if axes.get_legend():
             found += [text.get_text() for text in axes.get_legend().get_texts()]
     return "\n".join(found)
 
 
-def test_every_network_has_its_pictures(galveston, calibrated, ring):
-    assert set(figures(galveston)) == ALWAYS
-    assert set(figures(calibrated)) == set(figures(ring)) == set(OF_LENSES)
+def test_every_network_has_its_plots(galveston, calibrated, ring):
+    assert set(galveston.plot.available()) == ALWAYS
+    assert set(calibrated.plot.available()) == set(ring.plot.available()) == set(OF_LENSES)
 
 
-def test_pictures_take_axes_and_return_them(calibrated):
-    figure = Figure()
-    axes = figure.subplots(3, 2)
-    assert calibrated.plot.network(axes[0, 0]) is axes[0, 0]
-    assert calibrated.plot.correlations(axes[0, 1]) is axes[0, 1]
-    assert calibrated.plot.residuals(axes[1, 0]) is axes[1, 0]
-    assert calibrated.plot.tests(axes[2]).tolist() == axes[2].tolist()
-    with pytest.raises(InputError, match="2 panels, but ax is 1 axes"):
-        calibrated.plot.redundancy(axes[1, 1])
+def test_plots_are_drawn_on_axes(calibrated):
+    axes = Figure().subplots(3, 2)
+    calibrated.plot.network().on(axes[0, 0])
+    calibrated.plot.residuals().on(axes[1, 0])
+    calibrated.plot.tests().on(axes[2])
+    assert [each.has_data() for each in axes.flat] == [True, False, True, False, True, True]
+    with pytest.raises(InputError, match="2 panels and needs as many axes, got 1"):
+        calibrated.plot.redundancy().on(axes[1, 1])
+    empty = Figure()
+    calibrated.plot.redundancy().on(empty)
+    assert len(empty.axes) == 3
 
 
-def test_without_axes_there_is_a_new_figure_of_pyplot(galveston):
-    from matplotlib import pyplot
+def test_a_plot_shows_itself_in_a_notebook(galveston, calibrated):
+    plot = galveston.plot.network()
+    assert isinstance(plot, Plot)
+    assert repr(plot) == f"Plot({galveston.block.title!r}, 1 panel, {plot.width:.3g} x {plot.height:.3g} in)"
+    first, second = (each._repr_svg_() for each in (plot, calibrated.plot.network()))
+    identifiers = [set(re.findall(r'id="([^"]+)"', each)) for each in (first, second)]
+    assert identifiers[0]
+    assert identifiers[0].isdisjoint(identifiers[1])
+    assert first == galveston.plot.network()._repr_svg_()
 
-    before = pyplot.get_fignums()
-    axes = galveston.plot.network()
-    [number] = set(pyplot.get_fignums()) - set(before)
-    assert axes.get_figure().number == number
-    pyplot.close(number)
+
+def test_methods_have_the_arguments_and_docstrings_of_their_functions(galveston):
+    method = galveston.plot.network
+    assert str(signature(method)).startswith("(*, plane:")
+    assert method.__doc__ == PLOTS["network"].__doc__
+    assert {*PLOTS, "trajectory"} <= set(dir(galveston.plot))
 
 
-def test_pictures_of_what_is_not_there_say_so(galveston):
+def test_plots_without_data_are_refused(galveston):
     with pytest.raises(InputError, match="no correlations to draw"):
         galveston.plot.correlations()
     with pytest.raises(InputError, match="no distortion to draw"):
         galveston.plot.distortion()
     with pytest.raises(InputError, match="plane is one of XY, XZ, YZ"):
         galveston.plot.network(plane="up")
-    with pytest.raises(InputError, match="there is no picture map"):
-        figures(galveston, ["map"])
     with pytest.raises(TypeError, match="no pictures of str"):
-        figures("galveston")
+        PLOTS["network"]("galveston")
     bare = adjust(galveston.block, covariance=False)
-    assert set(figures(bare)) == {"network", "residuals"}
+    assert set(bare.plot.available()) == {"network", "residuals"}
 
 
 def test_the_network_shows_what_it_is_of(galveston):
-    said = written(figures(galveston, ["network"])["network"])
+    said = written(galveston.plot.network())
     assert "E, m" in said
     assert "photo (20)" in said
     assert "control point (22)" in said
@@ -111,22 +122,21 @@ def test_the_network_shows_what_it_is_of(galveston):
 
 
 def test_large_networks_are_thinned_and_the_picture_says_so(large):
-    drawn = figures(large)
-    said = written(drawn["network"])
+    plots = large.plot.available()
+    said = written(plots["network"])
     assert "400 of 480 footprints are drawn" in said
     assert "the median one of each of" in said
-    count = sum(len(each.get_offsets()) for each in drawn["network"].axes[0].collections[1:6])
+    count = sum(len(each.get_offsets()) for each in figure(plots["network"]).axes[0].collections[1:6])
     assert count <= 6000 + 150
-    assert "means of cells with" in written(drawn["residuals"])
-    content = picture_files(large, Path("pictures"), "svg")
-    assert {path.name for path in content} == {f"{name}.svg" for name in ALWAYS}
-    assert sum(map(len, content.values())) < 3e6
+    assert "means of cells with" in written(plots["residuals"])
+    assert set(plots) == ALWAYS
+    assert sum(len(plot.render("svg")) for plot in plots.values()) < 3e6
 
 
 def test_names_do_not_touch(galveston):
-    figure = figures(galveston, ["network"])["network"]
-    figure.draw_without_rendering()
-    axes = figure.axes[0]
+    drawn = figure(galveston.plot.network())
+    drawn.draw_without_rendering()
+    axes = drawn.axes[0]
     named = [
         text
         for text in axes.texts
@@ -138,14 +148,11 @@ def test_names_do_not_touch(galveston):
         assert not any(box.overlaps(other) for other in boxes[:row])
 
 
-def test_a_name_without_room_is_left_out():
-    figure = Figure(figsize=(2.0, 2.0))
-    axes = figure.subplots()
-    axes.set(xlim=(0, 1), ylim=(0, 1))
+def test_a_name_without_room_is_omitted():
     places = np.full((12, 2), 0.5) + 1e-3 * np.arange(12)[:, np.newaxis]
-    left_out = labels(axes, places, ["a long name"] * 12, ["black"] * 12)
-    assert 0 < left_out < 12
-    assert len(axes.texts) == 12 - left_out
+    names = Names(places, ["a long name"] * 12, ["black"] * 12)
+    axes = figure(Plot(2.0, 2.0, [Panel(np.array([[0.0, 0.0], [1.0, 1.0]]), [names])])).axes[0]
+    assert 0 < len(axes.texts) < 12
 
 
 def test_means_of_cells():
@@ -162,23 +169,22 @@ def test_a_lens_that_was_left_out_shows_in_the_means_of_the_cells(large):
     block = large.block
     radius = np.hypot(*block.image_xy.T)[:, np.newaxis]
     bent = block.replace(image_xy=block.image_xy * (1 + 3e-8 * radius**2))
-    said = written(figures(adjust(bent), ["residuals"])["residuals"])
+    said = written(adjust(bent).plot.residuals())
     assert "are larger than chance gives" in said
-    assert "are larger than chance gives" not in written(figures(large, ["residuals"])["residuals"])
+    assert "are larger than chance gives" not in written(large.plot.residuals())
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_equal_results_give_equal_files(ring, ending):
-    path = Path(f"network.{ending}")
-    first, second = (drawn(figures(ring, ["network"])["network"], path) for _ in range(2))
+    first, second = (ring.plot.network().render(ending) for _ in range(2))
     assert first == second
 
 
 def test_saved_pictures_are_all_there(calibrated, tmp_path):
     found = calibrated.plot.save(tmp_path, "svg")
     assert [path.name for path in found] == [f"{name}.svg" for name in OF_LENSES]
-    assert all(path.read_bytes().startswith(b"<?xml") for path in found)
-    with pytest.raises(InputError, match="matplotlib draws no 'doc'"):
+    assert all(path.read_bytes().startswith(b"<svg") for path in found)
+    with pytest.raises(InputError, match="the format 'doc'"):
         calibrated.plot.save(tmp_path, "doc")
 
 
@@ -197,13 +203,16 @@ def test_pictures_need_a_place(run):
     assert "goes with --out DIR" in result.stderr
 
 
-def test_a_result_is_there_without_matplotlib_and_pictures_name_the_extra(galveston, monkeypatch):
+def test_svg_needs_no_matplotlib_and_other_formats_name_the_extra(galveston, monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert "network" in repr(galveston.plot)
-    with pytest.raises(ModuleNotFoundError, match=r"pip install 'photogram\[plots\]'"):
-        galveston.plot.network()
+    plot = galveston.plot.network()
+    assert plot.render("svg").startswith(b"<svg")
+    for draw in (lambda: plot.render("png"), lambda: plot.on(None)):
+        with pytest.raises(ModuleNotFoundError, match=r"pip install 'photogram\[plots\]'"):
+            draw()
 
 
 def test_an_adjustment_loads_no_matplotlib():
@@ -220,7 +229,7 @@ def test_the_page_quotes_the_example_and_shows_pictures_that_are_there():
     assert subprocess.run(command, check=False).returncode == 0
     page = (root / "docs" / "pictures.md").read_text(encoding="utf-8")
     shown = re.findall(r"!\[[^\]]+\]\(pictures/(\w+)\.svg\)", page)
-    assert sorted(shown) == sorted(PICTURES)
+    assert sorted(shown) == sorted(PLOTS)
     for name in shown:
         assert 5_000 < (root / "docs" / "pictures" / f"{name}.svg").stat().st_size < 200_000
 
@@ -240,11 +249,8 @@ def test_what_weighs_nothing_is_no_spike_among_test_values():
     plain = adjust(simulate(**options).block)
     block = simulate(**options).block
     loose = adjust(block.replace(photo_position_sd=1e6, photo_attitude_sd=1e3))
-    counts = []
-    for each in (plain, loose):
-        axes = each.plot.tests()
-        counts.append(axes[0].get_legend().get_texts()[0].get_text())
-    assert counts[0] == counts[1]
+    first, second = (each.plot.tests().panels[0].marks[0].label for each in (plain, loose))
+    assert first == second
 
 
 def test_names_of_photos_can_be_read():
@@ -254,9 +260,10 @@ def test_names_of_photos_can_be_read():
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channel]
     luminance = float(np.dot([0.2126, 0.7152, 0.0722], linear))
     assert 1.05 / (luminance + 0.05) > 4.5
-    axes = adjust(simulate(strips=2, photos_per_strip=4, seed=5).block).plot.network()
-    colours = {each.get_color() for each in np.ravel(axes)[0].texts if each.get_text().startswith("010")}
-    assert colours == {SOFT}
+    [panel] = adjust(simulate(strips=2, photos_per_strip=4, seed=5).block).plot.network().panels
+    [names] = [mark for mark in panel.marks if isinstance(mark, Names)]
+    colours = zip(names.texts, names.colours, strict=True)
+    assert {colour for name, colour in colours if name.startswith("010")} == {SOFT}
 
 
 def test_the_repr_of_a_result_has_all_of_its_verdict():

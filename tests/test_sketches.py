@@ -13,13 +13,12 @@ from example_scripts import load
 from photogram import adjust, collection, formats, simulate
 from photogram.giant import read_project
 from photogram.lazy_dataclasses import fields
-from photogram.plots import PICTURES, figures
-from photogram.plots.accessor import sketch_of
 from photogram.show.sketch.colours import rgb
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import laid_out
 from photogram.show.sketch.letters import width, wrapped
 from photogram.show.sketch.marks import Contours, Ellipses, Level, Markers, Mesh, Names, Shades, Texts
+from photogram.show.sketch.on_axes import figure
 from photogram.show.sketch.svg import svg_of
 from photogram.show.sketch.svg_marks import svg
 from photogram.show.sketch.ticks import ticks
@@ -48,7 +47,7 @@ RESULTS = {
 def sketches(request):
     """Return the pictures of a result by name."""
     result = RESULTS[request.param]()
-    return {name: found for name in PICTURES if (found := sketch_of(result, name)) is not None}
+    return result.plot.available()
 
 
 def test_pictures_are_whole_and_their_identifiers_begin_with_their_names(sketches):
@@ -78,11 +77,11 @@ def test_numbers_along_axes_lie_within_their_limits(sketches):
 
 
 def test_both_renderers_show_the_same(ring_result):
-    for name, figure in figures(ring_result).items():
-        sketch = sketch_of(ring_result, name)
+    for sketch in ring_result.plot.available().values():
+        drawn = figure(sketch)
         panels = [each for each in sketch.panels if each is not None]
         said = "".join(text for text, _ in boxes(elements(sketch)[0]))
-        for axes, panel in zip(figure.axes, panels, strict=False):
+        for axes, panel in zip(drawn.axes, panels, strict=False):
             np.testing.assert_allclose(np.array([axes.get_xlim(), axes.get_ylim()]).T, panel.limits)
             assert axes.get_title(loc="left") == panel.title
             if axes.get_legend():

@@ -46,9 +46,11 @@ def pictures(block: Block) -> list[str]:
     from matplotlib.figure import Figure
 
     result: Result = adjust(block)
-    axes = result.plot.network(Figure().subplots())
-    axes.set_title("a block")
-    return [axes.get_title(), *photogram.plots.figures(result, ["residuals"])]
+    axes = Figure().subplots()
+    plot: photogram.plots.Plot = result.plot.network(plane="XZ")
+    plot.on(axes)
+    plot.save("network.svg")
+    return [axes.get_title(), *result.plot.available()]
 
 
 def cameras() -> list[Camera]:

@@ -143,11 +143,9 @@ def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
 
 def test_feature_18_pictures(full):
     pytest.importorskip("matplotlib")
-    from photogram.comparator.pictures import figures
-    from photogram.comparator.pictures.book import sketches
+    from photogram.comparator.pictures import sketches
 
     made = sketches(full)
-    assert [name for name, _ in figures(full)] == list(made)
     assert {
         "variance",
         "comparator-residuals",

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from golden_data import DATA, golden
 from photogram import InputError, Result, adjust, formats, simulate
@@ -15,6 +14,7 @@ from photogram.network import Fiducial, Film, KnownTogether, Mark
 from photogram.results.film_pictures import film_patterns, mark_residuals, mean_mark_residuals
 from photogram.results.film_report import film_table, scanner_table
 from photogram.show.quantity import labelled
+from photogram.show.sketch.marks import Names
 
 ARCHIVE = files("photogram") / "examples" / "archive"
 
@@ -148,14 +148,15 @@ def test_the_report_says_what_the_tables_say() -> None:
 
 
 def test_marks_and_patterns_are_drawn_and_stand_on_the_page() -> None:
-    drawn = archive().plot.films(Figure())
-    assert [axes.get_title(loc="left") for axes in drawn] == [
+    panels = archive().plot.films().panels
+    assert [panel.title for panel in panels if panel] == [
         "rc10-2345: residuals of marks, mean of 6 photos",
         "roll-7: pattern w1 w2",
     ]
-    assert {text.get_text() for text in drawn[0].texts} >= {"ll", "ur", "mt"}
+    [names] = [mark for mark in panels[0].marks if isinstance(mark, Names)]
+    assert {*names.texts} >= {"ll", "ur", "mt"}
     page = archive().to_html().decode()
     assert "picture-films" in page
     assert "The same as six numbers" in page
     with pytest.raises(InputError, match="neither residuals of marks nor patterns"):
-        adjust(simulate().block).plot.films(Figure())
+        adjust(simulate().block).plot.films()

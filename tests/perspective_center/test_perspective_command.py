@@ -14,7 +14,7 @@ import pytest
 from photogram import InputError
 from photogram.perspective_center import read_deck, run_deck
 from photogram.perspective_center.listing import listing
-from photogram.perspective_center.plot import draw
+from photogram.perspective_center.plot import run_sketch
 
 REPOSITORY = Path(__file__).parents[2]
 EXAMPLE = files("photogram") / "examples" / "perspective_center" / "grid.deck"
@@ -169,8 +169,8 @@ def test_a_set_that_cannot_be_solved_stops_the_run(run, singular):
 
 
 def test_plots_that_cannot_be_drawn(run, tmp_path):
-    with pytest.raises(InputError, match=r"out\.xyz: matplotlib draws no 'xyz'"):
-        draw(run_deck(Path(str(EXAMPLE))).results, tmp_path / "out.xyz")
+    with pytest.raises(InputError, match="the format 'xyz'"):
+        run_sketch(run_deck(Path(str(EXAMPLE))).results).save(tmp_path / "out.xyz")
     result = run("--example", "--out", "o", "--plots", "--plot-format", "xyz", "--json", "out.json")
     assert result.exit_code == 2
     assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,7 @@ from photogram import Camera, InputError, variance_components
 from photogram.targets import (
     difference,
     distance_uncertainty,
-    draw_uncertainty_curve,
+    plot_uncertainty_curve,
     projection_uncertainty,
     read,
     suggest_views,
@@ -90,12 +90,11 @@ def test_uncertainty_is_smallest_about_where_boards_were(calibrated):
     away = np.linalg.norm(calibrated.poses[:, :3, 3], axis=1)
     assert away.min() < found.minimum[0] < 2 * away.max()
     assert found.sd[-1] == pytest.approx(found.sd[-2], rel=0.02)
-    axes = draw_uncertainty_curve(found)
-    line, across, least = axes.lines
-    assert (np.diff(line.get_xdata()) > 0).all()
-    assert len(line.get_xdata()) == 40
-    assert across.get_ydata()[0] == found.sd[-1]
-    assert (least.get_xdata()[0], least.get_ydata()[0]) == found.minimum
+    line, across, least = plot_uncertainty_curve(found).panels[0].marks
+    assert (np.diff(line.places[:, 0]) > 0).all()
+    assert len(line.places) == 40
+    assert across.places[0, 1] == found.sd[-1]
+    assert tuple(least.places[0]) == found.minimum
 
 
 def test_two_calibrations_of_the_same_corners_are_not_independent(calibrated):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from functools import partial
 from typing import TYPE_CHECKING
 
 import orjson
 
 from photogram import _photocore
-from photogram.absolute_orientation.plot import residuals_sketch
 from photogram.absolute_orientation.tables import (
     control,
     cycles,
@@ -51,9 +49,7 @@ def orientation_document(result: Orientation) -> Document:
     """Return the document of an orientation."""
     stations, (size, quality) = result.stations, _facts(result)
     caption = "The control in plan with its residuals, given minus transformed, enlarged as the scale says."
-    drawing = Drawing(
-        "picture-residuals", "Residuals of the control in plan", caption, partial(residuals_sketch, result)
-    )
+    drawing = Drawing("picture-residuals", "Residuals of the control in plan", caption, result.plot)
     of_parameters, unit = parameters(result), f"{stations.model_unit} / {stations.ground_unit}"
     return Document(
         what="Absolute orientation of a model",

@@ -22,9 +22,8 @@ from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
-    from photogram.show.axes import Where
+    from photogram.show.sketch.plot import Plot
 
 __all__ = ["Orientation", "Trace"]
 
@@ -297,11 +296,12 @@ class Orientation(Documented, Judged, Brief):
 
         return orientation_findings(self)
 
-    def plot(self, ax: Where = None) -> Axes:
-        """Draw a plan of the residuals of the control into axes, or a new figure; return the axes.
+    def plot(self) -> Plot:
+        """Plot the residuals of the control, given minus transformed: arrows in plan, bars for elevations."""
+        from photogram.absolute_orientation.plot import control_plot
 
-        Needs matplotlib (`pip install 'photogram[plots]'`).
-        """
-        from photogram.absolute_orientation.plot import residuals
-
-        return residuals(self, ax)
+        rows = np.flatnonzero(self.took_part)
+        residuals, rms = self.residuals_ground[rows], self.rms / self.similarity.scale
+        return control_plot(
+            self.stations, rows, self.adjusted_control[rows, :2], residuals, self.used[rows], rms
+        )

@@ -2,78 +2,62 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
-from photogram.show.axes import Where
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, Sketch, around
+from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Names, Segments
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, PURPLE, VERMILION
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from photogram import Orientation
 
 LONGEST = 0.12
 """Length of the longest residual, as a fraction of the plan's larger side."""
 
 
-def residuals(result: Orientation, ax: Where = None) -> Axes:
-    """Draw plan residuals as arrows and those of elevations as bars, given minus transformed.
+def control_plot(
+    stations: Stations,
+    rows: NDArray[np.intp],
+    plan: Floats,
+    residuals: Floats,
+    used: NDArray[np.bool_],
+    rms: float,
+) -> Plot:
+    """Plot residuals of control, given minus transformed: arrows in plan, bars for elevations.
 
     Parameters
     ----------
-    result
-        An orientation.
-    ax
-        Axes, or a figure to put them in; a new figure when None.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
+    stations, rows
+        Stations, and the k rows of the control among them.
+    plan, residuals
+        (k, 2) ground coordinates of the control, and (k, 3) residuals in ground units.
+    used, rms
+        (k, 3) coordinates that took part, and the root mean square of the residuals.
     """
-    axes: Axes = on_axes(residuals_sketch(result), ax)
-    return axes
-
-
-def residuals_sketch(result: Orientation) -> Sketch:
-    """Return the plan of :func:`residuals` before it is drawn."""
-    rows = np.flatnonzero(result.took_part)
-    plan = result.adjusted_control[rows, :2]
-    own, unit = result.residuals_ground[rows], result.stations.ground_unit
+    unit = stations.ground_unit
     size = float(np.ptp(plan, axis=0).max())
-    largest = float(np.nanmax(np.abs(own)))
+    largest = float(np.nanmax(np.abs(residuals)))
     factor = LONGEST * size / largest if largest > 0 else 0.0
     high = float(np.clip(5.5 * np.ptp(plan[:, 1]) / (np.ptp(plan[:, 0]) or 1.0), 2.0, 8.0))
-    vectors, ends = _residuals(plan, own * factor)
-    names = [result.stations.ids[row] for row in rows.tolist()]
+    vectors, ends = _residuals(plan, residuals * factor)
+    names = [stations.ids[row] for row in rows.tolist()]
     length = round_length(LONGEST * size / factor) if factor else 0.0
     panel = Panel(
         around(np.vstack([plan, ends]), 0.1),
-        [*_stations(result, rows, plan), *vectors, Names(plan, names, [INK] * len(names), ends)],
-        f"Residuals of control, rms {result.rms / result.similarity.scale:.3g} {unit}",
+        [*_stations(used, plan), *vectors, Names(plan, names, [INK] * len(names), ends)],
+        f"Residuals of control, rms {rms:.3g} {unit}",
         f"X, {unit}",
         f"Y, {unit}",
         equal=True,
         bars=[(length * factor, INK, f"{length:g} {unit}, given minus transformed")] if factor else [],
         legend="below",
     )
-    return Sketch(6.5, high + 1.8, [panel])
+    return Plot(6.5, high + 1.8, [panel])
 
 
-def _stations(result: Orientation, rows: NDArray[np.intp], plan: Floats) -> list[Mark]:
-    used = result.used[rows]
+def _stations(used: NDArray[np.bool_], plan: Floats) -> list[Mark]:
     full, plan_only = used.all(axis=1), ~used[:, 2]
     kinds = (
         ("full control", full, "^"),

@@ -350,12 +350,8 @@ def _small_files(
     """Make everything that is small, before anything is written."""
     made = {folder / TEXT: result.report().encode()}
     if pictures:
-        from photogram.absolute_orientation.plot import residuals_sketch
-        from photogram.show.pictures import drawn
-        from photogram.show.sketch.on_axes import figure
-
-        picture = figure(residuals_sketch(result))
-        made |= {path: drawn(picture, path) for path in pictures}
+        plot = result.plot()
+        made |= {path: plot.render(path.suffix[1:]) for path in pictures}
     if trace:
         from photogram.absolute_orientation.trace import trace_text
 

@@ -155,9 +155,7 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
 def _files(found: Conversion, plots: bool) -> dict[str, bytes]:
     """Make what goes to the directory: the camera in each format that can hold it."""
     from photogram.errors import InputError
-    from photogram.show.pictures import drawn
-    from photogram.show.sketch.on_axes import figure
-    from photogram.targets.drawing import difference_sketch
+    from photogram.targets.drawing import plot_difference
     from photogram.targets.output.formats import CAMERA_FORMATS
 
     files = {"report.txt": found.report().encode(), "difference.csv": found.to_csv()}
@@ -167,6 +165,5 @@ def _files(found: Conversion, plots: bool) -> dict[str, bytes]:
         except InputError:
             continue
     if plots:
-        picture = figure(difference_sketch(found.difference))
-        files["difference.png"] = drawn(picture, Path("difference.png"))
+        files["difference.png"] = plot_difference(found.difference).render("png")
     return files

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from photogram.results.network import AdjustedNetwork
     from photogram.show.page import Document, Drawing
     from photogram.show.sections import Section
+    from photogram.show.sketch.plot import Plot
 
 TEXT, HTML = "report.txt", "report.html"
 """The reports, in a directory of results."""
@@ -279,7 +280,7 @@ class Pictures:
     BadParameter
         Pictures, but no directory.
     ModuleNotFoundError
-        matplotlib is absent: said before anything is computed.
+        matplotlib is absent, and the format is not SVG: raised before anything is computed.
     """
 
     def __init__(self, job: Job, plots: bool, ending: PictureFormat, out: Path | None) -> None:
@@ -289,25 +290,27 @@ class Pictures:
             return
         if out is None:
             raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
-        from photogram.plots import PICTURES
+        from photogram.plots.accessor import PLOTS
         from photogram.show.style import need_matplotlib
 
-        need_matplotlib()
-        job.writes(*(out / f"{name}.{ending}" for name in PICTURES))
+        if ending != "svg":
+            need_matplotlib()
+        job.writes(*(out / f"{name}.{ending}" for name in PLOTS))
 
     def of(self, result: AdjustedNetwork) -> dict[Path, bytes]:
         """Return the pictures of a result as files."""
         if self._out is None:
             return {}
-        from photogram.plots import picture_files
-
-        return picture_files(result, self._out, self._ending)
+        return self._files(result.plot.available())
 
     def of_drawings(self, make: Callable[[], Sequence[Drawing]]) -> dict[Path, bytes]:
         """Return pictures that a page has, too, as files."""
         if self._out is None:
             return {}
-        from photogram.show.pictures import drawn
+        plots = {each.name: each.sketch() for each in make()}
+        return self._files({name: plot for name, plot in plots.items() if plot is not None})
 
-        made = {self._out / f"{each.name}.{self._ending}": each.draw() for each in make()}
-        return {path: drawn(figure, path) for path, figure in made.items() if figure is not None}
+    def _files(self, plots: Mapping[str, Plot]) -> dict[Path, bytes]:
+        assert self._out is not None
+        paths = {self._out / f"{name}.{self._ending}": plot for name, plot in plots.items()}
+        return {path: plot.render(self._ending) for path, plot in paths.items()}

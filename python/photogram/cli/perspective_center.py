@@ -104,9 +104,10 @@ def _files(run: Run, json: Path | None, folder: Path, pictures: list[Path]) -> d
 
         made[folder / "listing.txt"] = listing(run).encode()
     if pictures and run.results:
-        from photogram.perspective_center.plot import draw
+        from photogram.perspective_center.plot import run_sketch
 
-        made |= {path: draw(run.results, path) for path in pictures}
+        plot = run_sketch(run.results)
+        made |= {path: plot.render(path.suffix[1:]) for path in pictures}
     return made
 
 

@@ -19,7 +19,6 @@ from photogram.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from photogram import Block
-    from photogram.planning.networks import Plan
 
 
 @with_job
@@ -83,8 +82,9 @@ def plan(
         made = predict(patterns)
         texts = {} if out is None else {out / TEXT: made.report().encode()}
         page = documents.page(job, "plan", out, made.document)
+        drawn = {path: made.plot().render(path.suffix[1:]) for path in pictures}
         job.finish(
-            {**texts, **page, **documents.as_json(made), **_drawn(made, pictures)},
+            {**texts, **page, **documents.as_json(made), **drawn},
             summary=lambda: output.print(made.report(), markup=False, end=""),
         )
 
@@ -149,9 +149,3 @@ def _names(projects: list[Path]) -> dict[str, Path]:
         raise typer.BadParameter("the same project twice", param_hint="DIR")
     short = len({place.name for place in places}) == len(places)
     return {place.name if short else str(place): given for place, given in zip(places, projects, strict=True)}
-
-
-def _drawn(made: Plan, places: list[Path]) -> dict[Path, bytes]:
-    from photogram.show.pictures import drawn
-
-    return {path: drawn(made.plot(), path) for path in places}

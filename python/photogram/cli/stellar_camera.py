@@ -17,7 +17,6 @@ from photogram.cli.job import InputFile, Job, OutputFolder, Writes, with_job
 from photogram.cli.options import Quiet, Strict, Threads, out_option
 
 if TYPE_CHECKING:
-    from photogram.show.sketch.declared import Sketch
     from photogram.stellar.night_calibration import CalibratedNight
     from photogram.stellar.problem import Problem
     from photogram.stellar.result import Result
@@ -277,7 +276,12 @@ def _files(result: Result, out: Path, mark: str, pictures: str) -> dict[Path, by
         made[out / f"printout{mark}.txt"] = printout(result).encode()
     if result.problem.options.plate_list:
         made[out / f"plate{mark}.txt"] = plate_list(result)
-    return made | _drawn(sketches(result), mark, out, pictures) if pictures else made
+    if pictures:
+        from photogram.stellar.plots import sketches
+
+        plots = sketches(result).items()
+        made |= {out / f"{name}{mark}.{pictures}": plot.render(pictures) for name, plot in plots}
+    return made
 
 
 def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path, bytes]:
@@ -294,11 +298,9 @@ def _night_files(result: CalibratedNight, out: Path, pictures: str) -> dict[Path
         cameras[out / "camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
         cameras[out / "camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
     made |= _cameras(result, cameras)
-    return made | _drawn(sketches(result), "", out, pictures) if pictures else made
+    if pictures:
+        from photogram.stellar.night_plots import sketches
 
-
-def _drawn(sketches: dict[str, Sketch], mark: str, out: Path, pictures: str) -> dict[Path, bytes]:
-    from photogram.show.pictures import files
-    from photogram.show.sketch.on_axes import figure
-
-    return files({f"{name}{mark}": figure(sketch) for name, sketch in sketches.items()}, out, pictures)
+        plots = sketches(result).items()
+        made |= {out / f"{name}.{pictures}": plot.render(pictures) for name, plot in plots}
+    return made

@@ -32,8 +32,9 @@ from photogram.show.page import Document, Drawing, Facts, Part, Section
 from photogram.show.quantity import Quantity, records
 from photogram.show.sections import Section as Lines
 from photogram.show.sections import composed, headline, verdict_sections
-from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Band, Line, Mark, Markers, Segments, error_bars
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal
 
@@ -269,7 +270,7 @@ _CURVE = (
 )
 
 
-def _sketch(certificate: Certificate) -> Sketch:
+def _sketch(certificate: Certificate) -> Plot:
     assert certificate.radial is not None
     own, um, given = certificate.curve(), 1e3, certificate.radial
     edge = float(own.radius.max())
@@ -283,4 +284,4 @@ def _sketch(certificate: Certificate) -> Sketch:
     low, high = (um * (given.distortion + sign * given.sd) for sign in (-1, 1))
     drawn += [Segments(error_bars(places, low, high), MARKED, 1.5), Markers(places, "o", 4.0, MARKED)]
     limits = np.column_stack([spread(0.0, 1.1 * edge), spread(low, high, *ends)])
-    return Sketch(6.4, 3.6, [Panel(limits, drawn, "", "radius, mm", "distortion, µm")])
+    return Plot(6.4, 3.6, [Panel(limits, drawn, "", "radius, mm", "distortion, µm")])

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.perspective_center.solution import PerspectiveCenter
-from photogram.show.pictures import drawn, round_length
-from photogram.show.sketch.declared import Panel, Sketch, around
+from photogram.show.pictures import round_length
+from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.marks import Arrows, Band, Level, Line, Mark, Markers
-from photogram.show.sketch.on_axes import figure
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, MARKED
 
 LONGEST = 0.12
@@ -21,12 +20,7 @@ SAME_RADIUS = 0.02
 """Points whose radii differ by less than this part of the largest have one mean in the curve."""
 
 
-def draw(results: Sequence[PerspectiveCenter], path: Path) -> bytes:
-    """Draw a run, which has a set at least, in the format of the suffix of a file name."""
-    return drawn(figure(run_sketch(results)), path)
-
-
-def run_sketch(results: Sequence[PerspectiveCenter]) -> Sketch:
+def run_sketch(results: Sequence[PerspectiveCenter]) -> Plot:
     """Return the picture of a run; all sets have the same scales."""
     longest = max(float(np.hypot(*each.residual.T).max()) for each in results)
     largest = max(max(np.abs(each.radial_distortion).max(), each.sigma0_plate or 0.0) for each in results)
@@ -35,7 +29,7 @@ def run_sketch(results: Sequence[PerspectiveCenter]) -> Sketch:
         for each in results
         for panel in (_residual_vectors(each, longest), _distortion_curve(each, 1000.0 * float(largest)))
     ]
-    return Sketch(11.0, 5.0 * len(results), panels, 2)
+    return Plot(11.0, 5.0 * len(results), panels, 2)
 
 
 def set_name(result: PerspectiveCenter) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +20,9 @@ from photogram.show.methods import Documented
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure, SubFigure
 
     from photogram.show.page import Document
+    from photogram.show.sketch.plot import Plot
 
 
 @dataclass(frozen=True)
@@ -58,31 +58,17 @@ class Plan(Documented):
 
         return plan_document(self.patterns)
 
-    @overload
-    def plot(self) -> Figure: ...
-
-    @overload
-    def plot(self, figure: Figure | SubFigure) -> Figure | SubFigure: ...
-
-    def plot(self, figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
-        """Draw the patterns in plan, the expected standard deviation in height as colour; return the figure.
-
-        `figure` is one of your own, or a part of one (SubFigure); None makes one that belongs to no window.
-
-        Needs matplotlib (`pip install 'photogram[plots]'`).
+    def plot(self) -> Plot:
+        """Plot the patterns in plan, with the expected standard deviation in height as colour.
 
         Raises
         ------
         PhotogramError
-            There are no new points to be shown.
+            The plan has no new points.
         """
         from photogram.planning.plot import plan_sketch
-        from photogram.show.pictures import new_figure
-        from photogram.show.sketch.on_axes import on_axes
 
-        made = new_figure(1.0, 1.0) if figure is None else figure
-        on_axes(plan_sketch(self.patterns), made)
-        return made
+        return plan_sketch(self.patterns)
 
 
 def plan(

@@ -9,9 +9,10 @@ import numpy as np
 
 from photogram.errors import PhotogramError
 from photogram.lazy_dataclasses import replace
-from photogram.show.sketch.declared import Panel, Sketch, around
+from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.layout import labelled
 from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Shades
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, VERMILION
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _ELONGATED = 2.5
 _KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s"))
 
 
-def plan_sketch(patterns: Sequence[Pattern]) -> Sketch:
+def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
     """Return a picture with a panel for each pattern, in one scale of lengths and one of colours."""
     heights = np.concatenate([pattern.point_sd[pattern.new_points, 2] for pattern in patterns])
     if heights.size == 0:
@@ -43,7 +44,7 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Sketch:
     across = max(2 * _PANEL if stacked else min(_PANEL, _PANEL * width / height), 3.5)
     up = min(across * height / width, _PANEL)
     size = columns * (across + 0.5) + 3.0, rows * (up + 1.0) + 0.4
-    return Sketch(*size, panels, columns, shades)
+    return Plot(*size, panels, columns, shades)
 
 
 def _with_legend(panels: Sequence[Panel]) -> Panel:

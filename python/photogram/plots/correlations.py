@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.picture_data import Correlated, pictured
-from photogram.show.axes import Where
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Mesh, Shades, Texts
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 
 CAMERAS = 4
 """That have a panel at most."""
@@ -20,34 +17,14 @@ WRITTEN = 14
 SHADES = Shades(-1.0, 1.0, "correlation, -1 to 1", "signed")
 
 
-def correlations(result: object, ax: Where = None) -> Any:
-    """Draw the correlations of the estimated parameters of cameras.
-
-    Parameters
-    ----------
-    result
-        An adjusted block or collection.
-    ax
-        Axes, as many as there are cameras (four at most), or a figure to put them in; a new one when None.
-
-    Returns
-    -------
-    The axes, or an array of them where there are several cameras.
+def correlations(result: object) -> Plot:
+    """Plot the correlations of the estimated parameters of cameras.
 
     Raises
     ------
     InputError
-        No camera has two estimated parameters, or there are no covariances; another number of axes.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
+        No camera has two estimated parameters, or there are no covariances.
     """
-    return on_axes(correlations_sketch(result), ax)
-
-
-def correlations_sketch(result: object) -> Sketch:
-    """Return the picture of correlations; see :func:`correlations`."""
     cameras = pictured(result).correlations
     if not cameras:
         raise InputError("there are no correlations to draw: no camera has two estimated parameters")
@@ -58,7 +35,7 @@ def correlations_sketch(result: object) -> Sketch:
     left_out = len(cameras) > len(shown)
     said = f"the first {len(shown)} of {len(cameras)} cameras are drawn" if left_out else ""
     found = [_matrix(each, said if each is shown[-1] else "") for each in shown]
-    return Sketch(columns * side + 0.9, rows * (side + 0.2), found, columns, SHADES)
+    return Plot(columns * side + 0.9, rows * (side + 0.2), found, columns, SHADES)
 
 
 def _matrix(each: Correlated, said: str) -> Panel:

@@ -3,60 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.plots.picture_data import Curve, Curves, pictured
-from photogram.show.axes import Where
-from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Band, Level, Line, Mark
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
 
 CAMERAS = 3
 """That are drawn at most, side by side."""
 
 
-def distortion(result: object, ax: Where = None) -> Any:
-    """Draw the radial distortion of cameras: the curve, its balanced form, and their standard deviations.
+def distortion(result: object) -> Plot:
+    """Plot the radial distortion of cameras: the curve, its balanced form, and their standard deviations.
 
-    Bands are one standard deviation to either side; what is beyond all images is dashed.
-
-    Parameters
-    ----------
-    result
-        An adjusted block or collection.
-    ax
-        Axes, as many as there are panels (three below each other for each camera of a block, two for a
-        collection; three cameras at most), or a figure to put them in; a new one when None.
-
-    Returns
-    -------
-    An array of axes, row by row.
+    Bands are one standard deviation to either side. Dashed lines are beyond all images.
 
     Raises
     ------
     InputError
-        No camera has radial distortion; another number of axes.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
+        No camera has radial distortion.
     """
-    return on_axes(distortion_sketch(result), ax)
-
-
-def distortion_sketch(result: object) -> Sketch:
-    """Return the picture of distortion; see :func:`distortion`."""
     cameras = pictured(result).distortion[:CAMERAS]
     if not cameras:
         raise InputError("there is no distortion to draw: no camera has radial terms, or they are all zero")
     found = side_by_side(cameras)
     width = 6.4 if len(cameras) == 1 else 4.8 * len(cameras)
-    return Sketch(width, 0.6 + 2.3 * (len(found) // len(cameras)), found, len(cameras), shared=True)
+    return Plot(width, 0.6 + 2.3 * (len(found) // len(cameras)), found, len(cameras), shared=True)
 
 
 def side_by_side(cameras: Sequence[Curves]) -> list[Panel | None]:

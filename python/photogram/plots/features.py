@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.picture_data import Deviations, pictured
-from photogram.show.axes import Where
-from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Mark, Markers, Segments
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 
 SHOWN = 4
@@ -20,42 +17,21 @@ NAMED = 40
 """Points whose names are written at most."""
 
 
-def features(result: object, ax: Where = None) -> Any:
-    """Draw the deviations of points from the features that are fitted to them, with U to either side.
-
-    Parameters
-    ----------
-    result
-        An adjusted block with features.
-    ax
-        Axes, as many as there are features with deviations (four at most), or a figure to put them in; a new
-        one when None.
-
-    Returns
-    -------
-    The axes, or an array of them where there are several features.
+def features(result: object) -> Plot:
+    """Plot the deviations of points from the features that are fitted to them, with U to either side.
 
     Raises
     ------
     InputError
-        No feature has deviations; another number of axes.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
+        No feature has deviations.
     """
-    return on_axes(features_sketch(result), ax)
-
-
-def features_sketch(result: object) -> Sketch:
-    """Return the picture of features; see :func:`features`."""
     every = pictured(result).deviations
     if not every:
         raise InputError("there are no deviations to draw: no feature is fitted to more than two points")
     shown = every[:SHOWN]
     said = f"the first {SHOWN} of {len(every)} features are drawn" if len(every) > SHOWN else ""
     panels = [_panel(each, said if each is shown[-1] else "") for each in shown]
-    return Sketch(7.0, 0.4 + 2.5 * len(shown), panels)
+    return Plot(7.0, 0.4 + 2.5 * len(shown), panels)
 
 
 def _panel(each: Deviations, said: str) -> Panel:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from photogram.errors import InputError
 from photogram.plots.picture_data import VectorField, pictured
-from photogram.show.axes import Where
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
+from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Names
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK
 
 SHOWN = 6
@@ -23,35 +20,14 @@ LONGEST = 0.11
 """Of the longest vector, of the extent of the places."""
 
 
-def films(result: object, ax: Where = None) -> Any:
-    """Draw residuals of fiducial marks, mean over the photos of each camera, and patterns of films.
-
-    Parameters
-    ----------
-    result
-        An adjusted block with scanned films.
-    ax
-        Axes, as many as there are cameras with marks and films with a pattern (six at most), or a figure to
-        put them in; a new one when None.
-
-    Returns
-    -------
-    The axes, or an array of them where there are several fields.
+def films(result: object) -> Plot:
+    """Plot residuals of fiducial marks, mean over the photos of each camera, and patterns of films.
 
     Raises
     ------
     InputError
-        No marks and no patterns; another number of axes.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
+        No marks and no patterns.
     """
-    return on_axes(films_sketch(result), ax)
-
-
-def films_sketch(result: object) -> Sketch:
-    """Return the picture of films; see :func:`films`."""
     every = pictured(result).films
     if not every:
         raise InputError("there are neither residuals of marks nor patterns of films to draw")
@@ -59,7 +35,7 @@ def films_sketch(result: object) -> Sketch:
     columns = min(2, len(shown))
     said = f"the first {SHOWN} of {len(every)} fields are drawn" if len(every) > SHOWN else ""
     panels = [_panel(each, said if each is shown[-1] else "") for each in shown]
-    return Sketch(4.6 * columns, 4.9 * -(-len(shown) // columns), panels, columns)
+    return Plot(4.6 * columns, 4.9 * -(-len(shown) // columns), panels, columns)
 
 
 def _panel(each: VectorField, said: str) -> Panel:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.plots.picture_data import Pictured, Plan, pictured
-from photogram.show.axes import Where
 from photogram.show.pictures import round_length
 from photogram.show.sketch.colours import hexadecimal, rgb
-from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
+from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import (
     NOWHERE,
     Arrows,
@@ -26,11 +23,8 @@ from photogram.show.sketch.marks import (
     Shades,
     ellipse_axes,
 )
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 POINTS, PHOTOS, FOOTPRINTS, ELLIPSES, VECTORS = 6000, 2000, 400, 150, 300
 """How many of each are drawn at most."""
@@ -49,39 +43,21 @@ PLANES = {"XY": (0, 1, 2), "XZ": (0, 2, 1), "YZ": (1, 2, 0)}
 """Axes to the right and up, and the one that is not seen."""
 
 
-def network(result: object, ax: Where = None, *, plane: str | None = None) -> Axes:
-    """Draw photos, footprints, points by number of rays, control and check points, and error ellipses.
+def network(result: object, *, plane: str | None = None) -> Plot:
+    """Plot photos, footprints, points by number of rays, control and check points, and error ellipses.
 
-    Of a large network parts are drawn; the picture says which.
+    The plot shows a part of a large network, and its notes state which part.
 
     Parameters
     ----------
-    result
-        An adjusted block or collection.
-    ax
-        Axes, or a figure to put them in; a new figure when None.
     plane
-        `XY`, `XZ` or `YZ`: what is seen; that in which the points spread most when None.
-
-    Returns
-    -------
-    The axes.
+        `XY`, `XZ` or `YZ`; if None, the plane in which the points spread most.
 
     Raises
     ------
     InputError
-        Another plane.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
+        `plane` is another text.
     """
-    axes: Axes = on_axes(network_sketch(result, plane), ax)
-    return axes
-
-
-def network_sketch(result: object, plane: str | None = None) -> Sketch:
-    """Return the picture of a network; see :func:`network`."""
     drawn = pictured(result)
     plan = drawn.plan
     seen = _plane(plan, plane)
@@ -102,7 +78,7 @@ def network_sketch(result: object, plane: str | None = None) -> Sketch:
         bars=bars,
         legend="beside",
     )
-    return Sketch(*_size(limits), [panel])
+    return Plot(*_size(limits), [panel])
 
 
 def view_of_plan(plan: Plan) -> tuple[Panel, tuple[int, int, int]]:

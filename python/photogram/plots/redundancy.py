@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from photogram.arguments.types import Floats
@@ -13,10 +11,9 @@ from photogram.plots.cells import Cells, cells
 from photogram.plots.network import thinned, view_of_plan
 from photogram.plots.picture_data import Images, Pictured, pictured
 from photogram.plots.residuals import frame
-from photogram.show.axes import Where
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Markers, Mesh, Shades
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 
 SINGLE = 600
 """Image points that are drawn one by one at most."""
@@ -31,44 +28,24 @@ PHOTOS = 1000
 SHADES = Shades(0.0, 1.0, "redundancy number, 0 to 1")
 
 
-def redundancy(result: object, ax: Where = None) -> Any:
-    """Draw redundancy numbers of images over the frame of all cameras, and of points over the network.
+def redundancy(result: object) -> Plot:
+    """Plot redundancy numbers of images over the frame of all cameras, and of points over the network.
 
     A redundancy number is the part of an error that shows in the residual of its own observation: 0 hides
-    it, 1 shows all of it. Drawn are means of x and y.
-
-    Parameters
-    ----------
-    result
-        An adjusted block or collection.
-    ax
-        Two axes, or a figure to put them in; a new one when None.
-
-    Returns
-    -------
-    An array of two axes: the frame, the network.
+    it, 1 shows all of it. Values are means of x and y.
 
     Raises
     ------
     InputError
-        The adjustment gave no redundancy numbers (`covariance=False`); another number of axes.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
+        The adjustment gave no redundancy numbers (`covariance=False`).
     """
-    return on_axes(redundancy_sketch(result), ax)
-
-
-def redundancy_sketch(result: object) -> Sketch:
-    """Return the picture of redundancy numbers; see :func:`redundancy`."""
     drawn = pictured(result)
     images = drawn.images
     values = images.redundancy.mean(axis=1)
     if not np.isfinite(values).any():
         raise InputError("there are no redundancy numbers: adjust with covariance=True")
     network = replace(_over_network(drawn, values), shades=SHADES)
-    return Sketch(10.5, 4.9, [_over_frame(images, values), network], 2)
+    return Plot(10.5, 4.9, [_over_frame(images, values), network], 2)
 
 
 def _over_frame(images: Images, values: Floats) -> Panel:

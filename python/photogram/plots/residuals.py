@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
 from photogram.plots.picture_data import Images, pictured
-from photogram.show.axes import Where
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, ScaleBar, Sketch
+from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import Arrows, Mark, Markers
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 
 SINGLE = 900
@@ -35,36 +32,11 @@ LEVEL = 0.01
 """Of a false alarm in any cell of a panel."""
 
 
-def residuals(result: object, ax: Where = None) -> Any:
-    """Draw image residuals over the frame of each camera: one by one, or the means of cells where many.
+def residuals(result: object) -> Plot:
+    """Plot image residuals over the frame of each camera: one by one, or means of cells if they are many.
 
     Means that errors by chance would hardly give (1 percent for all cells together) are coloured.
-
-    Parameters
-    ----------
-    result
-        An adjusted block or collection.
-    ax
-        Axes, as many as there are cameras (six at most), or a figure to put them in; a new one when None.
-
-    Returns
-    -------
-    The axes, or an array of them where there are several cameras.
-
-    Raises
-    ------
-    InputError
-        Another number of axes.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
     """
-    return on_axes(residuals_sketch(result), ax)
-
-
-def residuals_sketch(result: object) -> Sketch:
-    """Return the picture of image residuals; see :func:`residuals`."""
     images = pictured(result).images
     cameras, left_out = largest_cameras(images)
     columns = min(3, len(cameras))
@@ -78,7 +50,7 @@ def residuals_sketch(result: object) -> Sketch:
     beside = 1.95 if many else 1.25
     high = rows * (float(np.clip(up / across, 0.3, 1.5)) * (width / columns - 0.75) + beside)
     found = [_field(images, camera, left_out if camera == cameras[-1] else "") for camera in cameras]
-    return Sketch(width, high, found, columns)
+    return Plot(width, high, found, columns)
 
 
 def largest_cameras(images: Images, most: int = CAMERAS) -> tuple[list[int], str]:

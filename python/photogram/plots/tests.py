@@ -12,10 +12,9 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.plots.picture_data import pictured
-from photogram.show.axes import Where
-from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Band, Level, Line, Mark, Markers, Names, bars
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.statistics.patterns import SPEAKING
@@ -34,37 +33,17 @@ WIDEST = 6.0
 """What the histogram shows: values beyond are counted at its ends."""
 
 
-def tests(result: object, ax: Where = None) -> Any:  # noqa: PT028  (pytest does not call it)
-    """Draw test values w of all observations: their histogram, and their quantiles, against the normal.
+def tests(result: object) -> Plot:
+    """Plot test values w of all observations: their histogram, and their quantiles, against the normal.
 
     w = residual / (standard deviation x root of redundancy number) is standard normal where the given
     standard deviations are right and there are no gross errors.
 
-    Parameters
-    ----------
-    result
-        An adjusted block or collection.
-    ax
-        Two axes, or a figure to put them in; a new one when None.
-
-    Returns
-    -------
-    An array of two axes: histogram, quantiles.
-
     Raises
     ------
     InputError
-        The adjustment gave no test values (`covariance=False`); another number of axes.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
-    TypeError
-        A result without photos and points.
+        The adjustment gave no test values (`covariance=False`).
     """
-    return on_axes(tests_sketch(result), ax)
-
-
-def tests_sketch(result: object) -> Sketch:
-    """Return the picture of test values; see :func:`tests`."""
     drawn = pictured(result)
     groups = [_speaking(each) for each in drawn.tested]
     values = np.concatenate([each.values.ravel() for each in groups])
@@ -72,7 +51,7 @@ def tests_sketch(result: object) -> Sketch:
     if len(values) < 2:
         raise InputError("there are no test values: adjust with covariance=True, and with redundancy")
     weight = drawn.unit_weight
-    return Sketch(10.0, 4.6, [_histogram(values, weight), _quantiles(values, groups, weight)], 2)
+    return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(values, groups, weight)], 2)
 
 
 def _speaking(group: Observations) -> Observations:

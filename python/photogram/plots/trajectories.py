@@ -9,10 +9,9 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
-from photogram.show.axes import Where
-from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Band, Line, Mark, Segments, error_bars
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, GREEN, INK, VERMILION
 
 TIMES = 160
@@ -22,32 +21,23 @@ TALL = 0.03
 """Marks of the times of observations, of the height of a panel."""
 
 
-def trajectory(result: Any, ax: Where = None, *, name: str | None = None) -> Any:
-    """Draw the corrections of a trajectory over time, bands of one standard deviation about them.
+def trajectory(result: Any, *, name: str | None = None) -> Plot:
+    """Plot the corrections of a trajectory over time, with bands of one standard deviation about them.
 
-    Below stand the times of observations beside images that are of it.
+    The left panel shows positions, the right one rotations about the axes of the photo. Lines below mark the
+    times of further observations of the trajectory.
 
     Parameters
     ----------
-    result
-        An adjusted block that has trajectories.
-    ax
-        Two axes, or a figure to put them in; a new one when None.
     name
         Of the trajectory; None: the first.
-
-    Returns
-    -------
-    An array of two axes: corrections of positions, and rotations about the axes of the photo.
 
     Raises
     ------
     InputError
-        A trajectory that is not there, or that has one record; another number of axes.
+        A trajectory that is not there, or that has one record.
     AdjustmentError, OutOfMemoryError
         As :meth:`photogram.Result.covariance`.
-    ModuleNotFoundError
-        matplotlib is absent (`pip install 'photogram[plots]'`).
     """
     every = result.trajectories
     name = next(iter(every), "") if name is None else name
@@ -71,7 +61,7 @@ def trajectory(result: Any, ax: Where = None, *, name: str | None = None) -> Any
         for part, head in enumerate(heads)
     ]
     panels[0] = replace(panels[0], title=name, legend="best")
-    return on_axes(Sketch(9.0, 3.4, panels, 2), ax)
+    return Plot(9.0, 3.4, panels, 2)
 
 
 def _panel(times: Floats, values: Floats, sd: Floats, records: list[float], head: str) -> Panel:

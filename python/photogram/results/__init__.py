@@ -3,7 +3,6 @@
 import lazy_loader
 
 WAYS = {
-    "axes_of": ("components_picture",),
     "columns_of": ("tables",),
     "document_of": ("document",),
     "files_of": ("block_files",),

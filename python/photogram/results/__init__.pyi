@@ -1,8 +1,7 @@
 from .calibration import Calibration as Calibration
 from .calibration import calibrations as calibrations
-from .calibration_picture import draw_distortion as draw_distortion
-from .calibration_picture import draw_lens_field as draw_lens_field
-from .components_picture import draw_components as draw_components
+from .calibration_picture import plot_distortion as plot_distortion
+from .calibration_picture import plot_lens_field as plot_lens_field
 from .covariance import Covariances as Covariances
 from .covariance import Propagated as Propagated
 from .distortion import DistortionCurve as DistortionCurve
@@ -11,4 +10,3 @@ from .distortion import distortion_curve as distortion_curve
 from .distortion import lens_field as lens_field
 from .pattern_pictures import DrawnPattern as DrawnPattern
 from .pattern_pictures import drawn_patterns as drawn_patterns
-from .variance_function import draw_variance_function as draw_variance_function

@@ -10,7 +10,7 @@ from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.network import AdjustedNetwork
 from photogram.show.lines import padded
-from photogram.show.methods import Shown, axes_of, columns_of, document_of, findings_of, report_of
+from photogram.show.methods import Shown, columns_of, document_of, findings_of, report_of
 from photogram.show.sections import Section, composed, headline, verdict_sections
 from photogram.show.summary import Brief
 from photogram.statistics.components import Component, Estimate
@@ -18,9 +18,8 @@ from photogram.statistics.findings import Findings, GroupFactor
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
-    from photogram.show.axes import Where
+    from photogram.show.sketch.plot import Plot
 
 __all__ = ["VarianceComponents", "component_lines", "component_sections", "statement", "statement_lines"]
 
@@ -56,13 +55,11 @@ class VarianceComponents(Shown, Brief):
         """Those that differ significantly, and by more than 25 percent of the standard deviation, from 1."""
         return [each for each in self.components if each.worth_changing]
 
-    def plot(self, ax: Where = None) -> Axes:
-        """Draw factors of standard deviations with intervals into axes, or a new figure; return the axes.
+    def plot(self) -> Plot:
+        """Plot factors of standard deviations with 95 percent intervals; circles are fixed components."""
+        from photogram.results.components_picture import components_sketch
 
-        Needs matplotlib (`pip install 'photogram[plots]'`).
-        """
-        drawn: Axes = axes_of(self, ax)
-        return drawn
+        return components_sketch(self.components)
 
     def __getitem__(self, name: str) -> Component:
         """Return the component of a group."""

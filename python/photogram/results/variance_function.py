@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -11,24 +10,21 @@ import numpy as np
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
-from photogram.plots.placed import placed
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
-from photogram.show.axes import Where
-from photogram.show.methods import Shown, axes_of, columns_of, document_of, report_of
+from photogram.show.methods import Shown, columns_of, document_of, report_of
 from photogram.show.sections import composed, headline
-from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Line, Markers, Segments, error_bars
-from photogram.show.sketch.on_axes import on_axes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.show.summary import Brief
 from photogram.statistics.variance_function import FunctionEstimate
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
-__all__ = ["Bin", "VarianceFunction", "draw_variance_function"]
+__all__ = ["Bin", "VarianceFunction"]
 
 OUTSIDE = 0.025
 """On each side of an interval."""
@@ -110,13 +106,23 @@ class VarianceFunction(Shown, Brief):
         a, b = self.estimate.coefficients.tolist()
         return float(a + b * (value / self.largest) ** 2)
 
-    def plot(self, ax: Where = None) -> Axes:
-        """Draw quantiles with their intervals, and the function, into axes, or a new figure; return the axes.
-
-        Needs matplotlib (`pip install 'photogram[plots]'`).
-        """
-        drawn: Axes = axes_of(self, ax)
-        return drawn
+    def plot(self) -> Plot:
+        """Plot the factors of ten quantiles with their 95 percent intervals, and the function."""
+        places = np.array([[each.value, each.factor] for each in self.bins])
+        low, high = np.array([each.interval for each in self.bins]).T
+        x = np.linspace(0.0, self.largest, 100)
+        curve = np.array([self.factor(value) for value in x.tolist()])
+        across = spread(x, places[:, 0])
+        marks = [
+            Segments(error_bars(places, low, high), INK, 1.5),
+            Markers(places, "o", 6.0, label="residuals, 95 percent"),
+            Line(np.column_stack([x, curve]), MARKED, label="function"),
+            Line(np.column_stack([across, [1.0, 1.0]]), FAINT, 0.8, label="given variance"),
+        ]
+        unit = f", {getattr(self.network, 'image_unit', 'px')}" if self.name == "radius" else ""
+        limits = np.column_stack([across, (0.0, spread(0.0, 1.0, curve, places[:, 1], high)[1])])
+        panel = Panel(limits, marks, "", f"{self.name}{unit}", "factor of the given variance", legend="best")
+        return Plot(6.4, 4.0, [panel])
 
     def table(self) -> pd.DataFrame:
         """Return the bins as a data frame."""
@@ -181,50 +187,3 @@ def _report(found: VarianceFunction) -> str:
         lines.append(f"{each.value:>12.4g}{each.count:>8}{each.redundancy:>12.2f}{cells}")
     sections = [("Function", said), ("Quantiles: factor of the given variance", lines)]
     return composed(headline("variance function"), sections)
-
-
-def draw_variance_function(found: VarianceFunction, path: Path | None = None, ax: Where = None) -> Axes:
-    """Draw the factors of ten quantiles with their intervals, and the function.
-
-    Parameters
-    ----------
-    found
-        A variance function.
-    path, ax
-        As of :func:`photogram.results.draw_components`.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`photogram.results.draw_components`.
-    """
-    axes: Axes = placed(_sketch(found), path, ax)
-    return axes
-
-
-@axes_of.register(VarianceFunction)
-def _drawn(found: VarianceFunction, ax: Where = None) -> Axes:
-    axes: Axes = on_axes(_sketch(found), ax)
-    return axes
-
-
-def _sketch(found: VarianceFunction) -> Sketch:
-    places = np.array([[each.value, each.factor] for each in found.bins])
-    low, high = np.array([each.interval for each in found.bins]).T
-    x = np.linspace(0.0, found.largest, 100)
-    curve = np.array([found.factor(value) for value in x.tolist()])
-    across = spread(x, places[:, 0])
-    marks = [
-        Segments(error_bars(places, low, high), INK, 1.5),
-        Markers(places, "o", 6.0, label="residuals, 95 percent"),
-        Line(np.column_stack([x, curve]), MARKED, label="function"),
-        Line(np.column_stack([across, [1.0, 1.0]]), FAINT, 0.8, label="given variance"),
-    ]
-    unit = f", {getattr(found.network, 'image_unit', 'px')}" if found.name == "radius" else ""
-    limits = np.column_stack([across, (0.0, spread(0.0, 1.0, curve, places[:, 1], high)[1])])
-    panel = Panel(limits, marks, "", f"{found.name}{unit}", "factor of the given variance", legend="best")
-    return Sketch(6.4, 4.0, [panel])

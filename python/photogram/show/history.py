@@ -13,8 +13,9 @@ from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Document, Drawing, Section, layered
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each
-from photogram.show.sketch.declared import Panel, Sketch, spread
+from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers, Segments, error_bars
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 
 if TYPE_CHECKING:
@@ -152,7 +153,7 @@ _CHARTS = (
 )
 
 
-def control_charts(history: History, title: str) -> Sketch:
+def control_charts(history: History, title: str) -> Plot:
     """Return every quantity over time: values with their standard deviations, mean, limits, what changed.
 
     Dashed lines are where |t| of a value against the others reaches the limit of all tests. Marked is what is
@@ -161,7 +162,7 @@ def control_charts(history: History, title: str) -> Sketch:
     across = min(ACROSS, len(history.series))
     rows = -(-len(history.series) // across)
     panels = [_chart(history, own) for own in history.series]
-    return Sketch(3.6 * across, 2.2 * rows + 0.5, panels, across, shared=True, title=title)
+    return Plot(3.6 * across, 2.2 * rows + 0.5, panels, across, shared=True, title=title)
 
 
 def _chart(history: History, own: Series) -> Panel:

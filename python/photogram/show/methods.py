@@ -92,12 +92,6 @@ def files_of(result: object) -> Mapping[str, bytes | Callable[[BinaryIO], None]]
 
 
 @Way
-def axes_of(result: object, ax: Any = None) -> Any:
-    """Draw a result into axes, or into a new figure; return the axes."""
-    _undefined(result, "picture")
-
-
-@Way
 def page_of(result: object) -> Document:
     """Return the document of a result: its own, or what is defined for its class."""
     if not isinstance(result, Documented):

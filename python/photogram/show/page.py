@@ -19,7 +19,7 @@ from photogram.show import quantity
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from photogram.show.sketch.declared import Sketch
+    from photogram.show.sketch.plot import Plot
 
 T = TypeVar("T")
 
@@ -158,7 +158,7 @@ class Drawing:
     name: str  # Unique on the page; parts of the picture are named after it
     title: str  # A word for switching, and what is to be seen
     caption: str
-    sketch: Callable[[], Sketch | None]  # Declares the picture; None where there is nothing to draw
+    sketch: Callable[[], Plot | None]  # Declares the picture; None where there is nothing to draw
     kind: str = field(default="drawing", init=False)
 
     def draw(self) -> Figure | None:

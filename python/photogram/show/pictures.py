@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from photogram.errors import InputError
-from photogram.show.style import need_matplotlib, styled
+from photogram.show.style import need_matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DPI = 120
-"""Dots an inch of pictures that are made of dots."""
-SILENT: dict[str, dict[str, Any]] = {
-    "png": {"Software": None},
-    "svg": {"Date": None},
-    "pdf": {"CreationDate": None},
-}
-"""What formats would say of version and time."""
+DPI = 120  # Dots per inch of PNG files
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -33,45 +22,6 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained", dpi=DPI)
     FigureCanvasAgg(figure)
     return figure
-
-
-def drawn(figure: Figure, path: Path | None = None) -> bytes:
-    """Return a figure in the format that the name of a file asks for, PNG without one.
-
-    Raises
-    ------
-    InputError
-        The suffix names no format of matplotlib.
-    """
-    suffix = "" if path is None else path.suffix.lower().removeprefix(".")
-    suffix = suffix or "png"
-    if suffix not in figure.canvas.get_supported_filetypes():
-        raise InputError(f"matplotlib draws no {suffix!r}; png, pdf and svg are possible", file=path)
-    content = io.BytesIO()
-    # Equal figures give equal files, whatever version draws them, and whenever.
-    with styled():
-        figure.savefig(content, format=suffix, metadata=SILENT.get(suffix))
-    return content.getvalue()
-
-
-def files(figures: Mapping[str, Figure], folder: Path, ending: str) -> dict[Path, bytes]:
-    """Return figures as files of a folder, in the format of their common ending (`png`, `pdf`, `svg`)."""
-    places = {folder / f"{name}.{ending}": figure for name, figure in figures.items()}
-    return {place: drawn(figure, place) for place, figure in places.items()}
-
-
-def decimal_sign(figure: Figure, sign: str) -> None:
-    """Write the numbers at all axes of a figure with the decimal sign of a language."""
-    from matplotlib.ticker import ScalarFormatter
-
-    class Signed(ScalarFormatter):
-        def __call__(self, x: float, pos: int | None = None) -> str:
-            return super().__call__(x, pos).replace(".", sign)
-
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            if isinstance(axis.get_major_formatter(), ScalarFormatter):
-                axis.set_major_formatter(Signed(useOffset=False))
 
 
 def round_length(value: float) -> float:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, spread
+from photogram.show.sketch.declared import Panel, ScaleBar, spread
 from photogram.show.sketch.marks import Arrows, Band, Line, Mark, Polygons, boxes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, INK, MARKED, SKY
 from photogram.stellar.curves import histogram
 
@@ -56,10 +57,10 @@ def vectors(
     return marks, (scale * bar, INK, f"{bar:g} {unit}")
 
 
-def bells(every: dict[str, Floats], unit: str) -> Sketch:
+def bells(every: dict[str, Floats], unit: str) -> Plot:
     """Return histograms of residuals with their normal curves, by names of the residuals."""
     panels = [_bell(values, f"residuals in {name}", unit) for name, values in every.items()]
-    return Sketch(11.0, 3.8, panels, len(panels))
+    return Plot(11.0, 3.8, panels, len(panels))
 
 
 def _bell(values: Floats, title: str, unit: str) -> Panel:

@@ -12,7 +12,7 @@ from photogram.show.angles import ARCSEC
 from photogram.show.judgement import judged, remarks_section, tests_section
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section, significant
 from photogram.show.quantity import members
-from photogram.show.sketch.declared import Sketch
+from photogram.show.sketch.plot import Plot
 from photogram.stellar import night_tables as tables
 from photogram.stellar.camera_tables import correlated_members, correlations, matrix_table
 from photogram.stellar.lens_choice import LensTest
@@ -78,7 +78,7 @@ def night_document(result: CalibratedNight) -> Document:
     )
 
 
-def pictures(drawn: dict[str, Sketch]) -> Layers:
+def pictures(drawn: dict[str, Plot]) -> Layers:
     """Return pictures by their names as layers of a page."""
     layers = [
         Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", partial(drawn.get, name))

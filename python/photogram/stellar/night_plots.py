@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, around
+from photogram.show.sketch.declared import Panel, ScaleBar, around
 from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.drawing import band, bells, curves, vectors
 from photogram.stellar.night_result import CalibratedNight
@@ -18,7 +19,7 @@ _NAMED = len(COLOURS)
 """Exposures that have a colour of their own; more are drawn alike."""
 
 
-def sketches(result: CalibratedNight) -> dict[str, Sketch]:
+def sketches(result: CalibratedNight) -> dict[str, Plot]:
     """Return all pictures by name."""
     x, y = result.calibration.residuals.T
     return {
@@ -29,9 +30,7 @@ def sketches(result: CalibratedNight) -> dict[str, Sketch]:
     }
 
 
-def _frame(
-    result: CalibratedNight, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()
-) -> Sketch:
+def _frame(result: CalibratedNight, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()) -> Plot:
     """Return marks on the frame as the picture is seen: y downward."""
     width, height = result.night.frame
     outline = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]], float)
@@ -40,7 +39,7 @@ def _frame(
     every = [Line(outline, FAINT, 0.8), Markers(result.camera.values[None, 2:4], "+", 12.0), *marks]
     limits = np.array([[left, low], [right, top]])
     panel = Panel(limits, every, title, "x, px", "y, px", equal=True, legend="beside", bars=bars)
-    return Sketch(8.7, 1.8 + 6.5 * height / width, [panel])
+    return Plot(8.7, 1.8 + 6.5 * height / width, [panel])
 
 
 def _groups(result: CalibratedNight) -> list[tuple[str, Any]]:
@@ -50,7 +49,7 @@ def _groups(result: CalibratedNight) -> list[tuple[str, Any]]:
     return [(f"exposure {name}", of == k) for k, name in enumerate(result.names)]
 
 
-def _stars(result: CalibratedNight) -> Sketch:
+def _stars(result: CalibratedNight) -> Plot:
     marks: list[Mark] = [
         Markers(
             result.calibration.xy[chosen],
@@ -65,13 +64,13 @@ def _stars(result: CalibratedNight) -> Sketch:
     return _frame(result, "Stars in the frame, and the principal point", marks)
 
 
-def _residuals(result: CalibratedNight) -> Sketch:
+def _residuals(result: CalibratedNight) -> Plot:
     found = result.calibration
     arrows, bar = vectors(found.xy, found.residuals, _groups(result), "px")
     return _frame(result, "Residuals (measured minus computed)", arrows, [bar])
 
 
-def _of_angle(result: CalibratedNight) -> Sketch:
+def _of_angle(result: CalibratedNight) -> Plot:
     """Draw the distance from the principal point over the angle, and what the terms change in it."""
     camera, frame = result.camera, result.night.frame
     theta = np.linspace(0, min(camera.largest_angle(frame), np.radians(110)), 200)
@@ -87,10 +86,10 @@ def _of_angle(result: CalibratedNight) -> Sketch:
         curves([line], across, "distance from the principal point, px"),
         curves(terms, across, "change by the terms of the lens, px"),
     ]
-    return Sketch(11.0, 4.4, panels, 2)
+    return Plot(11.0, 4.4, panels, 2)
 
 
-def _of_brown(result: CalibratedNight) -> Sketch:
+def _of_brown(result: CalibratedNight) -> Plot:
     """Draw radial distortion and the profile of the decentering one, to the corners of the frame."""
     camera = result.camera
     f = float(np.mean(camera.values[:2]))
@@ -118,7 +117,7 @@ def _of_brown(result: CalibratedNight) -> Sketch:
     ]
     used = float(np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max())
     outermost = [replace(panel, marks=[_outermost(used, panel), *panel.marks]) for panel in panels]
-    return Sketch(11.0, 4.4, outermost, 2)
+    return Plot(11.0, 4.4, outermost, 2)
 
 
 def _outermost(used: float, panel: Panel) -> Line:

@@ -9,8 +9,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC
-from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, around, spread
+from photogram.show.sketch.declared import Panel, ScaleBar, around, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
 from photogram.stellar.drawing import band, bells, curves, vectors
@@ -18,7 +19,7 @@ from photogram.stellar.parameters import GROUPS
 from photogram.stellar.result import Result
 
 
-def sketches(result: Result) -> dict[str, Sketch]:
+def sketches(result: Result) -> dict[str, Plot]:
     """Return all pictures that the options ask for by name; stars and residuals always."""
     made = {"stars": _stars(result), "residuals": _residuals(result)}
     if result.problem.options.histogram:
@@ -31,7 +32,7 @@ def sketches(result: Result) -> dict[str, Sketch]:
     return made
 
 
-def _plate(places: Floats, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()) -> Sketch:
+def _plate(places: Floats, title: str, marks: Sequence[Mark], bars: Sequence[ScaleBar] = ()) -> Plot:
     """Return a plate with marks, and lines through its origin."""
     limits = around(places)
     lines = [
@@ -39,10 +40,10 @@ def _plate(places: Floats, title: str, marks: Sequence[Mark], bars: Sequence[Sca
         for axis in ([True, False], [False, True])
     ]
     panel = Panel(limits, [*lines, *marks], title, "x, mm", "y, mm", equal=True, legend="beside", bars=bars)
-    return Sketch(8.2, 6.6, [panel])
+    return Plot(8.2, 6.6, [panel])
 
 
-def _stars(result: Result) -> Sketch:
+def _stars(result: Result) -> Plot:
     """Draw every star at its mean place on the plate."""
     problem = result.problem
     count = np.bincount(problem.image_stars, minlength=len(problem.star_ids))
@@ -58,7 +59,7 @@ def _stars(result: Result) -> Sketch:
     return _plate(means, "Stars on the plate", marks)
 
 
-def _residuals(result: Result) -> Sketch:
+def _residuals(result: Result) -> Plot:
     problem = result.problem
     groups = [(name, problem.image_groups == group) for group, name in enumerate(GROUPS)]
     shown = [(name, chosen) for name, chosen in groups if chosen.any()]
@@ -68,7 +69,7 @@ def _residuals(result: Result) -> Sketch:
     return _plate(np.vstack([places, *ends]), "Residuals (computed minus measured)", arrows, [bar])
 
 
-def _distortion(result: Result) -> Sketch:
+def _distortion(result: Result) -> Plot:
     # Finer than the table, so that the curves are smooth.
     problem = result.problem
     fine = replace(problem.options, interval=(problem.options.extent or 0.1) / 200)
@@ -86,10 +87,10 @@ def _distortion(result: Result) -> Sketch:
         "distortion with its mean error, µm",
         f"Distortion; calibrated principal distance {1e3 * found.calibrated:.4f} mm",
     )
-    return Sketch(7.5, 4.8, [panel])
+    return Plot(7.5, 4.8, [panel])
 
 
-def _refraction(result: Result) -> Sketch:
+def _refraction(result: Result) -> Plot:
     """Draw one curve, for all attitudes look through the same air, and where each of them looks."""
     groups = [group for group in range(3) if result.solved.free[3 * group]]
     every = {group: refraction_curves(result, group) for group in groups}
@@ -111,4 +112,4 @@ def _refraction(result: Result) -> Sketch:
         "Refraction",
         "upper left",
     )
-    return Sketch(7.5, 4.8, [panel])
+    return Plot(7.5, 4.8, [panel])

@@ -4,29 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.plots.placed import placed
-from photogram.show.axes import Where
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Arrows, Contours, Line, Mark, Markers, Segments, Shades
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, VERMILION
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
 
 __all__ = [
-    "draw_cross_validation",
-    "draw_difference",
-    "draw_uncertainty",
-    "draw_uncertainty_curve",
+    "plot_cross_validation",
+    "plot_difference",
+    "plot_uncertainty",
+    "plot_uncertainty_curve",
     "steps_of_125",
 ]
 
@@ -40,103 +37,6 @@ STEPS = 4
 """Of colour from one contour to the next."""
 
 
-def draw_uncertainty(found: UncertaintyMap, path: Path | None = None, ax: Where = None) -> Any:
-    """Draw a map of the uncertainty of projection: contours, the corners that were seen and their hull.
-
-    Parameters
-    ----------
-    found
-        The map.
-    path
-        Of a file for the picture, in the format that its suffix names; None: none is written.
-    ax
-        Axes, or a figure to put them in; a new figure when None.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError
-        A suffix that names no format.
-    ModuleNotFoundError
-        matplotlib is absent.
-    """
-    return placed(uncertainty_sketch(found), path, ax)
-
-
-def draw_uncertainty_curve(found: UncertaintyCurve, path: Path | None = None, ax: Where = None) -> Any:
-    """Draw the uncertainty of projection of a pixel against distance, its minimum marked.
-
-    Parameters
-    ----------
-    found
-        The curve; where it has a value at infinity this is a line across.
-    path, ax
-        As of :func:`draw_uncertainty`.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`draw_uncertainty`.
-    """
-    return placed(_curve(found), path, ax)
-
-
-def draw_difference(found: CameraDifference, path: Path | None = None, ax: Where = None) -> Any:
-    """Draw the difference of two calibrations: its length as contours, its vectors; a panel each distance.
-
-    Parameters
-    ----------
-    found
-        The difference.
-    path, ax
-        As of :func:`draw_uncertainty`; as many axes as there are distances, and as many more where it is
-        drawn beside what the uncertainties explain.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`draw_uncertainty`.
-    """
-    return placed(difference_sketch(found), path, ax)
-
-
-def draw_cross_validation(
-    cross: CrossValidation, over: UncertaintyMap, path: Path | None = None, ax: Where = None
-) -> Any:
-    """Draw how the first two parts of a cross-validation differ, and that beside its covariance.
-
-    Parameters
-    ----------
-    cross
-        The cross-validation.
-    over
-        A map of the camera, whose grid and distance it is drawn at.
-    path, ax
-        As of :func:`draw_uncertainty`; two axes.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`draw_uncertainty`.
-    """
-    return placed(cross_validation_sketch(cross, over), path, ax)
-
-
 def steps_of_125(low: float, high: float) -> Floats:
     """Return values 1, 2, 5 times powers of ten that enclose what lies between two positive numbers."""
     start = round_length(low)
@@ -146,15 +46,28 @@ def steps_of_125(low: float, high: float) -> Floats:
     return np.asarray(steps[(steps >= start * (1 - 1e-9)) & (np.arange(len(steps)) <= above[0])])
 
 
-def uncertainty_sketch(found: UncertaintyMap) -> Sketch:
-    """Return the picture of a map; see :func:`draw_uncertainty`."""
+def plot_uncertainty(found: UncertaintyMap) -> Plot:
+    """Plot a map of the uncertainty of projection: contours, the corners that were seen and their hull.
+
+    Parameters
+    ----------
+    found
+        The map.
+    """
     marks = [*_known(found), *_seen(found.corners, found.coverage)]
     panel = _map(found.size, found.columns, found.rows, found.sd, "px", marks)
     title = found.title + "\n" + found.model.replace("; ", "\n")
-    return Sketch(WIDTH, _height(found.size), [replace(panel, title=title)])
+    return Plot(WIDTH, _height(found.size), [replace(panel, title=title)])
 
 
-def _curve(found: UncertaintyCurve) -> Sketch:
+def plot_uncertainty_curve(found: UncertaintyCurve) -> Plot:
+    """Plot the uncertainty of projection of a pixel against distance, its minimum marked.
+
+    Parameters
+    ----------
+    found
+        The curve; where it has a value at infinity this is a line across.
+    """
     away = np.isfinite(found.distances)
     order = np.argsort(found.distances[away])
     distance, sd = found.minimum
@@ -183,11 +96,17 @@ def _curve(found: UncertaintyCurve) -> Sketch:
         log_across=True,
         log_up=True,
     )
-    return Sketch(WIDTH, 0.6 * WIDTH, [panel])
+    return Plot(WIDTH, 0.6 * WIDTH, [panel])
 
 
-def difference_sketch(found: CameraDifference) -> Sketch:
-    """Return the picture of a difference; see :func:`draw_difference`."""
+def plot_difference(found: CameraDifference) -> Plot:
+    """Plot the difference of two calibrations: its length as contours, its vectors; a panel each distance.
+
+    Parameters
+    ----------
+    found
+        The difference.
+    """
     names = f"{found.cameras[1]} less {found.cameras[0]}"
     panels = list[Panel]()
     for number, distance in enumerate(found.distances):
@@ -198,18 +117,26 @@ def difference_sketch(found: CameraDifference) -> Sketch:
     rows = len(found.distances)
     columns = len(panels) // rows
     panels[-columns] = replace(panels[-columns], notes=found.remarks)
-    return Sketch(WIDTH * columns, rows * _height(found.size), panels, columns)
+    return Plot(WIDTH * columns, rows * _height(found.size), panels, columns)
 
 
-def cross_validation_sketch(cross: CrossValidation, over: UncertaintyMap) -> Sketch:
-    """Return the picture of a cross-validation; see :func:`draw_cross_validation`."""
+def plot_cross_validation(cross: CrossValidation, over: UncertaintyMap) -> Plot:
+    """Plot how the first two parts of a cross-validation differ, and that beside its covariance.
+
+    Parameters
+    ----------
+    cross
+        The cross-validation.
+    over
+        A map of the camera, whose grid and distance it is drawn at.
+    """
     found = cross.map(cross.cameras.index(over.camera), over.pixels.reshape(-1, 2), over.distance)
     shape = over.sd.shape
     own = _Apart(over.size, over.columns, over.rows, found.differences.reshape(*shape, 2), over.inside)
     away = distance_text(over.distance, over.unit)
     left = own.panel(f"{over.camera}: second part of the views less the first, {away}, px")
     panels = [replace(left, notes=[cross.verdict]), own.beside(found.chi2.reshape(shape) / 2)]
-    return Sketch(2 * WIDTH, _height(over.size), panels, 2)
+    return Plot(2 * WIDTH, _height(over.size), panels, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,4 +226,4 @@ def in_pixels(size: tuple[int, int]) -> Panel:
     return Panel(limits, across="column, px", up="row, px", equal=True)
 
 
-check_arguments(globals(), [name for name in __all__ if name.startswith("draw")])
+check_arguments(globals(), [name for name in __all__ if name.startswith("plot")])

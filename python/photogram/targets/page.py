@@ -12,10 +12,10 @@ from photogram.show.methods import page_of
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.calibration_result import Calibrated, Worth
-from photogram.targets.drawing import cross_validation_sketch, difference_sketch, uncertainty_sketch
+from photogram.targets.drawing import plot_cross_validation, plot_difference, plot_uncertainty
 from photogram.targets.grouping import Groups, residual_groups
 from photogram.targets.maps import UncertaintyMap, distance_text, map_name
-from photogram.targets.residual_drawing import board_sketch, poorest_sketch
+from photogram.targets.residual_drawing import plot_board_residuals, plot_poorest_views
 from photogram.targets.tables import board_facts, prior_shift, spline_lines, views, worst_points
 
 
@@ -54,13 +54,13 @@ def _residuals(calibrated: Calibrated) -> list[Part]:
             "board-residuals",
             "On the board",
             "Mean residuals over all views: errors of the print.",
-            partial(board_sketch, calibrated),
+            partial(plot_board_residuals, calibrated),
         ),
         Drawing(
             "poorest-views",
             "Poorest views",
             "Residuals of the pictures that fit worst.",
-            partial(poorest_sketch, calibrated),
+            partial(plot_poorest_views, calibrated),
         ),
     ]
     tables = [page_table(title, residual_groups(calibrated, by)) for by, title in _GROUPS.items()]
@@ -112,13 +112,13 @@ def worth_section(worth: Worth | None) -> Section:
 def drawings(worth: Worth) -> list[Drawing]:
     """Return all pictures, still to be drawn."""
     found = [
-        Drawing(f"map-{map_name(each)}", _title(each), CAPTION, partial(uncertainty_sketch, each))
+        Drawing(f"map-{map_name(each)}", _title(each), CAPTION, partial(plot_uncertainty, each))
         for each in worth.maps
     ]
     for cross in worth.cross:
         for own in worth.maps:
             if own.camera in cross.cameras:
-                sketch = partial(cross_validation_sketch, cross, own)
+                sketch = partial(plot_cross_validation, cross, own)
                 name = f"cross-validation-{map_name(own)}"
                 found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, sketch))
     return found + [_of_difference(each) for each in worth.differences]
@@ -136,7 +136,7 @@ def _tests(worth: Worth) -> list[Fact]:
 
 def _of_difference(found: CameraDifference) -> Drawing:
     name = f"difference-{found.cameras[0]}-{found.cameras[1]}".replace(" ", "-")
-    return Drawing(name, "Difference", APART, partial(difference_sketch, found))
+    return Drawing(name, "Difference", APART, partial(plot_difference, found))
 
 
 def _title(found: UncertaintyMap) -> str:

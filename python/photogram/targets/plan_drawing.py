@@ -2,58 +2,38 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.lazy_dataclasses import replace
 from photogram.network.hull import hull
-from photogram.plots.placed import placed
-from photogram.show.axes import Where
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Markers, Polygons
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.drawing import in_pixels
 from photogram.targets.view_plan_result import ViewPlan
 
-__all__ = ["draw_planned_views"]
+__all__ = ["plot_planned_views"]
 
 ACROSS, PANEL = 4, 2.2
 """Panels side by side, and how wide each is, inches."""
 
 
-def draw_planned_views(plan: ViewPlan, path: Path | None = None, ax: Where = None) -> Any:
-    """Draw where the corners of the board are in each picture; the point 0 is red where it is shown.
+def plot_planned_views(plan: ViewPlan) -> Plot:
+    """Plot where the corners of the board are in each picture; the point 0 is red where it is shown.
 
     Parameters
     ----------
     plan
         The plan.
-    path, ax
-        As of :func:`photogram.targets.draw_uncertainty`; four axes for each four views begun.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`photogram.targets.draw_uncertainty`.
     """
-    return placed(views_sketch(plan), path, ax)
-
-
-def views_sketch(plan: ViewPlan) -> Sketch:
-    """Return the picture of views; see :func:`draw_planned_views`."""
     (size,) = plan.calibrated.calibration.corners.sizes
     assert size is not None
     rows = -(-len(plan.views) // ACROSS)
     panels = [_view(plan, number, size) for number in range(len(plan.views))]
     every = [*panels, *[None] * (rows * ACROSS - len(panels))]
-    return Sketch(PANEL * ACROSS, rows * (0.3 + PANEL * size[1] / size[0]), every, ACROSS)
+    return Plot(PANEL * ACROSS, rows * (0.3 + PANEL * size[1] / size[0]), every, ACROSS)
 
 
 def _view(plan: ViewPlan, number: int, size: tuple[int, int]) -> Panel:

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import replace
-from photogram.plots.placed import placed
-from photogram.show.axes import Where
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Arrows, Mark, Markers
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.drawing import in_pixels
 from photogram.targets.grouping import NOTABLE, mean_residuals
 from photogram.targets.tables import view_rms
 
-__all__ = ["draw_board_residuals", "draw_poorest_views"]
+__all__ = ["plot_board_residuals", "plot_poorest_views"]
 
 POOREST = 3
 """Views that are drawn."""
@@ -29,50 +25,14 @@ LONGEST, OUTLIER = 1.5, 3.0
 """Spacings of the points, of the longest vector; what one that is far longer takes of these."""
 
 
-def draw_board_residuals(calibrated: Calibrated, path: Path | None = None, ax: Where = None) -> Any:
-    """Draw the mean residual of each point of the board, in axes of the picture: errors of its print.
+def plot_board_residuals(calibrated: Calibrated) -> Plot:
+    """Plot the mean residual of each point of the board, in axes of the picture: errors of its print.
 
     Parameters
     ----------
     calibrated
         The adjusted calibration.
-    path, ax
-        As of :func:`photogram.targets.draw_uncertainty`.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`photogram.targets.draw_uncertainty`.
     """
-    return placed(board_sketch(calibrated), path, ax)
-
-
-def draw_poorest_views(calibrated: Calibrated, path: Path | None = None, ax: Where = None) -> Any:
-    """Draw the residuals of the pictures of the three views that fit worst.
-
-    Parameters
-    ----------
-    calibrated, path, ax
-        As of :func:`draw_board_residuals`; three axes, fewer where there are fewer pictures.
-
-    Returns
-    -------
-    The axes.
-
-    Raises
-    ------
-    InputError, ModuleNotFoundError
-        As of :func:`draw_board_residuals`.
-    """
-    return placed(poorest_sketch(calibrated), path, ax)
-
-
-def board_sketch(calibrated: Calibrated) -> Sketch:
-    """Return the picture of a board; see :func:`draw_board_residuals`."""
     corners, places = calibrated.calibration.corners, calibrated.points
     mean, tests = mean_residuals(calibrated, corners.point[corners.use], len(places))
     seen = np.isfinite(mean).all(axis=1)
@@ -85,11 +45,17 @@ def board_sketch(calibrated: Calibrated) -> Sketch:
     title = "Mean residual of each point of the board; red: hardly by chance"
     plan = Panel(limits, (), title, f"x of the board, {unit}", f"y of the board, {unit}", equal=True)
     height = 1.4 + 5.2 * float(np.clip(extent[1] / extent[0], 0.4, 1.4))
-    return Sketch(6.4, height, [_with_vectors(plan, places[seen, :2], mean[seen], marked[seen], room)])
+    return Plot(6.4, height, [_with_vectors(plan, places[seen, :2], mean[seen], marked[seen], room)])
 
 
-def poorest_sketch(calibrated: Calibrated) -> Sketch:
-    """Return the picture of views; see :func:`draw_poorest_views`."""
+def plot_poorest_views(calibrated: Calibrated) -> Plot:
+    """Plot the residuals of the pictures of the three views that fit worst.
+
+    Parameters
+    ----------
+    calibrated, path, ax
+        As of :func:`plot_board_residuals`; three axes, fewer where there are fewer pictures.
+    """
     corners, result = calibrated.calibration.corners, calibrated.result
     picture = corners.picture[corners.use]
     rms = view_rms(picture, result.residuals, len(corners.pictures))
@@ -104,7 +70,7 @@ def poorest_sketch(calibrated: Calibrated) -> Sketch:
         large = (np.abs(tests) > NOTABLE).any(axis=1)
         view = replace(in_pixels(size), title=f"{corners.pictures[each]}, rms {rms[each]:.2g} px")
         panels.append(_with_vectors(view, xy, residuals, large, room))
-    return Sketch(4.4 * len(worst), 4.2, panels, len(worst))
+    return Plot(4.4 * len(worst), 4.2, panels, len(worst))
 
 
 def _with_vectors(panel: Panel, places: Floats, vectors: Floats, marked: Bools, room: float) -> Panel:

@@ -20,7 +20,7 @@ from photogram.show.sections import composed, headline
 from photogram.targets.document import worth_files, worth_members
 from photogram.targets.maps import distance_text
 from photogram.targets.page import drawings, worth_facts
-from photogram.targets.plan_drawing import views_sketch
+from photogram.targets.plan_drawing import plot_planned_views
 from photogram.targets.view_plan_result import ViewPlan
 
 CAPTION = "Where the corners of the board are in each picture; red: its point 0."
@@ -103,7 +103,7 @@ def plan_drawings(plan: ViewPlan) -> list[Drawing]:
     """Return all pictures, still to be drawn: the views, and maps of the uncertainty that they promise."""
     worth = plan.calibrated.worth
     assert worth is not None
-    return [Drawing("planned-views", "Views", CAPTION, partial(views_sketch, plan)), *drawings(worth)]
+    return [Drawing("planned-views", "Views", CAPTION, partial(plot_planned_views, plan)), *drawings(worth)]
 
 
 @document_of.register(ViewPlan)

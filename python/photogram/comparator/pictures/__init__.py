@@ -1,5 +1,5 @@
-"""Pictures of a calibration, made with matplotlib (`pip install 'photogram[plots]'`)."""
+"""Plots of a calibration, and its report as PDF."""
 
-from photogram.comparator.pictures.book import figures
+from photogram.comparator.pictures.book import sketches
 
-__all__ = ["figures"]
+__all__ = ["sketches"]

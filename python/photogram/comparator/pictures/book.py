@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -20,19 +20,16 @@ from photogram.comparator.pictures.vectors import (
     grid_vectors,
     joint_grid,
 )
-from photogram.show.sketch.declared import Sketch
-from photogram.show.sketch.on_axes import figure
+from photogram.show.sketch.plot import Plot
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from photogram.comparator import Calibration
 
 
-def sketches(calibration: Calibration) -> dict[str, Callable[[], Sketch]]:
-    """Return what draws each picture, by a short name."""
+def sketches(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
+    """Return the functions that draw the plots of a calibration, by short names."""
     nonlinear, joint = calibration.nonlinear, calibration.joint
-    made: dict[str, Callable[[], Sketch]] = {
+    made: dict[str, Callable[[], Plot]] = {
         "variance": partial(variance_bars, calibration),
         "comparator-residuals": partial(comparator_vectors, calibration),
         "grid-residuals": partial(grid_vectors, calibration),
@@ -58,12 +55,3 @@ def sketches(calibration: Calibration) -> dict[str, Callable[[], Sketch]]:
         "pooled-ellipses": partial(pooled_ellipses, calibration),
         "residual-histogram": partial(residual_histogram, calibration),
     }
-
-
-def figures(calibration: Calibration) -> Iterator[tuple[str, Figure]]:
-    """Make the pictures one after the other, with short names, as figures that belong to no window.
-
-    Needs matplotlib (`pip install 'photogram[plots]'`).
-    """
-    for name, sketch in sketches(calibration).items():
-        yield name, figure(sketch())

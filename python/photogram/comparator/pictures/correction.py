@@ -9,8 +9,9 @@ import numpy as np
 from photogram.comparator.listing.parameters import table_nodes
 from photogram.comparator.pictures.style import MAIN, MM, OF_COMPARATOR, plan
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, Sketch, around
+from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.marks import Contours, Line, Mark, Markers, Shades
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ MAGNIFICATION = 10_000
 """Of the net: a micrometre is drawn as 10 mm."""
 
 
-def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Sketch:
+def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:
     """Draw the corrections in x and in y as contour maps on one scale, with the places measured."""
     centre, half = np.array(polynomial.frame.centre_um), np.array(polynomial.frame.half_range_um)
     x, y = np.linspace(centre - half, centre + half, FINE).T
@@ -48,10 +49,10 @@ def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: 
         for axis in range(2)
     ]
     title = f"Nonlinear correction{whose}; dots are the places measured"
-    return Sketch(10.5, 4.9, panels, 2, shades, title=title)
+    return Plot(10.5, 4.9, panels, 2, shades, title=title)
 
 
-def distorted_grid(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Sketch:
+def distorted_grid(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:
     """Draw the program's net: lines through its 5 x 5 nodes, displaced 10,000 times the correction.
 
     Nodes and magnification are always the same, so that calibrations can be compared over the years.
@@ -68,4 +69,4 @@ def distorted_grid(calibration: Calibration, polynomial: Polynomial, whose: str 
     marks: list[Mark] = [stars, *(Line(line, MAIN, 1.2) for line in lines)]
     limits = around(np.vstack([stars.places, *lines]))
     title = f"Net displaced by the nonlinear correction{whose}, {MAGNIFICATION:,} times magnified"
-    return Sketch(6.2, 6.0, [plan(limits, marks, title, OF_COMPARATOR, (MAGNIFICATION / MM, 1.0))])
+    return Plot(6.2, 6.0, [plan(limits, marks, title, OF_COMPARATOR, (MAGNIFICATION / MM, 1.0))])

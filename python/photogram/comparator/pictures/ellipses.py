@@ -19,8 +19,9 @@ from photogram.comparator.pictures.style import (
 )
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, Sketch, around, side_by_side
+from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.marks import Ellipses, Mark, Markers
+from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import FAINT
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ LEAST = 39
 """Percent of the standard ellipse, which the program draws."""
 
 
-def pointing_ellipses(calibration: Calibration) -> Sketch:
+def pointing_ellipses(calibration: Calibration) -> Plot:
     """Draw the 39 percent ellipses of single pointings at the measured places of each case."""
     places = [case.placed.means_um / MM for case in calibration.cases]
     ellipses = [
@@ -56,7 +57,7 @@ def pointing_ellipses(calibration: Calibration) -> Sketch:
     )
 
 
-def operator_ellipses(calibration: Calibration, operator: int) -> Sketch:
+def operator_ellipses(calibration: Calibration, operator: int) -> Plot:
     """Draw the ellipses of the pointings of an operator, point by point over his cases, on the grid."""
     points, total = calibration.pointing.operators[operator]
     own = [case for case in calibration.cases if case.placed.case.operator == operator]
@@ -64,7 +65,7 @@ def operator_ellipses(calibration: Calibration, operator: int) -> Sketch:
     return _on_grid(calibration, own[0].placed.case.plate, points, total, title)
 
 
-def total_ellipses(calibration: Calibration) -> Sketch:
+def total_ellipses(calibration: Calibration) -> Plot:
     """Draw the ellipses of all pointings, point by point, on the grid of the first plate."""
     pointing = calibration.pointing
     title = f"All pointings, {len(calibration.cases)} cases, {len(pointing.operators)} operators"
@@ -74,7 +75,7 @@ def total_ellipses(calibration: Calibration) -> Sketch:
 
 def _on_grid(
     calibration: Calibration, plate: int, points: Mapping[int, Precision], total: Precision, title: str
-) -> Sketch:
+) -> Plot:
     """Draw the ellipses of points at all levels, in the axes of the comparator."""
     grid = calibration.session.grids[plate]
     place = dict(zip(grid.points.tolist(), grid.xy_um / MM, strict=True))
@@ -82,17 +83,17 @@ def _on_grid(
     pooled = f"pooled {total.sd_point_um:.2f} µm" if total.degrees_of_freedom > 0 else "no repeated readings"
     title = f"{title}: {pooled}\nellipses of {LEVELS} percent; * no deviation"
     if not known:
-        return Sketch(7.2, 7.0, [plan(around(np.array([*place.values()])), (), title, OF_PLATE)])
+        return Plot(7.2, 7.0, [plan(around(np.array([*place.values()])), (), title, OF_PLATE)])
     places = np.array([place[point] for point in known])
     ellipses = [own.ellipse for own in known.values()]
     largest = max(CONFIDENCE_FACTORS.values()) * max(ellipse.major_um for ellipse in ellipses)
     scale = _scale(places, largest)
     scales = {percent: factor * scale for percent, factor in CONFIDENCE_FACTORS.items()}
     marks, key = _ellipses(places, ellipses, scales), (scale, round_length(largest))
-    return Sketch(7.2, 7.0, [plan(around(places, 0.12), marks, title, OF_PLATE, key)])
+    return Plot(7.2, 7.0, [plan(around(places, 0.12), marks, title, OF_PLATE, key)])
 
 
-def pooled_ellipses(calibration: Calibration) -> Sketch:
+def pooled_ellipses(calibration: Calibration) -> Plot:
     """Draw the pooled ellipses of every case, every operator and all, each at all levels, on one scale."""
     pointing = calibration.pointing
     pooled = [

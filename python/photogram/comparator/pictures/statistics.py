@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.pictures.style import ACCENT, MAIN
-from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Line, Polygons, Texts, boxes
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
 
-def residual_histogram(calibration: Calibration) -> Sketch:
+def residual_histogram(calibration: Calibration) -> Plot:
     """Draw histograms of the final residuals against the normal curve of their standard deviation."""
     residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
     limit = float(np.abs(residuals).max()) * 1.1 or 1.0
@@ -40,7 +41,7 @@ def residual_histogram(calibration: Calibration) -> Sketch:
         marks = [Polygons(bars, MAIN, 0.35, MAIN, 1.0, 0.8), Line(curve, ACCENT, 1.8)]
         panels.append(Panel(limits, marks, title, "residual, µm", "" if axis else "number"))
     title = "Final residuals in the comparator system and the normal curve"
-    return Sketch(10.0, 3.9, panels, 2, title=title)
+    return Plot(10.0, 3.9, panels, 2, title=title)
 
 
 def _bins(count: int) -> int:
@@ -48,7 +49,7 @@ def _bins(count: int) -> int:
     return 2 * round(math.sqrt(count) * 0.75) + 1
 
 
-def variance_bars(calibration: Calibration) -> Sketch:
+def variance_bars(calibration: Calibration) -> Plot:
     """Draw the components of the error as bars of variance."""
     components = calibration.variance.components_um
     total = components["total"] ** 2
@@ -64,7 +65,7 @@ def variance_bars(calibration: Calibration) -> Sketch:
     ]
     title = f"Components of the error: {components['total']:.3f} µm before calibration"
     limits = np.array([[0.0, -0.5], [right, len(names) - 0.5]])
-    return Sketch(8.0, 2.9, [Panel(limits, marks, title, "variance, µm²", up_names=names)])
+    return Plot(8.0, 2.9, [Panel(limits, marks, title, "variance, µm²", up_names=names)])
 
 
 def _bars(values: Floats, places: Floats) -> Floats:

@@ -21,8 +21,9 @@ from photogram.comparator.pictures.style import (
 )
 from photogram.comparator.pointing import Ellipse
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Sketch, around, side_by_side
+from photogram.show.sketch.declared import around
 from photogram.show.sketch.marks import Ellipses, Names
+from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import FAINT, SOFT
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
 
-def comparator_vectors(calibration: Calibration) -> Sketch:
+def comparator_vectors(calibration: Calibration) -> Plot:
     """Draw the residuals of each case, after all corrections, in the system of the comparator."""
     residuals = [fit.residuals for fit in calibration.last_fits]
     return _by_case(
@@ -42,7 +43,7 @@ def comparator_vectors(calibration: Calibration) -> Sketch:
     )
 
 
-def grid_vectors(calibration: Calibration) -> Sketch:
+def grid_vectors(calibration: Calibration) -> Plot:
     """Draw the residuals of each case, after all corrections, in the system of its plate."""
     hands = [case.placed.orientation.left_handed for case in calibration.cases]
     return _by_case(
@@ -63,7 +64,7 @@ def _by_case(
     vectors: Sequence[Floats],
     axes: tuple[str, str],
     title: str,
-) -> Sketch:
+) -> Plot:
     every = np.vstack(vectors)
     scale = magnification(places[0] / MM, every)
     # The longest residual of all sets one scale for all panels.
@@ -82,7 +83,7 @@ def _by_case(
     return side_by_side(panels, ACROSS, 3.4, title)
 
 
-def average_vectors(calibration: Calibration, plate: int) -> Sketch:
+def average_vectors(calibration: Calibration, plate: int) -> Plot:
     """Draw average residuals by comparator location and by grid point, on one scale."""
     result = calibration.plates[plate]
     averages = result.averages
@@ -109,7 +110,7 @@ def average_vectors(calibration: Calibration, plate: int) -> Sketch:
     )
 
 
-def joint_grid(calibration: Calibration, plate: int) -> Sketch:
+def joint_grid(calibration: Calibration, plate: int) -> Plot:
     """Draw the corrections of the grid by the joint adjustment, with their standard ellipses."""
     joint = calibration.joint
     if joint is None:
@@ -133,4 +134,4 @@ def joint_grid(calibration: Calibration, plate: int) -> Sketch:
     limits = around(np.vstack([places / MM, ends - reach, ends + reach]))
     key = scale, round_length(float(np.hypot(*own.corrections_um.T).max()))
     title = f"Corrections of grid {plate} by the joint adjustment, standard ellipses"
-    return Sketch(6.2, 5.8, [plan(limits, marks, title, OF_PLATE, key)])
+    return Plot(6.2, 5.8, [plan(limits, marks, title, OF_PLATE, key)])

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 from photogram.results.components import VarianceComponents, statement
-from photogram.results.components_picture import components_sketch
 from photogram.results.snooping_result import LN10, Snooped, estimated_errors, rivals_of
 from photogram.show.judgement import judged
 from photogram.show.methods import page_of
@@ -52,7 +50,7 @@ def _parts(found: VarianceComponents) -> list[Part]:
     caption = "Factors of the standard deviations with their intervals (95 percent); 1 is what was given."
     parts: list[Part] = [
         Remarks(_sentences(statement(found))),
-        Drawing("picture-components", "Variance components", caption, partial(components_sketch, found)),
+        Drawing("picture-components", "Variance components", caption, found.plot),
         _table(found),
     ]
     if found.estimate.messages:

@@ -11,7 +11,7 @@ from photogram.results.result import Result
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.standards import Lengths
 from photogram.show.pictures import round_length
-from photogram.show.sketch.declared import Panel, ScaleBar, Sketch, around, spread
+from photogram.show.sketch.declared import Panel, ScaleBar, around, spread
 from photogram.show.sketch.marks import (
     Arrows,
     Ellipses,
@@ -26,6 +26,7 @@ from photogram.show.sketch.marks import (
     ellipse_axes,
     error_bars,
 )
+from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION
 
 WIDTH = 6.3
@@ -39,7 +40,7 @@ CELLS = 120
 """Of the longer side of the map of overlap."""
 
 
-def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Sketch | None:
+def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Plot | None:
     """Draw (k, 3) control, check points, their differences in plan, and those in height as colours."""
     if not len(found) and not len(control):
         return None
@@ -52,7 +53,7 @@ def differences(found: Compared, control: Floats, labels: dict[str, str]) -> Ske
     if len(found):
         panel = _points(panel, found, float(extent.max()), labels)
     height = float(np.clip(WIDTH * (extent[1] + 1e-9) / (extent[0] + 1e-9), 2.6, WIDTH))
-    return Sketch(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="above")])
+    return Plot(WIDTH, height, [replace(panel, marks=[*marks, *panel.marks], legend="above")])
 
 
 def _in_plan(limits: Floats, labels: dict[str, str]) -> Panel:
@@ -88,7 +89,7 @@ def _points(panel: Panel, found: Compared, extent: float, labels: dict[str, str]
     return replace(panel, marks=marks, bars=bars, shades=shades)
 
 
-def lengths(found: Lengths, labels: dict[str, str]) -> Sketch:
+def lengths(found: Lengths, labels: dict[str, str]) -> Plot:
     """Draw errors of calibrated lengths over these, with one standard deviation, and their limits."""
     test, order = found.test, np.argsort(found.calibrated, kind="stable")
     places = np.column_stack([found.calibrated, test.errors])
@@ -105,10 +106,10 @@ def lengths(found: Lengths, labels: dict[str, str]) -> Sketch:
             marks.append(Line(line, VERMILION, 0.9, "--"))
     limits = np.column_stack([spread(found.calibrated), spread(0.0, *ends)])
     across, up = (f"{labels[name]}, {labels['unit']}" for name in ("length", "error"))
-    return Sketch(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=labels["decimal"])])
+    return Plot(WIDTH, 3.0, [Panel(limits, marks, "", across, up, decimal=labels["decimal"])])
 
 
-def overlap(result: Result, labels: dict[str, str]) -> Sketch | None:
+def overlap(result: Result, labels: dict[str, str]) -> Plot | None:
     """Draw how many adjusted photos see each place of the ground; None without footprints."""
     outlines = footprints(result).outlines[:, :, :2]
     outlines = outlines[np.isfinite(outlines).all(axis=(1, 2))]
@@ -124,7 +125,7 @@ def overlap(result: Result, labels: dict[str, str]) -> Sketch | None:
     corners = np.array([low, low + cell * np.array([len(x), len(y)])])
     cells = Mesh(corners, np.where(counts > 0, counts, np.nan), shades)
     panel = replace(_in_plan(corners, labels), marks=[cells], shades=shades)
-    return Sketch(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)), [panel])
+    return Plot(WIDTH, float(np.clip(WIDTH * len(y) / len(x), 2.4, WIDTH)), [panel])
 
 
 def photos_per_place(outlines: Floats, x: Floats, y: Floats) -> Floats:

@@ -117,10 +117,3 @@ def around(places: Floats, part: float = 0.08) -> Floats:
     low, high = places.min(axis=0), places.max(axis=0)
     room = part * (float((high - low).max()) or 1.0)
     return np.array([low - room, high + room])
-
-
-def side_by_side(panels: Sequence[Panel], most: int, side: float, title: str = "") -> Sketch:
-    """Return a picture of panels about as high as wide, `side` inches, so many in a row at most."""
-    columns = min(len(panels), most)
-    height = side * -(-len(panels) // columns) + (0.3 if title else 0.0)
-    return Sketch(max(side * columns, 5.0), height, panels, columns, title=title)

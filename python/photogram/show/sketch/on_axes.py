@@ -1,4 +1,4 @@
-"""Pictures on axes of matplotlib: one function a mark, and the panel around them."""
+"""Plots on axes of matplotlib, an extra (`pip install 'photogram[plots]'`): one function for each mark."""
 
 from __future__ import annotations
 
@@ -8,123 +8,99 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
-from photogram.show.axes import Where, handed_out, labels, lay_out, note, panels, scale_bars, whole_figure
-from photogram.show.pictures import decimal_sign, new_figure
+from photogram.errors import InputError
+from photogram.show.pictures import new_figure
+from photogram.show.sketch import marks
 from photogram.show.sketch.declared import Panel, Sketch
-from photogram.show.sketch.marks import (
-    Arrows,
-    Band,
-    Contours,
-    Ellipses,
-    Level,
-    Line,
-    Mark,
-    Markers,
-    Mesh,
-    Names,
-    Polygons,
-    Segments,
-    Shades,
-    Texts,
-)
-from photogram.show.style import INK, ORDERED, signed
+from photogram.show.sketch.layout import NAME, NOTE
+from photogram.show.sketch.letters import width
+from photogram.show.sketch.names import Box, free_side
+from photogram.show.style import FAINT, INK, ORDERED, signed, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Text
 
-DOTS = 500
-"""Marks beyond which vectors become dots: files are smaller, and nothing is lost that could be seen."""
+MAX_VECTOR_MARKS = 500  # More markers than these are drawn as pixels in PDF and SVG files
 LEGENDS: dict[str, dict[str, Any]] = {
     "beside": {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0},
     "below": {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "borderaxespad": 4.5},
     "above": {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)},
     "lower right": {"loc": "lower right", "frameon": True, "framealpha": 1.0, "edgecolor": "white"},
 }
-
-
-ROOM = 20.0
-"""Points from the middle of a level of contours to that of the next one."""
 ALIGNED = {"start": "left", "middle": "center", "end": "right"}
 
 
 def figure(sketch: Sketch) -> Figure:
-    """Return a picture as a figure that belongs to no window."""
-    found = new_figure(sketch.width, sketch.height)
-    on_axes(sketch, found)
-    # Where panels of equal scales go is known only when their limits are.
-    lay_out(found)
-    return found
+    """Return a plot as a figure that belongs to no window."""
+    made = new_figure(sketch.width, sketch.height)
+    on_axes(sketch, made)
+    _lay_out(made)
+    return made
 
 
-def on_axes(sketch: Sketch, ax: Where) -> Any:
-    """Draw a picture where it is asked for, and return its axes: one by itself, several as an array.
-
-    Parameters
-    ----------
-    sketch
-        The picture.
-    ax
-        As of :func:`photogram.show.axes.panels`.
+def on_axes(sketch: Sketch, ax: Any) -> None:
+    """Draw a plot on axes, as many as it has panels, or in a figure or subfigure, which gets the axes.
 
     Raises
     ------
     InputError
-        Another number of axes.
+        The number of axes differs from the number of panels.
     ModuleNotFoundError
         matplotlib is absent.
     """
-    given: dict[str, Any] = {"sharex": "col"} if sketch.shared else {}
-    with panels(ax, sketch.rows, sketch.columns, sketch.width, sketch.height, **given) as found:
-        own = [(axes, panel) for axes, panel in zip(found, sketch.panels, strict=False) if panel]
-        for axes, panel in own:
-            _panel(axes, panel)
-        for unused in {*found} - {axes for axes, _ in own}:
-            unused.set_visible(False)
+    with styled():
+        from matplotlib.figure import FigureBase
+
+        if isinstance(ax, FigureBase):
+            shared: Any = {"sharex": "col"} if sketch.shared else {}
+            ax = ax.subplots(sketch.rows, sketch.columns, squeeze=False, **shared)
+            for empty in ax.flat[len(sketch.panels) :]:
+                empty.set_visible(False)
+            ax = ax.flat[: len(sketch.panels)]
+        every: list[Axes] = np.atleast_1d(np.asarray(ax, dtype=object)).ravel().tolist()
+        if len(every) != len(sketch.panels):
+            raise InputError(
+                f"the plot has {len(sketch.panels)} panels and needs as many axes, got {len(every)}"
+            )
+        drawn = [(axes, panel) for axes, panel in zip(every, sketch.panels, strict=True) if panel is not None]
+        for axes, panel in zip(every, sketch.panels, strict=True):
+            if panel is None:
+                axes.set_visible(False)
+            else:
+                _panel(axes, panel)
+        whole: Any = every[0].get_figure()
+        whole.align_ylabels()
         if sketch.shades is not None:
-            _colour_bar([axes for axes, _ in own], sketch.shades)
-        _head(found[0], sketch.title)
-        for axes, panel in own:
-            for mark in panel.marks:
-                if isinstance(mark, Names):
-                    labels(axes, mark.places, mark.texts, mark.colours, mark.avoid)
-    return handed_out(found[: len(sketch.panels)])
-
-
-def _head(axes: Axes, title: str) -> None:
-    """Write the title of all panels above them, and align the names of their vertical axes."""
-    figure = axes.get_figure()
-    assert figure is not None
-    figure.align_ylabels()
-    if title:
-        figure.suptitle(title, fontsize=11, x=0.01, horizontalalignment="left")
+            _colour_bar([axes for axes, _ in drawn], sketch.shades)
+        if sketch.title:
+            whole.suptitle(sketch.title, fontsize=11, x=0.01, horizontalalignment="left")
+        _names(drawn)
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
+    # Ticks are created when the figure is drawn, outside the context of the style.
+    axes.tick_params(color=FAINT, labelsize=8.0, labelcolor=INK)
+    (left, low), (right, top) = panel.limits.tolist()
+    axes.set(xlim=(left, right), ylim=(low, top), xlabel=panel.across, ylabel=panel.up)
     if panel.equal:
         axes.set_aspect("equal", anchor="NW")
-    axes.set_xlim(*panel.limits[:, 0].tolist())
-    axes.set_ylim(*panel.limits[:, 1].tolist())
-    axes.set_xlabel(panel.across)
-    axes.set_ylabel(panel.up)
-    if panel.log_across:
-        axes.set_xscale("log")
-        _ratios(axes.xaxis)
-    if panel.log_up:
-        axes.set_yscale("log")
-        _ratios(axes.yaxis)
-    if panel.equal:
         axes.ticklabel_format(useOffset=False, style="plain")
         axes.locator_params(nbins=6)
     if panel.across:
         axes.tick_params(labelbottom=True)
-    if panel.across_names:
-        places = range(len(panel.across_names))
-        axes.set_xticks(places, panel.across_names, rotation=90 if panel.turned else 0)
-    if panel.up_names:
-        axes.set_yticks(range(len(panel.up_names)), panel.up_names)
+    for axis, log, names in (
+        (axes.xaxis, panel.log_across, panel.across_names),
+        (axes.yaxis, panel.log_up, panel.up_names),
+    ):
+        if log:
+            axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+            _ratios(axis)
+        elif panel.decimal != ".":
+            axis.set_major_formatter(lambda value, _: f"{value:.10g}".replace(".", panel.decimal))
+        if names:
+            turn = 90 if panel.turned and axis is axes.xaxis else 0
+            axis.set_ticks(range(len(names)), names, rotation=turn)
     if panel.unnumbered:
         axes.set(xticks=[], yticks=[])
     if panel.bare:
@@ -132,18 +108,45 @@ def _panel(axes: Axes, panel: Panel) -> None:
         axes.spines[:].set_visible(False)
     for mark in panel.marks:
         draw(mark, axes)
-    if panel.legend:
-        _legend(axes, panel)
-    scale_bars(axes, panel.bars, panel.title)
-    note(axes, panel.notes)
+    _around(axes, panel)
     if panel.shades is not None:
         _colour_bar([axes], panel.shades)
-    if panel.decimal != ".":
-        decimal_sign(whole_figure(axes), panel.decimal)
+
+
+def _around(axes: Axes, panel: Panel) -> None:
+    """Add the legend, the scale bars above the axes with the title over them, and the notes below."""
+    from matplotlib.collections import PathCollection
+    from matplotlib.transforms import ScaledTranslation
+
+    if panel.legend:
+        columns = len(axes.get_legend_handles_labels()[0]) if panel.legend == "above" else 1
+        legend = axes.legend(**LEGENDS.get(panel.legend, {"loc": panel.legend}), ncols=columns)
+        for handle in legend.legend_handles:
+            if isinstance(handle, PathCollection):
+                handle.set_sizes([16.0])
+    left, right = axes.get_xlim()
+    whole: Any = axes.figure
+    for row, (length, colour, text) in enumerate(reversed(panel.bars)):
+        up = ScaledTranslation(0.0, (8.0 + 12.0 * row) / 72.0, whole.dpi_scale_trans)
+        place, end = axes.get_xaxis_transform() + up, left + np.copysign(length, right - left)
+        look: Any = {"color": colour, "linewidth": 2.5, "solid_capstyle": "butt", "clip_on": False}
+        axes.plot([left, end], [1.0, 1.0], transform=place, **look)
+        _written(axes, text, (end, 1.0), place, (5.0, 0.0), va="center", fontsize=8.0)
+    axes.set_title(panel.title, pad=8.0 + 12.0 * len(panel.bars))
+    if notes := "\n".join(filter(None, panel.notes)):
+        down = -34.0 if panel.across else -22.0
+        _written(axes, notes, (0.0, 0.0), "axes fraction", (0.0, down), va="top", fontsize=NOTE)
+
+
+def _written(
+    axes: Axes, text: str, at: tuple[float, float], coords: Any, shift: tuple[float, float], **look: Any
+) -> None:
+    """Write a text outside the panel, points away from a place."""
+    axes.annotate(text, at, shift, coords, "offset points", color=INK, annotation_clip=False, **look)
 
 
 def _ratios(axis: Any) -> None:
-    """Give a logarithmic axis numbers that are 1, 2, 5 times powers of ten."""
+    """Write 1, 2, 5 times powers of ten along a logarithmic axis."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -151,215 +154,159 @@ def _ratios(axis: Any) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _legend(axes: Axes, panel: Panel) -> None:
-    from matplotlib.collections import PathCollection
-
-    columns = len(axes.get_legend_handles_labels()[0]) if panel.legend == "above" else 1
-    legend = axes.legend(**LEGENDS.get(panel.legend, {"loc": panel.legend}), ncols=columns)
-    for handle in legend.legend_handles:
-        if isinstance(handle, PathCollection):
-            handle.set_sizes([16.0])
-
-
-def _colour_bar(axes: list[Axes], shades: Shades) -> None:
+def _colour_bar(axes: list[Axes], shades: marks.Shades) -> None:
     from matplotlib.cm import ScalarMappable
 
-    figure = axes[0].get_figure()
-    assert figure is not None
-    colours = ScalarMappable(_norm(shades), _map(shades))
-    bar = figure.colorbar(colours, ax=axes, label=shades.label, aspect=30, shrink=0.85)
+    whole: Any = axes[0].get_figure()
+    bar = whole.colorbar(
+        ScalarMappable(**_colours(shades)), ax=axes, label=shades.label, aspect=30, shrink=0.85
+    )
     if shades.log:
         _ratios(bar.ax.yaxis)
 
 
-def _map(shades: Shades) -> Any:
-    return signed() if shades.map == "signed" else ORDERED
-
-
-def _norm(shades: Shades) -> Any:
+def _colours(shades: marks.Shades) -> dict[str, Any]:
     from matplotlib.colors import LogNorm, Normalize
 
-    return (LogNorm if shades.log else Normalize)(shades.low, shades.high)
+    norm = (LogNorm if shades.log else Normalize)(shades.low, shades.high)
+    return {"cmap": signed() if shades.map == "signed" else ORDERED, "norm": norm}
+
+
+def _names(drawn: Sequence[tuple[Axes, Panel]]) -> None:
+    """Write names beside their places: none covers another name or place."""
+    named = [(axes, mark) for axes, panel in drawn for mark in panel.marks if isinstance(mark, marks.Names)]
+    # Legends and axes of equal scales get their final places in the second layout.
+    for axes, _ in named[:1] * 2:
+        _lay_out(axes.figure)
+    for axes, mark in named:
+        point = axes.figure.dpi / 72.0
+        room: Box = axes.get_window_extent().extents
+        taken: list[Box] = []
+        at = axes.transData.transform(mark.places)
+        obstacles = np.concatenate([at, axes.transData.transform(mark.avoid)])
+        for place, (x, y), text, colour in zip(
+            mark.places.tolist(), at.tolist(), mark.texts, mark.colours, strict=True
+        ):
+            size = point * (width(text, NAME) + 2.0), point * (NAME + 2.0)
+            if box := free_side(size, (x, y), 4.0 * point, taken, obstacles, room):
+                taken.append(box)
+                shift = (box[0] - x) / point + 1.0, (box[1] - y) / point + 2.0
+                name = axes.annotate(
+                    text, place, shift, textcoords="offset points", fontsize=NAME, color=colour
+                )
+                name.set_in_layout(False)
+                name.set_bbox({"facecolor": "white", "alpha": 0.85, "linewidth": 0.0, "pad": 0.4})
+
+
+def _lay_out(whole: Any) -> None:
+    whole = whole.canvas.figure
+    if (engine := whole.get_layout_engine()) is not None:
+        engine.execute(whole)
+    for axes in whole.axes:
+        axes.apply_aspect()
 
 
 @singledispatch
-def draw(mark: Mark, axes: Axes) -> None:
-    """Draw a mark into axes whose limits are final."""
-    raise TypeError(f"there is no way to draw {type(mark).__name__}")
+def draw(mark: marks.Mark, axes: Axes) -> None:
+    """Draw a mark into axes whose limits are final; `Names` are drawn after the layout of all panels."""
+    if not isinstance(mark, marks.Names):
+        raise TypeError(f"the renderer for matplotlib has no function for {type(mark).__name__}")
 
 
-@draw.register(Markers)
-def _markers(mark: Markers, axes: Axes) -> None:
-    given: dict[str, Any] = {
-        "label": mark.label or None,
-        "zorder": mark.layer,
-        "alpha": mark.opacity,
-        "rasterized": len(mark.places) > DOTS,
-    }
+def _given(mark: Any) -> dict[str, Any]:
+    return {"zorder": mark.layer, "label": getattr(mark, "label", "") or None}
+
+
+@draw.register(marks.Markers)
+def _markers(mark: marks.Markers, axes: Axes) -> None:
+    given = _given(mark) | {"alpha": mark.opacity, "rasterized": len(mark.places) > MAX_VECTOR_MARKS}
+    dots: dict[str, Any] = {"s": mark.size**2, "marker": mark.shape, "linewidths": 0}
+    places = mark.places
     if mark.values is not None and mark.shades is not None:
-        sign, shades = (1.0 if mark.rising else -1.0), mark.shades
-        order = np.argsort(sign * mark.values, kind="stable")
-        given |= {"c": mark.values[order], "cmap": _map(shades), "norm": _norm(shades)}
-        x, y = mark.places[order].T
-        axes.scatter(x, y, mark.size**2, marker=mark.shape, linewidths=0, **given)
+        order = np.argsort((1.0 if mark.rising else -1.0) * mark.values, kind="stable")
+        given |= {**dots, "c": mark.values[order], **_colours(mark.shades)}
+        axes.scatter(places[order, 0], places[order, 1], **given)
     elif mark.shape == "o" and not mark.face:
-        x, y = mark.places.T
-        axes.scatter(x, y, mark.size**2, color=mark.colour, linewidths=0, **given)
+        axes.scatter(places[:, 0], places[:, 1], color=mark.colour, **dots, **given)
     else:
         given |= {"markersize": mark.size, "markeredgewidth": mark.edge, "markeredgecolor": mark.colour}
-        given["markerfacecolor"] = mark.face or mark.colour
-        axes.plot(*mark.places.T, mark.shape, **given)
+        axes.plot(*places.T, mark.shape, markerfacecolor=mark.face or mark.colour, **given)
 
 
-@draw.register(Line)
-def _line(mark: Line, axes: Axes) -> None:
-    axes.plot(
-        *mark.places.T,
-        color=mark.colour,
-        linewidth=mark.width,
-        linestyle=mark.dash or "-",
-        alpha=mark.opacity,
-        label=mark.label or None,
-        zorder=mark.layer,
-    )
+@draw.register(marks.Line)
+def _line(mark: marks.Line, axes: Axes) -> None:
+    look: Any = {"color": mark.colour, "linewidth": mark.width, "linestyle": mark.dash or "-"}
+    axes.plot(*mark.places.T, alpha=mark.opacity, **look, **_given(mark))
 
 
-@draw.register(Level)
-def _level(mark: Level, axes: Axes) -> None:
-    axes.axhline(
-        mark.height, color=mark.colour, linewidth=mark.width, linestyle=mark.dash or "-", zorder=mark.layer
-    )
+@draw.register(marks.Level)
+def _level(mark: marks.Level, axes: Axes) -> None:
+    look: Any = {"color": mark.colour, "linewidth": mark.width, "linestyle": mark.dash or "-"}
+    axes.axhline(mark.height, **look, zorder=mark.layer)
 
 
-@draw.register(Segments)
-def _segments(mark: Segments, axes: Axes) -> None:
-    from matplotlib.collections import LineCollection
-
-    lines: Any = list(mark.ends)
-    given: dict[str, Any] = {"label": mark.label or None, "zorder": mark.layer}
-    look: Any = {"colors": mark.colour, "linewidths": mark.width, "linestyles": mark.dash or "-"}
-    drawn = LineCollection(lines, **look, **given)
-    axes.add_collection(drawn, autolim=False)
+@draw.register(marks.Segments)
+def _segments(mark: marks.Segments, axes: Axes) -> None:
+    look = {"colors": mark.colour, "linewidths": mark.width, "linestyles": mark.dash or "-"}
+    _collection("LineCollection", axes, list(mark.ends), **look, **_given(mark))
 
 
-@draw.register(Arrows)
-def _arrows(mark: Arrows, axes: Axes) -> None:
-    axes.quiver(
-        *mark.places.T,
-        *mark.vectors.T,
-        angles="xy",
-        scale_units="xy",
-        scale=1.0,
-        color=mark.colours,
-        width=mark.width,
-        headwidth=3.5,
-        headlength=4.5,
-        label=mark.label or None,
-        zorder=mark.layer,
-    )
+@draw.register(marks.Arrows)
+def _arrows(mark: marks.Arrows, axes: Axes) -> None:
+    look: Any = {"color": mark.colours, "width": mark.width, "headwidth": 3.5, "headlength": 4.5}
+    plain: Any = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
+    axes.quiver(*mark.places.T, *mark.vectors.T, **plain, **look, **_given(mark))
 
 
-@draw.register(Polygons)
-def _polygons(mark: Polygons, axes: Axes) -> None:
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgba
-
-    drawn = PolyCollection(
-        list(mark.outlines),
-        facecolors=to_rgba(mark.face, mark.face_opacity),
-        edgecolors=to_rgba(mark.edge, mark.edge_opacity),
-        linewidths=mark.width,
-        label=mark.label or None,
-        zorder=mark.layer,
-        rasterized=len(mark.outlines) > DOTS / 5,
-    )
-    axes.add_collection(drawn, autolim=False)
+@draw.register(marks.Polygons)
+def _polygons(mark: marks.Polygons, axes: Axes) -> None:
+    look = {"facecolors": (mark.face, mark.face_opacity), "edgecolors": (mark.edge, mark.edge_opacity)}
+    pixels = len(mark.outlines) > MAX_VECTOR_MARKS / 5
+    given = {"linewidths": mark.width, "rasterized": pixels, **_given(mark)}
+    _collection("PolyCollection", axes, list(mark.outlines), **look, **given)
 
 
-@draw.register(Ellipses)
-def _ellipses(mark: Ellipses, axes: Axes) -> None:
-    from matplotlib.collections import EllipseCollection
-
-    drawn = EllipseCollection(
-        2 * mark.semi_axes[:, 0],
-        2 * mark.semi_axes[:, 1],
-        mark.angles,
-        units="xy",
-        offsets=mark.places,
-        transOffset=axes.transData,
-        facecolors=(mark.colour, mark.fill),
-        edgecolors="none" if mark.fill else mark.colour,
-        linewidths=mark.width,
-        zorder=mark.layer,
-    )
-    axes.add_collection(drawn, autolim=False)
+@draw.register(marks.Ellipses)
+def _ellipses(mark: marks.Ellipses, axes: Axes) -> None:
+    look = {"facecolors": (mark.colour, mark.fill), "edgecolors": "none" if mark.fill else mark.colour}
+    place = {"units": "xy", "offsets": mark.places, "offset_transform": axes.transData}
+    sizes = (*(2 * mark.semi_axes.T), mark.angles)
+    _collection("EllipseCollection", axes, *sizes, **place, **look, linewidths=mark.width, zorder=mark.layer)
 
 
-@draw.register(Mesh)
-def _mesh(mark: Mesh, axes: Axes) -> None:
+def _collection(kind: str, axes: Axes, *what: Any, **look: Any) -> None:
+    from matplotlib import collections
+
+    axes.add_collection(getattr(collections, kind)(*what, **look), autolim=False)
+
+
+@draw.register(marks.Mesh)
+def _mesh(mark: marks.Mesh, axes: Axes) -> None:
     (left, low), (right, high) = mark.corners
     rows, columns = mark.values.shape
-    axes.pcolormesh(
-        np.linspace(left, right, columns + 1),
-        np.linspace(low, high, rows + 1),
-        np.ma.masked_invalid(mark.values),
-        cmap=_map(mark.shades),
-        norm=_norm(mark.shades),
-        zorder=mark.layer,
-        rasterized=True,
-    )
-
-
-@draw.register(Contours)
-def _contours(mark: Contours, axes: Axes) -> None:
-    from matplotlib.patheffects import withStroke
-
+    x, y = np.linspace(left, right, columns + 1), np.linspace(low, high, rows + 1)
     values = np.ma.masked_invalid(mark.values)
-    look: dict[str, Any] = {"cmap": _map(mark.shades), "norm": _norm(mark.shades), "zorder": mark.layer}
-    filled = axes.contourf(mark.across, mark.up, values, mark.bounds, extend="min", **look)
-    filled.set_edgecolor("face")  # no seams between colours
-    look = {"colors": mark.colour, "linewidths": mark.width, "linestyles": "solid"}
-    lines = axes.contour(mark.across, mark.up, values, mark.levels, **look)
-    written = axes.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8.0, inline=False)
-    for text in _apart(axes, written):
-        text.set_color(INK)
-        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+    axes.pcolormesh(x, y, values, zorder=mark.layer, rasterized=True, **_colours(mark.shades))
 
 
-def _apart(axes: Axes, texts: Sequence[Text]) -> list[Text]:
-    """Return words that do not lie on each other, those of the lowest contours; take the others away."""
-    kept: list[Text] = []
-    places: list[Floats] = []
-    for each in texts:
-        place = np.asarray(axes.transData.transform(each.get_position())) * 72 / axes.figure.dpi
-        if all(np.hypot(*(place - other)) > ROOM for other in places):
-            kept.append(each)
-            places.append(place)
-        else:
-            each.remove()
-    return kept
+@draw.register(marks.Contours)
+def _contours(mark: marks.Contours, axes: Axes) -> None:
+    grid = mark.across, mark.up, np.ma.masked_invalid(mark.values)
+    areas = axes.contourf(*grid, mark.bounds, extend="min", zorder=mark.layer, **_colours(mark.shades))
+    areas.set_edgecolor("face")  # No seams between colours
+    look: Any = {"colors": mark.colour, "linewidths": mark.width, "linestyles": "solid"}
+    lines = axes.contour(*grid, mark.levels, **look)
+    axes.clabel(lines, fmt="%g", fontsize=8.0)
 
 
-@draw.register(Band)
-def _band(mark: Band, axes: Axes) -> None:
-    axes.fill_between(
-        mark.across,
-        mark.low,
-        mark.high,
-        color=mark.colour,
-        alpha=mark.opacity,
-        linewidth=0,
-        label=mark.label or None,
-        zorder=mark.layer,
-    )
+@draw.register(marks.Band)
+def _band(mark: marks.Band, axes: Axes) -> None:
+    look: Any = {"color": mark.colour, "alpha": mark.opacity, "linewidth": 0}
+    axes.fill_between(mark.across, mark.low, mark.high, **look, **_given(mark))
 
 
-@draw.register(Texts)
-def _texts(mark: Texts, axes: Axes) -> None:
+@draw.register(marks.Texts)
+def _texts(mark: marks.Texts, axes: Axes) -> None:
+    look: Any = {"ha": ALIGNED[mark.anchor], "va": "center", "fontsize": mark.size}
     for (x, y), text, colour in zip(mark.places.tolist(), mark.texts, mark.colours, strict=True):
-        axes.text(x, y, text, ha=ALIGNED[mark.anchor], va="center", fontsize=mark.size, color=colour)
-
-
-@draw.register(Names)
-def _later(mark: Names, axes: Axes) -> None:
-    """Names are drawn when the layout of all panels is known."""
+        axes.text(x, y, text, color=colour, **look)

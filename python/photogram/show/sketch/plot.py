@@ -1,0 +1,126 @@
+"""A plot as users have it: shown in notebooks, saved as a file, or drawn on axes of matplotlib."""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from photogram.errors import InputError
+from photogram.lazy_dataclasses import dataclass
+from photogram.show.sketch.declared import Panel, Sketch
+from photogram.show.sketch.svg import svg_of
+from photogram.show.style import styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    Where: TypeAlias = Axes | Sequence[Axes] | NDArray[Any] | Figure | SubFigure
+
+# Metadata without version and time: equal plots give equal files
+TIMELESS: dict[str, Any] = {"png": {"Software": None}, "pdf": {"CreationDate": None}}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plot(Sketch):
+    """A plot: panels with marks, which nothing has drawn yet. Notebooks show it as SVG.
+
+    Examples
+    --------
+    >>> import photogram
+    >>> result = photogram.adjust(photogram.simulate(strips=2, photos_per_strip=4, seed=5).block)
+    >>> plot = result.plot.network()
+    >>> plot.save("network.svg")
+    """
+
+    def __repr__(self) -> str:
+        count = sum(panel is not None for panel in self.panels)
+        size = f"{self.width:.3g} x {self.height:.3g} in"
+        return f"Plot({self._name!r}, {count} panel{'s' * (count != 1)}, {size})"
+
+    @property
+    def _name(self) -> str:
+        titles = [self.title, *(panel.title for panel in self.panels if panel is not None)]
+        return next((title.partition("\n")[0] for title in titles if title), "")
+
+    def _repr_svg_(self) -> str:
+        # A page that shows several plots needs a different identifier for each.
+        plain = svg_of(self, "plot", self._name)
+        return svg_of(self, f"plot{zlib.crc32(plain.encode()):08x}", self._name)
+
+    def render(self, ending: str = "svg") -> bytes:
+        """Return the plot as the content of a file.
+
+        Parameters
+        ----------
+        ending
+            `svg`, which needs no further package; `png`, `pdf` or another format of matplotlib.
+
+        Raises
+        ------
+        InputError
+            matplotlib has no such format.
+        ModuleNotFoundError
+            matplotlib is absent (`pip install 'photogram[plots]'`).
+        """
+        if ending == "svg":
+            return svg_of(self, "plot", self._name).encode()
+        from photogram.show.sketch.on_axes import figure
+
+        drawn, content = figure(self), io.BytesIO()
+        if ending not in drawn.canvas.get_supported_filetypes():
+            raise InputError(f"matplotlib does not write the format {ending!r}: use svg, png or pdf")
+        with styled():
+            drawn.savefig(content, format=ending, metadata=TIMELESS.get(ending))
+        return content.getvalue()
+
+    def save(self, path: Path | str) -> None:
+        """Write the plot to a file, in the format of the suffix: `.svg`, `.png`, `.pdf`.
+
+        Parameters
+        ----------
+        path
+            Name of the file; without a suffix the format is PNG.
+
+        Raises
+        ------
+        InputError
+            The suffix is the name of no format.
+        ModuleNotFoundError
+            matplotlib, which all formats but SVG need, is absent (`pip install 'photogram[plots]'`).
+        """
+        from photogram.io.writing import write_whole
+
+        path = Path(path)
+        write_whole({path: self.render(path.suffix.lower().removeprefix(".") or "png")})
+
+    def on(self, ax: Where) -> None:
+        """Draw the plot on axes of matplotlib.
+
+        Parameters
+        ----------
+        ax
+            Axes; a sequence of them, one for each panel, if the plot has several panels; or a figure or
+            subfigure, in which the plot creates its axes.
+
+        Raises
+        ------
+        InputError
+            The number of axes differs from the number of panels.
+        ModuleNotFoundError
+            matplotlib is absent (`pip install 'photogram[plots]'`).
+        """
+        from photogram.show.sketch.on_axes import on_axes
+
+        on_axes(self, ax)
+
+
+def side_by_side(panels: Sequence[Panel], most: int, side: float, title: str = "") -> Plot:
+    """Return a picture of panels about as high as wide, `side` inches, so many in a row at most."""
+    columns = min(len(panels), most)
+    height = side * -(-len(panels) // columns) + (0.3 if title else 0.0)
+    return Plot(max(side * columns, 5.0), height, panels, columns, title=title)
