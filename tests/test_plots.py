@@ -20,7 +20,6 @@ from photogram.plots.cells import cells
 from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Names
-from photogram.show.sketch.on_axes import figure
 
 ALWAYS = {"network", "residuals", "redundancy", "tests"}
 OF_LENSES = [name for name in PLOTS if name not in ("features", "films")]
@@ -50,7 +49,7 @@ def large():
 def written(plot):
     """Return all letters of a plot that are seen on axes."""
     found = []
-    for axes in figure(plot).axes:
+    for axes in plot.figure().axes:
         found += [axes.get_title(loc="left"), axes.get_xlabel(), axes.get_ylabel()]
         found += [text.get_text() for text in axes.texts]
         if axes.get_legend():
@@ -126,7 +125,7 @@ def test_large_networks_are_thinned_and_the_picture_says_so(large):
     said = written(plots["network"])
     assert "400 of 480 footprints are drawn" in said
     assert "the median one of each of" in said
-    count = sum(len(each.get_offsets()) for each in figure(plots["network"]).axes[0].collections[1:6])
+    count = sum(len(each.get_offsets()) for each in plots["network"].figure().axes[0].collections[1:6])
     assert count <= 6000 + 150
     assert "means of cells with" in written(plots["residuals"])
     assert set(plots) == ALWAYS
@@ -134,7 +133,7 @@ def test_large_networks_are_thinned_and_the_picture_says_so(large):
 
 
 def test_names_do_not_touch(galveston):
-    drawn = figure(galveston.plot.network())
+    drawn = galveston.plot.network().figure()
     drawn.draw_without_rendering()
     axes = drawn.axes[0]
     named = [
@@ -151,7 +150,7 @@ def test_names_do_not_touch(galveston):
 def test_a_name_without_room_is_omitted():
     places = np.full((12, 2), 0.5) + 1e-3 * np.arange(12)[:, np.newaxis]
     names = Names(places, ["a long name"] * 12, ["black"] * 12)
-    axes = figure(Plot(2.0, 2.0, [Panel(np.array([[0.0, 0.0], [1.0, 1.0]]), [names])])).axes[0]
+    axes = Plot(2.0, 2.0, [Panel(np.array([[0.0, 0.0], [1.0, 1.0]]), [names])]).figure().axes[0]
     assert 0 < len(axes.texts) < 12
 
 
@@ -231,7 +230,7 @@ def test_the_page_quotes_the_example_and_shows_pictures_that_are_there():
     shown = re.findall(r"!\[[^\]]+\]\(pictures/(\w+)\.svg\)", page)
     assert sorted(shown) == sorted(PLOTS)
     for name in shown:
-        assert 5_000 < (root / "docs" / "pictures" / f"{name}.svg").stat().st_size < 200_000
+        assert 2_000 < (root / "docs" / "pictures" / f"{name}.svg").stat().st_size < 200_000
 
 
 def test_the_example_writes_all_pictures(tmp_path, monkeypatch):

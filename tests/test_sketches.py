@@ -18,7 +18,6 @@ from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import laid_out
 from photogram.show.sketch.letters import width, wrapped
 from photogram.show.sketch.marks import Contours, Ellipses, Level, Markers, Mesh, Names, Shades, Texts
-from photogram.show.sketch.on_axes import figure
 from photogram.show.sketch.svg import svg_of
 from photogram.show.sketch.svg_marks import svg
 from photogram.show.sketch.ticks import ticks
@@ -78,7 +77,7 @@ def test_numbers_along_axes_lie_within_their_limits(sketches):
 
 def test_both_renderers_show_the_same(ring_result):
     for sketch in ring_result.plot.available().values():
-        drawn = figure(sketch)
+        drawn = sketch.figure()
         panels = [each for each in sketch.panels if each is not None]
         said = "".join(text for text, _ in boxes(elements(sketch)[0]))
         for axes, panel in zip(drawn.axes, panels, strict=False):

@@ -49,10 +49,9 @@ def test_they_can_be_read(sketches):
 
 def test_they_are_the_same_on_axes(sketches):
     pytest.importorskip("matplotlib")
-    from photogram.show.sketch.on_axes import figure
 
     for name, sketch in sketches.items():
-        drawn = figure(sketch)
+        drawn = sketch.figure()
         panels = [each for each in sketch.panels if each is not None]
         shown = [axes for axes in drawn.axes if axes.get_visible()]
         _, every = elements(sketch)

@@ -9,7 +9,7 @@ from photogram.absolute_orientation.stations import Stations
 from photogram.arguments.types import Floats
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Mark, Markers, Names, Segments
+from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, PURPLE, VERMILION
 
@@ -80,6 +80,6 @@ def _residuals(plan: Floats, enlarged: Floats) -> tuple[list[Mark], Floats]:
     if flat.any():
         marks.append(Arrows(plan[flat], steps[flat, :2], VERMILION, 0.004, label="plan residual", layer=3.0))
     bars = np.stack([plan[high], plan[high] + up[high]], axis=1)
-    marks.append(Segments(bars, PURPLE, 3.0, label="height residual (up: positive)"))
+    marks.append(Line(bars, PURPLE, 3.0, label="height residual (up: positive)"))
     parts = np.linspace(0.25, 1.0, 4)[:, np.newaxis, np.newaxis]
     return marks, np.concatenate([plan + parts * steps[:, :2], plan + parts * up]).reshape(-1, 2)

@@ -33,7 +33,7 @@ from photogram.show.quantity import Quantity, records
 from photogram.show.sections import Section as Lines
 from photogram.show.sections import composed, headline, verdict_sections
 from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Band, Line, Mark, Markers, Segments, error_bars
+from photogram.show.sketch.marks import Line, Mark, Markers, band, error_bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.distributions import LEVEL, bonferroni, critical_normal
@@ -277,11 +277,11 @@ def _sketch(certificate: Certificate) -> Plot:
     drawn, ends = list[Mark](), list[Floats]()
     for radius, dash in ((np.linspace(0, edge, 200), ""), (np.linspace(edge, 1.1 * edge, 40), "--")):
         value, sd = um * own.at(radius), um * own.sd_at(radius)
-        drawn.append(Band(radius, value - sd, value + sd, FAINT, 0.4))
+        drawn.append(band(radius, value - sd, value + sd, FAINT, 0.4))
         drawn.append(Line(np.column_stack([radius, value]), INK, 1.2, dash))
         ends += [value - sd, value + sd]
     places = np.column_stack([own.radius, um * given.distortion])
     low, high = (um * (given.distortion + sign * given.sd) for sign in (-1, 1))
-    drawn += [Segments(error_bars(places, low, high), MARKED, 1.5), Markers(places, "o", 4.0, MARKED)]
+    drawn += [Line(error_bars(places, low, high), MARKED, 1.5), Markers(places, "o", 4.0, MARKED)]
     limits = np.column_stack([spread(0.0, 1.1 * edge), spread(low, high, *ends)])
     return Plot(6.4, 3.6, [Panel(limits, drawn, "", "radius, mm", "distortion, µm")])

@@ -10,7 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.perspective_center.solution import PerspectiveCenter
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, around
-from photogram.show.sketch.marks import Arrows, Band, Level, Line, Mark, Markers
+from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers, band
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, MARKED
 
@@ -60,7 +60,7 @@ def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:
     if result.sigma0_plate is not None:
         sigma = np.full(2, 1000.0 * result.sigma0_plate)
         label = f"± standard error of unit weight, {sigma[0]:.1f} µm"
-        marks.append(Band(np.array([0.0, right]), -sigma, sigma, "#e4e4e4", 1.0, label=label))
+        marks.append(band(np.array([0.0, right]), -sigma, sigma, "#e4e4e4", 1.0, label=label))
     places = np.column_stack([radius, distortion])
     marks += [Level(0.0, INK, 0.8), Markers(places, "o", 3.5, opacity=0.75, label="points")]
     if (radius > 0).any():

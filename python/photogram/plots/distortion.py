@@ -10,7 +10,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.plots.picture_data import Curve, Curves, pictured
 from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Band, Level, Line, Mark
+from photogram.show.sketch.marks import Level, Line, Mark, band
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
 
@@ -60,7 +60,7 @@ def _column(curves: Curves) -> list[Panel]:
             low, high = factor * (curve.values - sd), factor * (curve.values + sd)
             colour = COLOURS[taken % len(COLOURS)]
             taken += 1
-            marks.append(Band(curves.radii, low, high, colour, 0.3, label=f"± sd of the {name}"))
+            marks.append(band(curves.radii, low, high, colour, 0.3, label=f"± sd of the {name}"))
             # Bands are thin on curves of hundreds of micrometres: once more by themselves.
             deviations += _dashed(curves.radii, factor * sd, seen, colour, f"sd of the {name}")
             sizes.append(factor * sd)

@@ -7,7 +7,7 @@ import numpy as np
 from photogram.errors import InputError
 from photogram.plots.picture_data import Deviations, pictured
 from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Level, Mark, Markers, Segments
+from photogram.show.sketch.marks import Level, Line, Mark, Markers
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 
@@ -45,7 +45,7 @@ def _panel(each: Deviations, said: str) -> Panel:
         at = np.column_stack([across[:, k], values[:, k]])
         ends = np.stack([at, at], axis=1)
         ends[:, :, 1] += bars[:, k, np.newaxis] * [-1.0, 1.0]
-        marks += [Segments(ends, COLOURS[k], 1.0), Markers(at, "o", 3.5, COLOURS[k], label=direction)]
+        marks += [Line(ends, COLOURS[k], 1.0), Markers(at, "o", 3.5, COLOURS[k], label=direction)]
     named = len(places) <= NAMED
     return Panel(
         np.column_stack([spread(across), spread(0.0, values - bars, values + bars)]),

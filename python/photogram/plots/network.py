@@ -15,11 +15,11 @@ from photogram.show.sketch.marks import (
     NOWHERE,
     Arrows,
     Ellipses,
+    Line,
     Mark,
     Markers,
     Names,
     Polygons,
-    Segments,
     Shades,
     ellipse_axes,
 )
@@ -298,7 +298,7 @@ def _vectors(
     if (high := np.isfinite(out) & (out != 0)).any():
         tops = places[high] + np.column_stack([np.zeros(high.sum()), scale * out[high]])
         label = "difference in height, + upwards"
-        marks.append(Segments(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label=label, layer=5.5))
+        marks.append(Line(np.stack([places[high], tops], axis=1), PURPLE, 2.2, label=label, layer=5.5))
     unit = f" {plan.unit}" if plan.unit else ""
     bar = round_length(0.12 * extent / scale)
     what = f"differences of control and check points, adjusted less given (× {scale:,g})"

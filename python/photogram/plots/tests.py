@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Band, Level, Line, Mark, Markers, Names, bars
+from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, band, bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
@@ -101,7 +101,7 @@ def _quantiles(values: Floats, groups: list[Observations], unit_weight: float) -
     spread = 1.96 * np.sqrt(probability * (1.0 - probability) / n) / _bell(expected, 1.0)
     ends, places = expected[[0, -1]], np.column_stack([expected, ordered])
     marks: list[Mark] = [
-        Band(expected, expected - spread, expected + spread, FAINT, 0.35, label="95 % of normal values"),
+        band(expected, expected - spread, expected + spread, FAINT, 0.35, label="95 % of normal values"),
         Line(np.column_stack([ends, ends]), width=0.9, label="standard deviations as given"),
     ]
     if abs(unit_weight - 1.0) > 0.02:

@@ -10,7 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Band, Line, Mark, Segments, error_bars
+from photogram.show.sketch.marks import Line, Mark, band, error_bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, GREEN, INK, VERMILION
 
@@ -69,10 +69,10 @@ def _panel(times: Floats, values: Floats, sd: Floats, records: list[float], head
     low, high = spread(values - sd, values + sd)
     marks = list[Mark]()
     for k, colour in enumerate(COLOURS):
-        own, band = values[:, k], sd[:, k]
-        marks.append(Band(times, own - band, own + band, colour, 0.2))
+        own, room = values[:, k], sd[:, k]
+        marks.append(band(times, own - room, own + room, colour, 0.2))
         marks.append(Line(np.column_stack([times, own]), colour, 1.2, label="xyz"[k]))
     if records:
         feet = np.column_stack([records, np.full(len(records), low)])
-        marks.append(Segments(error_bars(feet, feet[:, 1], feet[:, 1] + TALL * (high - low)), INK, 1.0))
+        marks.append(Line(error_bars(feet, feet[:, 1], feet[:, 1] + TALL * (high - low)), INK, 1.0))
     return Panel(np.column_stack([spread(times), (low, high)]), marks, "", "time, s", head)

@@ -15,7 +15,7 @@ from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Shown, columns_of, document_of, report_of
 from photogram.show.sections import composed, headline
 from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Line, Markers, Segments, error_bars
+from photogram.show.sketch.marks import Line, Markers, error_bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.show.summary import Brief
@@ -114,7 +114,7 @@ class VarianceFunction(Shown, Brief):
         curve = np.array([self.factor(value) for value in x.tolist()])
         across = spread(x, places[:, 0])
         marks = [
-            Segments(error_bars(places, low, high), INK, 1.5),
+            Line(error_bars(places, low, high), INK, 1.5),
             Markers(places, "o", 6.0, label="residuals, 95 percent"),
             Line(np.column_stack([x, curve]), MARKED, label="function"),
             Line(np.column_stack([across, [1.0, 1.0]]), FAINT, 0.8, label="given variance"),

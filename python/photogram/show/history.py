@@ -14,7 +14,7 @@ from photogram.show.judgement import judged, tests_section
 from photogram.show.page import Document, Drawing, Section, layered
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each
 from photogram.show.sketch.declared import Panel, spread
-from photogram.show.sketch.marks import Level, Line, Mark, Markers, Segments, error_bars
+from photogram.show.sketch.marks import Level, Line, Mark, Markers, error_bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 
@@ -173,7 +173,7 @@ def _chart(history: History, own: Series) -> Panel:
         history.limit * own.off_sd,
     )
     marks: list[Mark] = [
-        Segments(error_bars(places, own.values - own.sd, own.values + own.sd), INK, 1.0),
+        Line(error_bars(places, own.values - own.sd, own.values + own.sd), INK, 1.0),
         Markers(places, "o", 3.5),
         *(Line(np.column_stack([t, expected + sign * room]), FAINT, 0.8, "--") for sign in (-1, 1)),
         Level(own.mean, FAINT, 0.8),

@@ -163,10 +163,8 @@ class Drawing:
 
     def draw(self) -> Figure | None:
         """Return the picture as a figure of matplotlib; None where there is nothing to draw."""
-        from photogram.show.sketch.on_axes import figure
-
-        sketch = self.sketch()
-        return None if sketch is None else figure(sketch)
+        plot = self.sketch()
+        return None if plot is None else plot.figure()
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.show.sketch.declared import Panel, ScaleBar, spread
-from photogram.show.sketch.marks import Arrows, Band, Line, Mark, Polygons, boxes
+from photogram.show.sketch.marks import Arrows, Line, Mark, Polygons, boxes
+from photogram.show.sketch.marks import band as area
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, INK, MARKED, SKY
 from photogram.stellar.curves import histogram
@@ -20,14 +21,14 @@ _LENGTH = 0.05
 
 def band(x: Floats, y: Floats, error: Floats, colour: str, label: str) -> list[Mark]:
     """Return a curve with its mean error."""
-    return [Band(x, y - error, y + error, colour, 0.2), Line(np.column_stack([x, y]), colour, label=label)]
+    return [area(x, y - error, y + error, colour, 0.2), Line(np.column_stack([x, y]), colour, label=label)]
 
 
 def curves(marks: Sequence[Mark], across: str, up: str, title: str = "", legend: str = "best") -> Panel:
     """Return a panel with room for all lines and bands on it."""
     lines = [mark.places for mark in marks if isinstance(mark, Line)]
     x, y = np.concatenate(lines).T
-    bands = [each for mark in marks if isinstance(mark, Band) for each in (mark.low, mark.high)]
+    bands = [mark.places[..., 1] for mark in marks if isinstance(mark, Polygons)]
     limits = np.column_stack([spread(x), spread(y, *bands)])
     return Panel(limits, marks, title, across, up, legend=legend)
 

@@ -12,7 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel
-from photogram.show.sketch.marks import Arrows, Contours, Line, Mark, Markers, Segments, Shades
+from photogram.show.sketch.marks import Arrows, Contours, Line, Mark, Markers, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, VERMILION
 from photogram.targets.calibration_difference import CameraDifference
@@ -207,7 +207,7 @@ def _known(found: UncertaintyMap) -> list[Mark]:
         middle = np.column_stack([found.columns[at[:, 0]], found.rows[at[:, 1]]]) + half * [right, up]
         along = half * [1 - right, 1 - up]
         ends.append(np.stack([middle - along, middle + along], axis=1))
-    return [Segments(np.concatenate(ends), INK, 0.9, "--")]
+    return [Line(np.concatenate(ends), INK, 0.9, "--")]
 
 
 def _seen(corners: Floats, coverage: Floats) -> list[Mark]:

@@ -21,7 +21,6 @@ from photogram.show.sketch.marks import (
     Markers,
     Mesh,
     Names,
-    Segments,
     Shades,
     ellipse_axes,
     error_bars,
@@ -95,7 +94,7 @@ def lengths(found: Lengths, labels: dict[str, str]) -> Plot:
     places = np.column_stack([found.calibrated, test.errors])
     ends = [test.errors - test.sd, test.errors + test.sd]
     marks: list[Mark] = [
-        Segments(error_bars(places, *ends), BLUE, 0.7),
+        Line(error_bars(places, *ends), BLUE, 0.7),
         Markers(places, "o", 3.0, BLUE),
         Level(0.0, SOFT, 0.6),
     ]

@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.letters import widest, width, wrapped
-from photogram.show.sketch.marks import Band, Labelled, Level, Line, Markers, Segments
+from photogram.show.sketch.marks import Labelled, Level, Line, Markers, Polygons
 from photogram.show.sketch.names import Box
 from photogram.show.sketch.ticks import Ticks, ticks
 
@@ -222,12 +222,8 @@ def _curves(panel: Panel) -> list[Floats]:
     """Return (n, 2) places on what a legend should not hide."""
     found: list[Floats] = []
     for mark in panel.marks:
-        if isinstance(mark, Band):
-            found += [np.column_stack([mark.across, each]) for each in (mark.low, mark.high)]
-        elif isinstance(mark, (Line, Markers)):
-            found.append(mark.places)
-        elif isinstance(mark, Segments):
-            found.append(mark.ends.reshape(-1, 2))
+        if isinstance(mark, (Line, Markers, Polygons)):
+            found.append(mark.places.reshape(-1, 2))
         elif isinstance(mark, Level):
             left, right = panel.limits[:, 0].tolist()
             found.append(np.column_stack([np.linspace(left, right, 60), np.full(60, mark.height)]))

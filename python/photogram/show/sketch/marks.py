@@ -66,7 +66,7 @@ class Markers(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Line(Labelled):
-    """A line through (n, 2) places; `dash` is nothing, `--` or `:`."""
+    """A line through (n, 2) places, or k lines through (k, n, 2); `dash` is nothing, `--` or `:`."""
 
     places: Floats
     colour: str = INK
@@ -86,16 +86,6 @@ class Level(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Segments(Labelled):
-    """Straight lines between (n, 2, 2) ends; `dash` as of a line."""
-
-    ends: Floats
-    colour: str
-    width: float
-    dash: str = ""
-
-
-@dataclass(frozen=True, eq=False)
 class Arrows(Labelled):
     """Arrows from (n, 2) places by (n, 2) vectors, in one colour or n; `width` of the shaft in panels."""
 
@@ -107,14 +97,14 @@ class Arrows(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class Polygons(Labelled):
-    """(n, v, 2) closed outlines; colours and opacities of their insides and edges."""
+    """Closed outlines through (n, v, 2) places; colours and opacities of their insides and edges, if any."""
 
-    outlines: Floats
+    places: Floats
     face: str
     face_opacity: float
-    edge: str
-    edge_opacity: float
-    width: float
+    edge: str = ""
+    edge_opacity: float = 1.0
+    width: float = 0.0
     layer: float = field(default=1.0, kw_only=True)
 
 
@@ -167,18 +157,6 @@ class Contours(Mark):
 
 
 @dataclass(frozen=True, eq=False)
-class Band(Labelled):
-    """What lies between two curves over (n,) `across`."""
-
-    across: Floats
-    low: Floats
-    high: Floats
-    colour: str
-    opacity: float
-    layer: float = field(default=1.0, kw_only=True)
-
-
-@dataclass(frozen=True, eq=False)
 class Texts(Mark):
     """Words at (n, 2) places, which are their `start`, `middle` or `end`."""
 
@@ -201,10 +179,16 @@ class Names(Mark):
     layer: float = field(default=9.0, kw_only=True)
 
 
-def bars(edges: Floats, heights: Floats, colour: str, opacity: float, label: str) -> Band:
+def band(across: Floats, low: Floats, high: Floats, colour: str, opacity: float, label: str = "") -> Polygons:
+    """Return the area between two curves over (n,) `across`."""
+    lower, upper = (np.column_stack([across, each]) for each in (low, high))
+    return Polygons(np.concatenate([lower, upper[::-1]])[np.newaxis], colour, opacity, label=label)
+
+
+def bars(edges: Floats, heights: Floats, colour: str, opacity: float, label: str) -> Polygons:
     """Return a histogram, of (n + 1,) edges and (n,) heights from 0, as the band that it is."""
     across, up = np.repeat(edges, 2)[1:-1], np.repeat(heights, 2)
-    return Band(across, np.zeros(len(up)), up, colour, opacity, label=label)
+    return band(across, np.zeros(len(up)), up, colour, opacity, label)
 
 
 def boxes(low: Floats, high: Floats) -> Floats:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.show.pictures import new_figure
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.svg import svg_of
 from photogram.show.style import styled
@@ -69,9 +70,7 @@ class Plot(Sketch):
         """
         if ending == "svg":
             return svg_of(self, "plot", self._name).encode()
-        from photogram.show.sketch.on_axes import figure
-
-        drawn, content = figure(self), io.BytesIO()
+        drawn, content = self.figure(), io.BytesIO()
         if ending not in drawn.canvas.get_supported_filetypes():
             raise InputError(f"matplotlib does not write the format {ending!r}: use svg, png or pdf")
         with styled():
@@ -97,6 +96,21 @@ class Plot(Sketch):
 
         path = Path(path)
         write_whole({path: self.render(path.suffix.lower().removeprefix(".") or "png")})
+
+    def figure(self) -> Figure:
+        """Return the plot as a figure of matplotlib that belongs to no window.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            matplotlib is absent (`pip install 'photogram[plots]'`).
+        """
+        from photogram.show.sketch.on_axes import lay_out, on_axes
+
+        figure = new_figure(self.width, self.height)
+        on_axes(self, figure)
+        lay_out(figure)
+        return figure
 
     def on(self, ax: Where) -> None:
         """Draw the plot on axes of matplotlib.

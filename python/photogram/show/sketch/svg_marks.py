@@ -18,7 +18,6 @@ from photogram.show.sketch.layout import NAME, Placed
 from photogram.show.sketch.letters import width
 from photogram.show.sketch.marks import (
     Arrows,
-    Band,
     Ellipses,
     Labelled,
     Level,
@@ -28,7 +27,6 @@ from photogram.show.sketch.marks import (
     Mesh,
     Names,
     Polygons,
-    Segments,
     Shades,
     Texts,
 )
@@ -148,6 +146,8 @@ def _stroke(colour: str, wide: float, dash: str = "") -> Attributes:
 def _line(mark: Line, placed: Placed) -> str:
     opacity: str | float = mark.opacity if mark.opacity < 1 else ""
     look = _stroke(mark.colour, mark.width, mark.dash)
+    if mark.places.ndim > 2:
+        return path("".join(map(joined, placed.at(mark.places))), **look, opacity=opacity)
     return path(joined(placed.at(mark.places)), **look, opacity=opacity, stroke_linejoin="round")
 
 
@@ -155,12 +155,6 @@ def _line(mark: Line, placed: Placed) -> str:
 def _level(mark: Level, placed: Placed) -> str:
     height = placed.at(np.array([placed.panel.limits[0, 0], mark.height]))[1]
     data = f"M{number(placed.box[0])} {number(height)}H{number(placed.box[2])}"
-    return path(data, **_stroke(mark.colour, mark.width, mark.dash))
-
-
-@svg.register(Segments)
-def _segments(mark: Segments, placed: Placed) -> str:
-    data = "".join(joined(ends) for ends in placed.at(mark.ends))
     return path(data, **_stroke(mark.colour, mark.width, mark.dash))
 
 
@@ -189,6 +183,9 @@ def _arrows(mark: Arrows, placed: Placed) -> str:
 
 @svg.register(Polygons)
 def _polygons(mark: Polygons, placed: Placed) -> str:
+    outlines = [joined(each, "z") for each in placed.at(mark.places)]
+    if not mark.edge:
+        return path("".join(outlines), fill=mark.face, opacity=mark.face_opacity)
     look: Attributes = {
         "fill": mark.face,
         "fill_opacity": f"{mark.face_opacity:.3g}",
@@ -197,7 +194,7 @@ def _polygons(mark: Polygons, placed: Placed) -> str:
         "stroke_width": mark.width,
     }
     # Each by itself: where many lie over each other, it is darker.
-    return element("g", look, "".join(path(joined(each, "z")) for each in placed.at(mark.outlines)))
+    return element("g", look, "".join(map(path, outlines)))
 
 
 @svg.register(Ellipses)
@@ -254,13 +251,6 @@ def _png(pixels: Indices) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
 
-@svg.register(Band)
-def _band(mark: Band, placed: Placed) -> str:
-    lower, upper = (np.column_stack([mark.across, each]) for each in (mark.low, mark.high))
-    outline = placed.at(np.concatenate([lower, upper[::-1]]))
-    return path(joined(outline, "z"), fill=mark.colour, opacity=mark.opacity)
-
-
 @svg.register(Texts)
 def _texts(mark: Texts, placed: Placed) -> str:
     words = zip(placed.at(mark.places).tolist(), mark.texts, mark.colours, strict=True)
@@ -300,12 +290,8 @@ def sample(mark: Labelled) -> Labelled:
     if isinstance(mark, Markers):
         return replace(mark, places=np.array([[8.0, 4.0]]), size=max(mark.size, 4.0), values=None)
     if isinstance(mark, Line):
-        return replace(mark, places=line)
-    if isinstance(mark, Segments):
-        return replace(mark, ends=line[np.newaxis])
+        return replace(mark, places=line if mark.places.ndim == 2 else line[np.newaxis])
     if isinstance(mark, Arrows):
         return replace(mark, places=line[:1], vectors=line[1:] - line[:1], width=1.3 / 16.0)
-    if isinstance(mark, Polygons):
-        return replace(mark, outlines=np.array([[[0.0, 1.0], [16.0, 1.0], [16.0, 7.0], [0.0, 7.0]]]))
-    assert isinstance(mark, Band)
-    return replace(mark, across=np.array([0.0, 16.0]), low=np.full(2, 1.0), high=np.full(2, 7.0))
+    assert isinstance(mark, Polygons)
+    return replace(mark, places=np.array([[[0.0, 1.0], [16.0, 1.0], [16.0, 7.0], [0.0, 7.0]]]))
