@@ -170,14 +170,18 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
         raise InputError("the block has principal distances and no cameras that could be calibrated")
     wanted = {name.lower() for name in names}
     cameras, used, messages = [], set(), []
-    for camera, size in zip(project.block.cameras, project.sizes, strict=True):
+    titles_by_text: dict[str, list[str]] = {}
+    sizes = dict(enumerate(project.sizes))
+    for row, camera in enumerate(project.block.cameras):
         model = with_parameters(camera, wanted)
         free = set(model.names) - model.constants
         unknown = freed(model, {name.lower() for name in free} if "all" in wanted else wanted)
         cameras.append(unknown)
-        if "fx" in free and "f" in wanted:
-            cameras[-1] = with_one_focal_length(unknown, size if unknown.unit == "px" else None)
-            messages.append(Message(focal_length_message(unknown, cameras[-1])))
+        if "fx" in free and "f" in wanted and not wanted & {"fx", "fy", "all"}:
+            size = sizes.get(row) if unknown.unit == "px" else None
+            cameras[-1] = with_one_focal_length(unknown, size)
+            text = focal_length_message(unknown, cameras[-1])
+            titles_by_text.setdefault(text, []).append(camera.title)
         used |= {matching_word(name, wanted) for name in free}
         if model.model != camera.model:
             messages.append(
@@ -185,6 +189,7 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
                     f"{camera.title}: the model {model.model} replaces {camera.model}, which lacks lens terms"
                 )
             )
+    messages += [Message(f"camera {listed(titles, 3)}: {text}") for text, titles in titles_by_text.items()]
     if missing := sorted(wanted - used - {"all"}):
         known = listed(sorted({name for each in project.block.cameras for name in each.names}), 40)
         raise InputError(f"no camera has the parameter {missing[0]}; there are {known}")

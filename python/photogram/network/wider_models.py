@@ -120,9 +120,8 @@ def with_one_focal_length(camera: Camera, size: tuple[float, float] | None = Non
 
 def focal_length_message(camera: Camera, single: Camera) -> str:
     """Return a sentence on the unknown f of a camera and of its :func:`with_one_focal_length`."""
-    title, model = f"camera {camera.title}", camera.model
     if single is camera:
-        return f"{title}: f is two unknowns of the model {model}, fx and fy"
+        return f"f is two unknowns of the model {camera.model}, fx and fy"
     changes = []
     if (single.parameters.get("p1"), single.parameters.get("p2")) != (
         camera.parameters.get("p1"),
@@ -131,7 +130,7 @@ def focal_length_message(camera: Camera, single: Camera) -> str:
         changes.append("its p1 and p2 are p2 and p1")
     if "w" in single.names:
         changes.append("cx and cy count from the middle of the picture")
-    return "; ".join([f"{title}: {single.model} is {model} with one unknown f", *changes])
+    return "; ".join([f"{single.model} is {camera.model} with one unknown f", *changes])
 
 
 def _models(camera: Camera) -> list[Camera]:

@@ -307,7 +307,7 @@ def _camera(
     if not given.deviations.get("f") or "fx" not in own:
         return camera
     single = with_one_focal_length(camera, size if image == "px" else None)
-    tables.tell(focal_length_message(camera, single), table.path)
+    tables.tell(f"camera {given.name}: {focal_length_message(camera, single)}", table.path)
     return single
 
 
