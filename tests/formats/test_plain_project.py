@@ -109,7 +109,6 @@ def test_one_unknown_f_with_p1_is_adjusted_and_written_as_one(example, tmp_path,
         ("3620", "f", ["f"]),
         ("3621", "f", ["fx", "fy"]),
         ("3620", "fx,fy", ["fx", "fy"]),
-        ("3620", "f,fx,fy", ["fx", "fy"]),
         ("3620", "f,k3", ["f", "k3"]),
     ],
 )
