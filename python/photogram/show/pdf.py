@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
@@ -17,6 +18,7 @@ from photogram.show import quantity
 from photogram.show.cells import written
 from photogram.show.html import inlined
 from photogram.show.page import Column, Document, Drawing, Picture, Section, Table
+from photogram.show.sketch.letters import width
 from photogram.show.sketch.svg import LETTERS
 
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
@@ -76,11 +78,12 @@ def _record(part: Any) -> Any:
 def _column(column: Column, texts: list[str]) -> dict[str, object]:
     """Return the head of a column, and the text and the word from which its width follows."""
     words = [word for text in texts for word in text.split()] if column.text else texts
+    size = partial(width, size=1.0)
     return {
         "head": column.head,
         "unit": column.unit,
         "heads": [*column.head.split(), *column.unit.split()],
         "text": column.text,
-        "longest": max(texts, key=len, default=""),
-        "word": max(words, key=len, default="")[:LONGEST],
+        "widest": max(texts, key=size, default=""),
+        "word": max((word[:LONGEST] for word in words), key=size, default=""),
     }
