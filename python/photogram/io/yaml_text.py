@@ -11,6 +11,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import number_or_text
@@ -212,3 +215,17 @@ def _scalar(text: str) -> Any:
     if text.lower() in _WORDS:
         return _WORDS[text.lower()]
     return number_or_text(text)
+
+
+def figures(values: ArrayLike) -> str:
+    """Return a list of numbers with all their digits."""
+    return "[" + ", ".join(repr(float(each)) for each in np.ravel(values)) + "]"
+
+
+def matrix_lines(name: str, values: ArrayLike, *, opencv: bool = False) -> list[str]:
+    """Return a matrix as ROS or OpenCV writes it."""
+    found = np.atleast_2d(np.asarray(values, dtype=float))
+    rows, columns = found.shape
+    tag, indent, kind = (" !!opencv-matrix", "   ", ["dt: d"]) if opencv else ("", "  ", [])
+    lines = [f"rows: {rows}", f"cols: {columns}", *kind, f"data: {figures(found)}"]
+    return [f"{name}:{tag}", *(indent + line for line in lines)]

@@ -1,23 +1,16 @@
-"""Cameras of digital exposures as YAML: the form of OpenCV's FileStorage and that of ROS (camera_info).
-
-Only the YAML that these two write is read and written: mappings, lists of numbers, text. It needs no library.
-"""
+"""Cameras of digital exposures as YAML: the form of OpenCV's FileStorage and that of ROS (camera_info)."""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.files import read_lines
-from photogram.io.numbers import finite_number
-from photogram.lazy_dataclasses import dataclass
+from photogram.io.json import Tree, unknown
+from photogram.io.yaml_text import matrix_lines, read_yaml_text
 from photogram.messages import quoted
 from photogram.stellar.sky_cameras import BrownCamera, SkyCamera
 
@@ -31,8 +24,8 @@ _LENSES = {"brown": ("plumb_bob", _BROWN), "kannala_brandt": ("equidistant", _FI
 _LENSES["equidistant"] = _LENSES["kannala_brandt"]
 WITH_YAML = frozenset(_LENSES)
 """Lenses that have a form in YAML."""
-_DEEPEST = 3
-_KEY = re.compile(r"( *)([A-Za-z_][\w.]*) *:(?: +(.*))?$")
+_MATRIX = ("camera_matrix", "Camera_Matrix", "K")
+_DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "D")
 
 
 def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name: str = "camera") -> bytes:
@@ -74,11 +67,11 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
             f"image_width: {width}",
             f"image_height: {height}",
             f"camera_name: {_word(name)}",
-            *_ros_matrix("camera_matrix", matrix),
+            *matrix_lines("camera_matrix", matrix),
             f"distortion_model: {model}",
-            *_ros_matrix("distortion_coefficients", coefficients),
-            *_ros_matrix("rectification_matrix", np.eye(3)),
-            *_ros_matrix("projection_matrix", np.column_stack([matrix, np.zeros(3)])),
+            *matrix_lines("distortion_coefficients", coefficients),
+            *matrix_lines("rectification_matrix", np.eye(3)),
+            *matrix_lines("projection_matrix", np.column_stack([matrix, np.zeros(3)])),
         ]
     else:
         order = ("fx", "fy", "cx", "cy", *terms)
@@ -89,10 +82,10 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
             f"image_width: {width}",
             f"image_height: {height}",
             f"fisheye_model: {int(model == 'equidistant')}",
-            *_opencv_matrix("camera_matrix", matrix),
-            *_opencv_matrix("distortion_coefficients", coefficients),
+            *matrix_lines("camera_matrix", matrix, opencv=True),
+            *matrix_lines("distortion_coefficients", coefficients, opencv=True),
             f"# of {', '.join(order)}",
-            *_opencv_matrix("standard_deviations", deviations),
+            *matrix_lines("standard_deviations", deviations, opencv=True),
         ]
     return ("\n".join(lines) + "\n").encode()
 
@@ -101,27 +94,6 @@ def _word(name: str) -> str:
     if not re.fullmatch(r"[\w.-]+", name):
         raise InputError(f"the name of a camera has letters, digits, dots and hyphens, not {quoted(name)}")
     return name
-
-
-def _numbers(matrix: Floats) -> str:
-    return ", ".join(repr(float(value)) for value in matrix.ravel())
-
-
-def _ros_matrix(name: str, matrix: Floats) -> list[str]:
-    rows, columns = matrix.shape
-    return [f"{name}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{_numbers(matrix)}]"]
-
-
-def _opencv_matrix(name: str, matrix: Floats) -> list[str]:
-    rows, columns = matrix.shape
-    head = [f"{name}: !!opencv-matrix", f"   rows: {rows}", f"   cols: {columns}", "   dt: d"]
-    return [*head, f"   data: [ {_numbers(matrix)} ]"]
-
-
-@dataclass(frozen=True)
-class _Value:
-    line: int
-    text: str
 
 
 def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
@@ -137,119 +109,40 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
     InputError
         The file cannot be read, is none of the two, or has a lens with terms that no camera here has.
     """
-    values = _read(path)
-    matrix = _matrix(path, values, ("camera_matrix", "Camera_Matrix", "K"), (3, 3))
-    found = next((key for key in _DISTORTION if f"{key}.data" in values), "")
-    if not found:
-        raise InputError(f"has no {_DISTORTION[0]}", file=path)
-    given = _list(path, values[f"{found}.data"])
-    frame = _size(path, values, "width"), _size(path, values, "height")
-    if matrix[0, 1] or not np.array_equal(matrix[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
-        raise _bad(path, _first(values, "camera_matrix"), "is no camera matrix without skew")
-    fisheye = _fisheye(path, values)
+    content = Tree(read_yaml_text(path), path)
+    matrix = _member(content, *_MATRIX)
+    values = matrix.get("data", None).numbers(9).reshape(3, 3)
+    distortion = _member(content, *_DISTORTION)
+    given = [each.number() for each in distortion.get("data", None)]
+    frame = (
+        float(_member(content, "image_width", "image_Width", "width").whole(1)),
+        float(_member(content, "image_height", "image_Height", "height").whole(1)),
+    )
+    if values[0, 1] or not np.array_equal(values[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
+        raise matrix.error("must be a camera matrix without skew")
+    fisheye = _is_fisheye(content)
     terms = _FISHEYE if fisheye else _BROWN
     if any(given[len(terms) :]):
-        raise _bad(
-            path,
-            values[f"{found}.data"],
-            f"has more terms than {', '.join(terms)}: `photogram.Camera` has rational and prism ones",
+        raise distortion.error(
+            f"has more terms than {', '.join(terms)}: `photogram.Camera` has rational and prism ones"
         )
-    parameters = {"fx": matrix[0, 0], "fy": matrix[1, 1], "cx": matrix[0, 2], "cy": matrix[1, 2]}
+    parameters = {"fx": values[0, 0], "fy": values[1, 1], "cx": values[0, 2], "cy": values[1, 2]}
     parameters |= dict(zip(terms, [*given, *[0.0] * len(terms)][: len(terms)], strict=True))
     of, lens = (SkyCamera, "kannala_brandt") if fisheye else (BrownCamera, "brown")
     empty = of.of_field(*frame, 1.0, lens)
     return of(np.array([parameters[name] for name in empty.names]), empty.covariance, lens), frame
 
 
-_DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "D")
+def _member(content: Tree, *keys: str) -> Tree:
+    """Return the member with the first of some names."""
+    return content[next((key for key in keys if key in content), keys[0])]
 
 
-def _fisheye(path: Path, values: dict[str, _Value]) -> bool:
-    """Return whether terms are those of a fisheye: only when the file says so."""
-    if "distortion_model" in values:
-        model = values["distortion_model"]
-        if model.text not in _ROS:
-            raise _bad(path, model, f"is none of the models {', '.join(_ROS)}")
-        return model.text == "equidistant"
-    if "fisheye_model" in values:
-        return values["fisheye_model"].text not in ("0", "false", "False")
-    return False
-
-
-def _size(path: Path, values: dict[str, _Value], what: str) -> float:
-    for key in (f"image_{what}", f"image_{what.capitalize()}", f"{what}"):
-        if key in values:
-            size = _number(path, values[key], values[key].text)
-            if size < 1:
-                raise _bad(path, values[key], "is no size of an image")
-            return size
-    raise InputError(f"has no image_{what}", file=path)
-
-
-def _matrix(path: Path, values: dict[str, _Value], keys: Sequence[str], shape: tuple[int, int]) -> Floats:
-    for key in keys:
-        if f"{key}.data" in values:
-            found = _list(path, values[f"{key}.data"])
-            if len(found) != math.prod(shape):
-                raise _bad(path, values[f"{key}.data"], f"has {len(found)} numbers, not {math.prod(shape)}")
-            return np.array(found).reshape(shape)
-    raise InputError(f"has no {keys[0]}", file=path)
-
-
-def _first(values: dict[str, _Value], key: str) -> _Value:
-    return next(value for name, value in values.items() if name.lower().startswith(key) or name == "K.data")
-
-
-def _bad(path: Path, value: _Value, what: str) -> InputError:
-    return InputError(f"line {value.line}: {quoted(value.text)} {what}", file=path)
-
-
-def _number(path: Path, value: _Value, text: str) -> float:
-    try:
-        return finite_number(text.strip())
-    except ValueError as error:
-        raise _bad(path, value, f"is no number: {error}") from None
-
-
-def _list(path: Path, value: _Value) -> list[float]:
-    if not (value.text.startswith("[") and value.text.endswith("]")):
-        raise _bad(path, value, "is no list of numbers")
-    inside = value.text[1:-1].strip()
-    return [_number(path, value, each) for each in inside.split(",")] if inside else []
-
-
-def _read(path: Path) -> dict[str, _Value]:
-    """Return the values by their keys, those of nested mappings joined by dots."""
-    found: dict[str, _Value] = {}
-    above: list[tuple[int, str]] = []
-    opened: tuple[str, int, str] | None = None
-    for number, line in enumerate(read_lines(path), 1):
-        text = line.split(" #")[0].rstrip()
-        if opened is not None:
-            # A list goes on over several lines.
-            key, first, before = opened
-            joined = f"{before} {text.strip()}"
-            opened = None if joined.endswith("]") else (key, first, joined)
-            found[key] = _Value(first, joined)
-            continue
-        if not text.strip() or text.lstrip().startswith(("#", "%", "---", "...")):
-            continue
-        match = _KEY.match(text)
-        if match is None:
-            what = "is no line of a YAML file of OpenCV or ROS"
-            raise InputError(f"line {number}: {quoted(line)} {what}", file=path)
-        depth, name, value = len(match[1]), match[2], (match[3] or "").strip()
-        above = [each for each in above if each[0] < depth]
-        if len(above) >= _DEEPEST:
-            raise InputError(f"line {number}: {quoted(line)} is nested too deep", file=path)
-        key = ".".join([*(each for _, each in above), name])
-        if key in found:
-            raise InputError(f"line {number}: {name} is there twice", file=path)
-        if not value or value.startswith("!!"):
-            above.append((depth, name))
-        elif value.startswith("[") and not value.endswith("]"):
-            opened = (key, number, value)
-            found[key] = _Value(number, value)
-        else:
-            found[key] = _Value(number, value.strip("\"'"))
-    return found
+def _is_fisheye(content: Tree) -> bool:
+    """Return whether terms are those of a fisheye: only if the file states it."""
+    if "distortion_model" in content:
+        model = content["distortion_model"]
+        if model.value not in _ROS:
+            raise unknown(model, "the model", _ROS)
+        return bool(model.value == "equidistant")
+    return content.get("fisheye_model", 0).value not in (0, False)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from photogram.targets.output.rig import Rig, Terms, figures, terms_of
+from photogram.io.yaml_text import figures
+from photogram.targets.output.rig import Rig, Terms, terms_of
 
 TITLE = "camchain.yaml of Kalibr"
 TERMS = 4

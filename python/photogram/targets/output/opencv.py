@@ -7,13 +7,14 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.io.yaml_text import matrix_lines
 from photogram.results.cameras import AdjustedCamera
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.output.rig import TERMS, Rig, Terms, matrix, terms_of
+from photogram.targets.output.rig import TERMS, Rig, Terms, terms_of
 from photogram.targets.vision import cross_matrices
 
 TITLE = "YAML of OpenCV"
-_matrix = partial(matrix, opencv=True)
+_matrix = partial(matrix_lines, opencv=True)
 COUNTS = (4, 5, 8, 12)
 FEWEST = 5
 """Terms that OpenCV writes at the least, where they are not those of a fisheye."""

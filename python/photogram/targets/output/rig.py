@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -139,17 +138,3 @@ def rig_of(calibrated: Calibrated) -> Rig:
         sensors=sensors,
         calibrated=calibrated,
     )
-
-
-def figures(values: ArrayLike) -> str:
-    """Return numbers between brackets, each with the digits that say it."""
-    return "[" + ", ".join(repr(float(each)) for each in np.ravel(values)) + "]"
-
-
-def matrix(name: str, values: ArrayLike, *, opencv: bool = False) -> list[str]:
-    """Return a matrix in the YAML of ROS, or of OpenCV."""
-    found = np.atleast_2d(np.asarray(values, dtype=float))
-    rows, columns = found.shape
-    tag, indent, kind = (" !!opencv-matrix", "   ", ["dt: d"]) if opencv else ("", "  ", [])
-    lines = [f"rows: {rows}", f"cols: {columns}", *kind, f"data: {figures(found)}"]
-    return [f"{name}:{tag}", *(indent + line for line in lines)]

@@ -6,7 +6,8 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.targets.output.rig import Rig, Terms, matrix, terms_of
+from photogram.io.yaml_text import matrix_lines
+from photogram.targets.output.rig import Rig, Terms, terms_of
 
 TITLE = "camera_info of ROS"
 PLUMB_BOB, RATIONAL, EQUIDISTANT = 5, 8, 4
@@ -33,11 +34,11 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
             f"image_width: {width}",
             f"image_height: {height}",
             f'camera_name: "{name}"',
-            *matrix("camera_matrix", lens.matrix),
+            *matrix_lines("camera_matrix", lens.matrix),
             f"distortion_model: {model}",
-            *matrix("distortion_coefficients", [terms]),
-            *matrix("rectification_matrix", turn),
-            *matrix("projection_matrix", projection),
+            *matrix_lines("distortion_coefficients", [terms]),
+            *matrix_lines("rectification_matrix", turn),
+            *matrix_lines("projection_matrix", projection),
         ]
         found[f"{rig.files[row]}.yaml"] = "\n".join([*lines, ""]).encode()
     return found
