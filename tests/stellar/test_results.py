@@ -113,6 +113,7 @@ def test_ellipses_of_unknown_directions(unknown):
 def test_unknown_directions_in_the_document(unknown):
     document = json.loads(unknown.to_json())
     assert len(unknown.document().table("directions").columns[0].values) == 15
+    assert "Unknown directions" in unknown.report()
     stars = [star for star in document["stars"] if not star["known"]]
     assert len(stars) == 15
     assert {"correction", "m_i", "orientation_ellipse", "published_ellipse", "ellipse"} <= set(stars[0])

@@ -196,7 +196,8 @@ def _unknown(result: Result) -> list[Quantity]:
     }
     names = next(iter(rows.values()))
     of_stars = [rows.get(star, {}) for star in result.problem.star_ids]
-    return [Quantity([row.get(name) for row in of_stars], member=name) for name in names]
+    columns = {name: np.fromiter((row.get(name) for row in of_stars), object) for name in names}
+    return [Quantity(values, member=name) for name, values in columns.items()]
 
 
 def _ellipse(e: Ellipse) -> dict[str, float]:
