@@ -2,16 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.show.quantity import Axis, Quantity, Table, component
+from photogram.show.angles import ARCSEC
+from photogram.show.quantity import Axis, Kind, Quantity, Table, component
+from photogram.stellar.parameters import GRAD
 
 CORRELATED = 0.95
 """Correlations above this are named."""
+
+Unit = tuple[str, str, float]
+"""The unit of values, the unit that people read, and the factor between them."""
+MM, UM_OF_M, UM = ("m", "mm", 1e3), ("m", "um", 1e6), ("um", "um", 1.0)
+SECONDS, ARCSEC_OF_RAD, ARC_SECONDS = (
+    ("s", "s", 1.0),
+    ("rad", "arcsec", 1 / ARCSEC),
+    ("arcsec", "arcsec", 1.0),
+)
+DEGREES, GRADS = ("rad", "deg", math.degrees(1)), ("rad", "grads", 1 / GRAD)
+
+
+def names_column(values: Iterable[object], head: str, member: str = "") -> Quantity:
+    """Return names or texts."""
+    return Quantity(np.fromiter(values, object), (), "name", member or None, member, head=head)
+
+
+def column(
+    values: ArrayLike, unit: Unit | None, head: str, decimals: int, member: str = "", parts: str = ""
+) -> Quantity:
+    """Return numbers (n,), or (n, k) of k parts whose names are separated by commas; None: without a unit."""
+    own, small, factor = unit or ("", "", 1.0)
+    axes = tuple(Axis(part, own, small=small, factor=factor) for part in parts.split(", "))
+    numbers = np.reshape(np.asarray(values, dtype=float), (-1, len(axes)) if len(axes) > 1 else -1)
+    kind: Kind = "deviation" if unit else "number"
+    return Quantity(numbers, axes, kind, member or None, member, head=head, decimals=decimals)
 
 
 def correlations(covariance: Floats) -> Floats:
@@ -98,5 +128,8 @@ def parameter_table(
 
 def matrix_table(key: str, title: str, names: Sequence[str], matrix: Floats, **form: Any) -> Table:
     """Return a matrix of parameters with a row and a column for each name."""
-    heads = Quantity([*names], kind="name", head="Parameter")
-    return Table(key, title, [heads, Quantity(matrix, tuple(map(Axis, names)), head="{}", **form)])
+    return Table(
+        key,
+        title,
+        [names_column(names, "Parameter"), Quantity(matrix, tuple(map(Axis, names)), head="{}", **form)],
+    )

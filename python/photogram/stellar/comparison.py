@@ -37,27 +37,17 @@ LEVEL = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Standstill:
-    """The test of a camera that is said to have stood still.
+    """The test of a camera that is said to have stood still."""
 
-    Attributes
-    ----------
-    statistic, dimension, probability
-        Of all attitudes about their mean: chi-squared.
-    own
-        (E,) probability of the difference of each exposure from the others; of those that moved, when they
-        were found, of the rest without them.
-    turns
-        (E,) the turn of each against the mean of the others, radians.
-    moved
-        Exposures that differ from the others (Bonferroni over all), the worst first, each found without those
-        before it.
-    """
-
-    statistic: float
+    statistic: float  # Of all attitudes about their mean: chi-squared
     dimension: int
     probability: float
+    # (E,) probability of the difference of each exposure from the others; of those that moved, when
+    # they were found, of the rest without them
     own: Floats
-    turns: Floats
+    turns: Floats  # (E,) the turn of each against the mean of the others, radians
+    # Exposures that differ from the others (Bonferroni over all), the worst first, each found without
+    # those before it
     moved: tuple[int, ...]
 
 

@@ -33,26 +33,16 @@ _HOUR = math.tau / 24 * 1.00273790935
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What an exposure is identified with.
+    """What an exposure is identified with."""
 
-    Attributes
-    ----------
-    site, catalogue, frame, camera, earth
-        As for `identify`.
-    attitude_error, tolerance
-        Radians; pixels.
-    field_error, roll_known
-        As for `photogram.stellar.Night`.
-    """
-
-    site: Site
+    site: Site  # As for `identify`
     catalogue: Catalogue
     frame: tuple[float, float]
     camera: SkyCamera
-    attitude_error: float
+    attitude_error: float  # Radians; pixels
     tolerance: float
     earth: Earth
-    field_error: float = STRETCH
+    field_error: float = STRETCH  # As for `photogram.stellar.Night`
     roll_known: bool = True
 
     @property

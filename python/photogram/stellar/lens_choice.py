@@ -38,34 +38,16 @@ _GRID = 9
 
 @dataclass(frozen=True)
 class LensTest:
-    """A test of parameters of the lens.
+    """A test of parameters of the lens."""
 
-    Attributes
-    ----------
-    name
-        What is tested to be zero: `fx - fy`, `k3`, `p1, p2`.
-    statistic
-        F with `dimension` and `freedom` degrees of freedom.
-    dimension, freedom
-        Of the statistic.
-    probability
-        Of a statistic as large if it is zero.
-    level
-        Probability below which it is not zero.
-    effect
-        Largest displacement that it makes in the frame, pixels.
-    notable
-        Whether that is more than a fifth of the standard deviation of an image coordinate.
-    """
-
-    name: str
-    statistic: float
-    dimension: int
+    name: str  # What is tested to be zero: `fx - fy`, `k3`, `p1, p2`
+    statistic: float  # F with `dimension` and `freedom` degrees of freedom
+    dimension: int  # Of the statistic
     freedom: int
-    probability: float
-    level: float
-    effect: float
-    notable: bool
+    probability: float  # Of a statistic as large if it is zero
+    level: float  # Probability below which it is not zero
+    effect: float  # Largest displacement that it makes in the frame, pixels
+    notable: bool  # Whether that is more than a fifth of the standard deviation of an image coordinate
 
     @property
     def significant(self) -> bool:
@@ -182,30 +164,14 @@ _ROUNDS = 10
 
 @dataclass(frozen=True)
 class LensFit:
-    """A lens that was tried.
+    """A lens that was tried."""
 
-    Attributes
-    ----------
-    lens
-        Its name.
-    parameters
-        How many parameters of the camera were estimated.
-    images
-        Images that it was compared on.
-    mean_error
-        Mean error of unit weight; NaN where it was not adjusted.
-    bic
-        Schwarz's criterion; infinite where it was not adjusted.
-    reason
-        Why it was not adjusted.
-    """
-
-    lens: str
-    parameters: int
-    images: int
-    mean_error: float
-    bic: float
-    reason: str = ""
+    lens: str  # Its name
+    parameters: int  # How many parameters of the camera were estimated
+    images: int  # Images that it was compared on
+    mean_error: float  # Mean error of unit weight; NaN where it was not adjusted
+    bic: float  # Schwarz's criterion; infinite where it was not adjusted
+    reason: str = ""  # Why it was not adjusted
 
 
 def as_lens(camera: SkyCamera, lens: str, frame: tuple[float, float]) -> SkyCamera:

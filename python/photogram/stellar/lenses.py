@@ -11,39 +11,23 @@ from photogram.lazy_dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Lens:
-    """A lens.
+    """A lens."""
 
-    Attributes
-    ----------
-    model
-        The camera of `docs/cameras.md` that it is.
-    names
-        Parameters in the order of reports and files, fx, fy, cx, cy first; those of the model that are
-        missing are zero.
-    order
-        All parameters of the model, in its order.
-    radius
-        Distance from the principal point in principal distances, without lens terms, of an angle from the
-        axis (radians).
-    formula
-        The same for reports.
-    widest
-        The field of view (radians) from which on it has no image.
-    held
-        Terms that are zero unless a camera file says otherwise: without them the lens is the projection of
-        its name.
-    groups
-        Terms that are tested together, in the order in which they are left out where the data do not show
-        them.
-    """
-
-    model: str
+    model: str  # The camera of `docs/cameras.md` that it is
+    # Parameters in the order of reports and files, fx, fy, cx, cy first; those of the model that are
+    # missing are zero
     names: tuple[str, ...]
-    order: tuple[str, ...]
+    order: tuple[str, ...]  # All parameters of the model, in its order
+    # Distance from the principal point in principal distances, without lens terms, of an angle from the
+    # axis (radians)
     radius: Callable[[float], float]
-    formula: str
-    widest: float
+    formula: str  # The same for reports
+    widest: float  # The field of view (radians) from which on it has no image
+    # Terms that are zero unless a camera file says otherwise: without them the lens is the projection
+    # of its name
     held: tuple[str, ...] = ()
+    # Terms that are tested together, in the order in which they are left out where the data do not show
+    # them
     groups: tuple[tuple[str, ...], ...] = ()
 
     @property

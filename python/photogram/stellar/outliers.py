@@ -32,22 +32,13 @@ _SUSPECTS = 12
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Test values of all observations, and what good ones rarely exceed.
+    """Test values of all observations, and what good ones rarely exceed."""
 
-    Attributes
-    ----------
-    images, stars
-        (m, 2) and (S, 2) absolute values; NaN where nothing is tested.
-    limit
-        Good observations of the whole plate stay below it with 95 %.
-    known
-        Whether the mean error of unit weight is known (option 14): residuals over their mean errors; else
-        externally studentized ones.
-    """
-
-    images: Floats
+    images: Floats  # (m, 2) and (S, 2) absolute values; NaN where nothing is tested
     stars: Floats
-    limit: float
+    limit: float  # Good observations of the whole plate stay below it with 95 %
+    # Whether the mean error of unit weight is known (option 14): residuals over their mean errors; else
+    # externally studentized ones
     known: bool
 
 

@@ -218,17 +218,12 @@ class InertialAttitude:
     """The attitude of an exposure in ICRS.
 
     Axes of the camera are x right, y down, z along the axis; that is the camera of computer vision.
-
-    Attributes
-    ----------
-    matrix
-        (3, 3) R with camera direction = R times ICRS direction, of places without aberration and refraction;
-        det R = 1.
-    covariance
-        (3, 3) radians squared: of the small turn d about the axes of the camera with R_true = Exp(d) R.
     """
 
+    # (3, 3) R with camera direction = R times ICRS direction, of places without aberration and
+    # refraction; det R = 1
     matrix: Floats
+    # (3, 3) radians squared: of the small turn d about the axes of the camera with R_true = Exp(d) R
     covariance: Floats
 
     @property

@@ -254,25 +254,16 @@ def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Counts:
-    """What an adjustment counts.
+    """What an adjustment counts."""
 
-    Attributes
-    ----------
-    plate_observations, star_observations, parameter_observations
-        Plate coordinates with those of the axis; catalogue coordinates that have weight; parameters that have
-        weight.
-    parameter_unknowns, star_unknowns
-        What is estimated.
-    constraints
-        Of a combined solution.
-    """
-
+    # Plate coordinates with those of the axis; catalogue coordinates that have weight; parameters that
+    # have weight
     plate_observations: int
     star_observations: int
     parameter_observations: int
-    parameter_unknowns: int
+    parameter_unknowns: int  # What is estimated
     star_unknowns: int
-    constraints: int = 0
+    constraints: int = 0  # Of a combined solution
 
     @property
     def observations(self) -> int:

@@ -30,26 +30,15 @@ __all__ = ["Ellipse", "FictitiousPoint", "Movement", "PreRun", "Result", "Stage"
 
 @dataclass(frozen=True)
 class Movement:
-    """A fictitious point under two attitudes.
+    """A fictitious point under two attitudes."""
 
-    Attributes
-    ----------
-    first, second
-        The groups.
-    xy
-        x = y of the point, metres.
-    angle, mean_error
-        Angle between its two directions and its mean error, radians.
-    differences
-        Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
-        distance), elevation; radians.
-    """
-
-    first: str
+    first: str  # The groups
     second: str
-    xy: float
-    angle: float
+    xy: float  # x = y of the point, metres
+    angle: float  # Angle between its two directions and its mean error, radians
     mean_error: float
+    # Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
+    # distance), elevation; radians
     differences: tuple[float, float, float, float]
 
 
@@ -73,18 +62,11 @@ DISTORTION = ("K1", "K2", "K3", "K4", "K5")
 
 @dataclass(frozen=True)
 class Ellipse:
-    """A mean error ellipse on the sphere.
+    """A mean error ellipse on the sphere."""
 
-    Attributes
-    ----------
-    major, minor
-        Half axes, radians.
-    direction
-        Of the major axis, from increasing right ascension towards increasing declination, radians.
-    """
-
-    major: float
+    major: float  # Half axes, radians
     minor: float
+    # Of the major axis, from increasing right ascension towards increasing declination, radians
     direction: float
 
 
@@ -98,86 +80,43 @@ def ellipse(covariance: Floats, declination: float) -> Ellipse:
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """An unknown direction (section 5.7).
+    """An unknown direction (section 5.7)."""
 
-    Attributes
-    ----------
-    star
-        Its number.
-    place
-        Right ascension and declination, radians.
-    correction
-        (2,) of the direction of its first image, radians.
-    azimuth, elevation
-        Observed (refracted) ones at its first image: azimuth from south, positive west; radians.
-    mean_errors
-        Of right ascension times cos(declination), and declination; radians.
-    image_mean_error
-        m_i: mean error of unit weight from its own images, which should be parallel; that of the adjustment
-        where there is only one.
-    orientation
-        Ellipse from the orientation alone, as if its images had no error.
-    total
-        Ellipse with its images at the mean error of unit weight of the adjustment.
-    published
-        Ellipse with its images at m_i, as the report has it.
-    """
-
-    star: str
-    place: tuple[float, float]
-    correction: tuple[float, float]
-    azimuth: float
+    star: str  # Its number
+    place: tuple[float, float]  # Right ascension and declination, radians
+    correction: tuple[float, float]  # (2,) of the direction of its first image, radians
+    azimuth: float  # Observed (refracted) ones at its first image: azimuth from south, positive west; radians
     elevation: float
-    mean_errors: tuple[float, float]
+    mean_errors: tuple[float, float]  # Of right ascension times cos(declination), and declination; radians
+    # m_i: mean error of unit weight from its own images, which should be parallel; that of the
+    # adjustment where there is only one
     image_mean_error: float
-    orientation: Ellipse
-    total: Ellipse
-    published: Ellipse
+    orientation: Ellipse  # Ellipse from the orientation alone, as if its images had no error
+    total: Ellipse  # Ellipse with its images at the mean error of unit weight of the adjustment
+    published: Ellipse  # Ellipse with its images at m_i, as the report has it
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One of the solutions of a run.
+    """One of the solutions of a run."""
 
-    Attributes
-    ----------
-    solution
-        `minimum`, `maximum` or `refraction`.
-    counts
-        Its observations and unknowns.
-    levels
-        Its history.
-    stop
-        Why it stopped.
-    converged
-        Whether by its criterion.
-    log_determinant
-        Natural logarithm of the determinant of its reduced normal equations, in the units of the parameters.
-    """
-
-    solution: str
-    counts: Counts
-    levels: tuple[Level, ...]
-    stop: str
-    converged: bool
+    solution: str  # `minimum`, `maximum` or `refraction`
+    counts: Counts  # Its observations and unknowns
+    levels: tuple[Level, ...]  # Its history
+    stop: str  # Why it stopped
+    converged: bool  # Whether by its criterion
+    # Natural logarithm of the determinant of its reduced normal equations, in the units of the
+    # parameters
     log_determinant: float
 
 
 @dataclass(frozen=True, eq=False)
 class PreRun:
-    """Images that took no part in the minimum solution (option 7).
+    """Images that took no part in the minimum solution (option 7)."""
 
-    Attributes
-    ----------
-    points, stars
-        Their numbers, and those of their stars.
-    residuals
-        (m, 2) computed minus measured, metres.
-    """
-
-    points: tuple[str, ...]
+    points: tuple[str, ...]  # Their numbers, and those of their stars
     stars: tuple[str, ...]
-    residuals: Floats
+    residuals: Floats  # (m, 2) computed minus measured, metres
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -69,48 +69,28 @@ class Exposure:
 
 @dataclass(frozen=True, eq=False)
 class SkyCalibration:
-    """A calibrated camera and the attitudes of E exposures.
+    """A calibrated camera and the attitudes of E exposures."""
 
-    Attributes
-    ----------
-    camera
-        With covariance, scaled by the variance of unit weight.
-    attitudes, attitude_covariances
-        (E, 3) alpha, omega, kappa in radians, and (E, 3, 3).
-    cross_covariances
-        (E, 3, k) of attitudes and camera.
-    exposures, stars
-        (m,) exposure and catalogue star of each image used.
-    xy, residuals, redundancy, standardized
-        (m, 2) measured pixels; measured minus computed, pixels; redundancy numbers; residuals over their mean
-        errors.
-    catalogue
-        (S,) index in the catalogue of the stars used.
-    star_residuals, star_redundancy, star_standardized
-        (S, 2) adjusted minus catalogue right ascension and declination, radians; redundancy numbers;
-        residuals over their mean errors. NaN for stars that were held.
-    mean_error
-        Mean error of unit weight: of a pixel coordinate over its assumed standard deviation.
-    degrees_of_freedom, iterations, status
-        Of the adjustment.
-    """
-
-    camera: SkyCamera
-    attitudes: Floats
+    camera: SkyCamera  # With covariance, scaled by the variance of unit weight
+    attitudes: Floats  # (E, 3) alpha, omega, kappa in radians, and (E, 3, 3)
     attitude_covariances: Floats
-    cross_covariances: Floats
-    exposures: Indices
+    cross_covariances: Floats  # (E, 3, k) of attitudes and camera
+    exposures: Indices  # (m,) exposure and catalogue star of each image used
     stars: Indices
+    # (m, 2) measured pixels; measured minus computed, pixels; redundancy numbers; residuals over their
+    # mean errors
     xy: Floats
     residuals: Floats
     redundancy: Floats
     standardized: Floats
-    catalogue: Indices
+    catalogue: Indices  # (S,) index in the catalogue of the stars used
+    # (S, 2) adjusted minus catalogue right ascension and declination, radians; redundancy numbers;
+    # residuals over their mean errors. NaN for stars that were held.
     star_residuals: Floats
     star_redundancy: Floats
     star_standardized: Floats
-    mean_error: float
-    degrees_of_freedom: int
+    mean_error: float  # Mean error of unit weight: of a pixel coordinate over its assumed standard deviation
+    degrees_of_freedom: int  # Of the adjustment
     iterations: int
     status: str
 

@@ -13,82 +13,42 @@ from photogram.stellar.problem import Problem
 
 @dataclass(frozen=True)
 class Level:
-    """One pass of an iteration.
+    """One pass of an iteration."""
 
-    Attributes
-    ----------
-    solution
-        `minimum`, `maximum` or `refraction`.
-    number
-        From 1.
-    level
-        Level of discrepancies before its correction, metres. As published: root of the sum of squares of the
-        plate discrepancies over the degrees of freedom, stars at their catalogue places. Else: root of the
-        whole weighted sum of squares over the degrees of freedom.
-    """
-
-    solution: str
-    number: int
+    solution: str  # `minimum`, `maximum` or `refraction`
+    number: int  # From 1
+    # Level of discrepancies before its correction, metres. As published: root of the sum of squares of
+    # the plate discrepancies over the degrees of freedom, stars at their catalogue places. Else: root
+    # of the whole weighted sum of squares over the degrees of freedom.
     level: float
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What an iteration returns.
+    """What an iteration returns."""
 
-    Attributes
-    ----------
-    parameters
-        (26,) values.
-    places
-        (S, 2) adjusted places of the stars.
-    free
-        (26,) which parameters were estimated.
-    cofactors
-        (26, 26) for unit weight; zero for what was not.
-    star_cofactors, star_inverse
-        (S, 2, 2) of the places; and what of them would be left if the parameters were known: the report's
-        (1)^-1.
-    residuals
-        (m, 2) computed minus measured plate coordinates, metres.
-    redundancy, standardized
-        (m, 2) of the images.
-    star_redundancy, star_standardized
-        (S, 2) of the catalogue places; NaN where there is none.
-    axis_residual
-        Computed minus measured plate coordinates of the axis.
-    sums
-        Weighted sums of squares of plate, stars, parameters (with the axis).
-    log_determinant
-        Natural logarithm of the determinant of the reduced normal equations in the units of the parameters.
-    stop
-        Why the iteration stopped.
-    converged
-        Whether by its criterion.
-    levels
-        The history.
-    remarks
-        What went on.
-    """
-
-    parameters: Floats
-    places: Floats
-    free: Bools
-    cofactors: Floats
+    parameters: Floats  # (26,) values
+    places: Floats  # (S, 2) adjusted places of the stars
+    free: Bools  # (26,) which parameters were estimated
+    cofactors: Floats  # (26, 26) for unit weight; zero for what was not
+    # (S, 2, 2) of the places; and what of them would be left if the parameters were known: the report's
+    # (1)^-1
     star_cofactors: Floats
     star_inverse: Floats
-    residuals: Floats
-    redundancy: Floats
+    residuals: Floats  # (m, 2) computed minus measured plate coordinates, metres
+    redundancy: Floats  # (m, 2) of the images
     standardized: Floats
-    star_redundancy: Floats
+    star_redundancy: Floats  # (S, 2) of the catalogue places; NaN where there is none
     star_standardized: Floats
-    axis_residual: Floats | None
-    sums: tuple[float, float, float]
+    axis_residual: Floats | None  # Computed minus measured plate coordinates of the axis
+    sums: tuple[float, float, float]  # Weighted sums of squares of plate, stars, parameters (with the axis)
+    # Natural logarithm of the determinant of the reduced normal equations in the units of the
+    # parameters
     log_determinant: float
-    stop: str
-    converged: bool
-    levels: tuple[Level, ...]
-    remarks: tuple[str, ...] = field(default=())
+    stop: str  # Why the iteration stopped
+    converged: bool  # Whether by its criterion
+    levels: tuple[Level, ...]  # The history
+    remarks: tuple[str, ...] = field(default=())  # What went on
 
     @classmethod
     def of(cls, problem: Problem, found: dict[str, Any], *, unit: float = 1.0, **rest: Any) -> Solved:

@@ -5,14 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.show.quantity import Axis, Quantity, Table, of_each
-from photogram.stellar.camera_tables import parameter_table
+from photogram.stellar.camera_tables import (
+    ARC_SECONDS,
+    ARCSEC_OF_RAD,
+    DEGREES,
+    GRADS,
+    MM,
+    SECONDS,
+    UM,
+    UM_OF_M,
+    column,
+    names_column,
+    parameter_table,
+)
 from photogram.stellar.curves import (
     distortion_curves,
     histogram,
@@ -27,33 +38,7 @@ from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.result import Ellipse, Result, ellipse
 
 _AZIMUTHS = "Azimuths from south, positive west; elevations above the horizon."
-_UM = (Axis.of("x", "um"), Axis.of("y", "um"))
-_MM = tuple(Axis(name, "m", small="mm", factor=1e3) for name in "xy")
-_PLACE = (Axis.of("ra", "arcsec"), Axis.of("dec", "arcsec"))
-
-
-def _axis(unit: str, small: str, factor: float, *names: str) -> tuple[Axis, ...]:
-    return tuple(Axis(name, unit, small=small, factor=factor) for name in names or ("",))
-
-
-def _angles(*names: str) -> tuple[Axis, ...]:
-    return _axis("rad", "arcsec", 1 / ARCSEC, *names)
-
-
-def _degrees(*names: str) -> tuple[Axis, ...]:
-    return _axis("rad", "deg", math.degrees(1), *names)
-
-
-_UM_OF_M = _axis("m", "um", 1e6)
 _NONE = np.zeros(0)
-_ATTITUDE = ("alpha", "omega", "kappa")
-
-
-def _named(
-    values: Sequence[Any] | np.ndarray, name: str, head: str = "", member: str | None = None
-) -> Quantity:
-    texts = np.array(values, dtype=object)
-    return Quantity(texts, (), "name", name or None, name if member is None else member, head=head)
 
 
 def parameters(result: Result) -> Table:
@@ -133,11 +118,10 @@ def transformed_attitudes(result: Result) -> dict[str, Floats]:
 
 def transformed(result: Result) -> Table:
     """Return the transformed attitudes."""
-    attitudes, grads = transformed_attitudes(result), _axis("rad", "grads", 1 / GRAD, *_ATTITUDE)
-    angles = np.reshape([*attitudes.values()], (-1, 3))
+    attitudes = transformed_attitudes(result)
     columns = [
-        _named([*attitudes], "", "Orientation"),
-        Quantity(angles, grads, "deviation", head="{}", decimals=9),
+        names_column(attitudes, "Orientation"),
+        column([*attitudes.values()], GRADS, "{}", 9, parts="alpha, omega, kappa"),
     ]
     return Table("transformed-angles", "Transformed angles", columns)
 
@@ -156,29 +140,27 @@ def stars(result: Result) -> Table:
     problem, known = result.problem, result.problem.known
     residuals = np.where(known[:, None], result.star_residuals / ARCSEC, np.nan)
     before = _before(result, problem.star_weights)
+    redundancy, standardized = (
+        np.where(known[:, None], values, np.nan)
+        for values in (result.solved.star_redundancy, result.star_standardized)
+    )
+    place = "ra, dec"
     columns = [
-        _named(problem.star_ids, "id", "Star"),
-        _named(problem.star_names or problem.star_ids, "name", "Name"),
+        names_column(problem.star_ids, "Star", "id"),
+        names_column(problem.star_names or problem.star_ids, "Name", "name"),
         Quantity(known, name="known", member="known"),
-        Quantity(result.solved.places, _degrees("ra", "dec"), member="place_rad"),
+        Quantity(result.solved.places, member="place_rad"),
         Quantity([*map(_ellipse, result.ellipses())], member="ellipse"),
-        Quantity(residuals[:, 0] / 15, _axis("s", "s", 1.0), "deviation", head="Residual ra", decimals=6),
-        Quantity(residuals, _PLACE, "deviation", "residual", "residual", head="Residual {}", decimals=4),
-        _known(known, result.solved.star_redundancy, "redundancy", "r {}"),
-        _known(known, result.star_standardized, "standardized", "w {}"),
-        Quantity(
-            before, _angles("ra", "dec"), "deviation", head="Before {}", decimals=3, words={0.0: "fixed"}
-        ),
+        column(residuals[:, 0] / 15, SECONDS, "Residual ra", 6),
+        column(residuals, ARC_SECONDS, "Residual {}", 4, "residual", place),
+        column(redundancy, None, "r {}", 2, "redundancy", place),
+        column(standardized, None, "w {}", 2, "standardized", place),
+        replace(column(before, ARCSEC_OF_RAD, "Before {}", 3, parts=place), words={0.0: "fixed"}),
     ]
     if not known.all():
         columns += _unknown(result)
     about = "Adjusted minus catalogue; redundancy numbers r, standardized residuals w, mean errors before."
     return Table("stars", "Star data", columns, about=about, shown=np.flatnonzero(known))
-
-
-def _known(known: Bools, values: Floats, name: str, head: str) -> Quantity:
-    values = np.where(known[:, None], values, np.nan)
-    return Quantity(values, _PLACE, "number", name, name, head=head, decimals=2)
 
 
 def _unknown(result: Result) -> list[Quantity]:
@@ -209,31 +191,22 @@ def _ellipse(e: Ellipse) -> dict[str, float]:
 
 
 def _ellipses(ellipses: Sequence[Ellipse], of: str) -> list[Quantity]:
-    values = np.reshape([(e.major, e.minor, e.direction) for e in ellipses], (-1, 3))
     return [
-        Quantity(values[:, :2], _angles("a", "b"), "deviation", head=f"{{}}, {of}", decimals=4),
-        Quantity(values[:, 2], _degrees(), "deviation", head="Direction", decimals=2),
+        column([(e.major, e.minor) for e in ellipses], ARCSEC_OF_RAD, f"{{}}, {of}", 4, parts="a, b"),
+        column([e.direction for e in ellipses], DEGREES, "Direction", 2),
     ]
 
 
 def directions(result: Result) -> Table:
     """Return unknown directions; ellipses from the orientation alone, in total, and in total with m_i."""
     found = result.directions()
-    places = np.reshape([d.place for d in found], (-1, 2))
     columns = [
-        _named([d.star for d in found], "", "Star"),
-        *_places(places),
-        *_horizontal([d.azimuth for d in found], [d.elevation for d in found]),
-        Quantity(
-            np.reshape([d.mean_errors for d in found], (-1, 2)),
-            _angles("ra", "dec"),
-            "deviation",
-            head="Mean error {}",
-            decimals=4,
-        ),
-        Quantity(
-            np.array([d.image_mean_error for d in found]), _UM_OF_M, "deviation", head="m_i", decimals=3
-        ),
+        names_column((d.star for d in found), "Star"),
+        *_places([d.place for d in found]),
+        column([d.azimuth for d in found], DEGREES, "Azimuth S", 5),
+        column([d.elevation for d in found], DEGREES, "Elevation", 5),
+        column([d.mean_errors for d in found], ARCSEC_OF_RAD, "Mean error {}", 4, parts="ra, dec"),
+        column([d.image_mean_error for d in found], UM_OF_M, "m_i", 3),
         *_ellipses([d.orientation for d in found], "orientation"),
         *_ellipses([d.total for d in found], "total"),
         *_ellipses([d.published for d in found], "with m_i"),
@@ -246,46 +219,27 @@ def directions(result: Result) -> Table:
     return Table("directions", "Unknown directions", columns, about=about)
 
 
-def _places(places: Floats) -> list[Quantity]:
+def _places(places: Sequence[tuple[float, float]]) -> list[Quantity]:
     return [
-        _named([hours(ra % math.tau) for ra in places[:, 0].tolist()], "", "Right ascension"),
-        _named([degrees(dec) for dec in places[:, 1].tolist()], "", "Declination"),
-    ]
-
-
-def _horizontal(azimuths: Sequence[float], elevations: Sequence[float], **member: str) -> list[Quantity]:
-    return [
-        Quantity(np.array(values), _degrees(), "deviation", member=name, head=head, decimals=5)
-        for values, name, head in (
-            (azimuths, member.get("azimuth", ""), "Azimuth S"),
-            (elevations, member.get("elevation", ""), "Elevation"),
-        )
+        names_column((hours(ra % math.tau) for ra, _ in places), "Right ascension"),
+        names_column((degrees(dec) for _, dec in places), "Declination"),
     ]
 
 
 def fictitious(result: Result) -> Table:
     """Return directions of plate points under every attitude, with ellipses from the orientation."""
     points = fictitious_points(result) if result.movement else ()
-    places = np.reshape([p.place for p in points], (-1, 2))
-    covariances = np.reshape([p.covariance for p in points], (-1, 2, 2))
-    errors = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    errors = errors * np.column_stack([np.cos(places[:, 1]), np.ones(len(places))])
+    deviations = [np.sqrt(np.diag(p.covariance)) * [math.cos(p.place[1]), 1.0] for p in points]
     columns = [
-        _named([p.group for p in points], "group", "Orientation"),
-        Quantity(
-            np.array([p.xy for p in points]), _MM[:1], "deviation", member="xy", head="x = y", decimals=0
-        ),
-        Quantity(places, member="place"),
-        *_places(places),
-        *_horizontal(
-            [p.azimuth for p in points],
-            [p.elevation for p in points],
-            azimuth="azimuth",
-            elevation="elevation",
-        ),
-        Quantity(errors, _angles("ra", "dec"), "deviation", head="Mean error {}", decimals=4),
+        names_column((p.group for p in points), "Orientation", "group"),
+        column([p.xy for p in points], MM, "x = y", 0, "xy"),
+        of_each(points, "place"),
+        *_places([p.place for p in points]),
+        column([p.azimuth for p in points], DEGREES, "Azimuth S", 5, "azimuth"),
+        column([p.elevation for p in points], DEGREES, "Elevation", 5, "elevation"),
+        column(deviations, ARCSEC_OF_RAD, "Mean error {}", 4, parts="ra, dec"),
         *_ellipses([ellipse(p.covariance, p.place[1]) for p in points], "orientation"),
-        Quantity(covariances, member="covariance"),
+        of_each(points, "covariance"),
     ]
     return Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)
 
@@ -295,26 +249,12 @@ def images(result: Result) -> Table:
     problem, solved = result.problem, result.solved
     columns = [
         *_images_of(result),
-        Quantity(problem.image_xy, _MM, "deviation", "", "xy_m", head="{}", decimals=5),
-        _named([hours(time) for time in problem.image_times.tolist()], "", "Time"),
-        Quantity(
-            _before(result, problem.image_weights),
-            _axis("m", "um", 1e6, "x", "y"),
-            "deviation",
-            head="Before {}",
-            decimals=3,
-        ),
-        Quantity(
-            1e6 * solved.residuals,
-            _UM,
-            "deviation",
-            "residual_um",
-            "residual_um",
-            head="Residual {}",
-            decimals=3,
-        ),
-        Quantity(solved.redundancy, _UM, "number", "redundancy", "redundancy", head="r {}", decimals=3),
-        Quantity(result.standardized, _UM, "number", "standardized", "standardized", head="w {}", decimals=2),
+        column(problem.image_xy, MM, "{}", 5, "xy_m", "x, y"),
+        names_column(map(hours, problem.image_times.tolist()), "Time"),
+        column(_before(result, problem.image_weights), UM_OF_M, "Before {}", 3, parts="x, y"),
+        column(1e6 * solved.residuals, UM, "Residual {}", 3, "residual_um", "x, y"),
+        column(solved.redundancy, None, "r {}", 3, "redundancy", "x, y"),
+        column(result.standardized, None, "w {}", 2, "standardized", "x, y"),
     ]
     about = "Computed minus measured; redundancy numbers r, standardized residuals w, mean errors before."
     return Table("images", "Plate data", columns, about=about)
@@ -323,9 +263,9 @@ def images(result: Result) -> Table:
 def _images_of(result: Result) -> list[Quantity]:
     problem = result.problem
     return [
-        _named(problem.image_points, "point", "Point"),
-        _named([problem.star_ids[star] for star in problem.image_stars], "star", "Star"),
-        _named([GROUPS[group] for group in problem.image_groups], "orientation", "Orientation"),
+        names_column(problem.image_points, "Point", "point"),
+        names_column((problem.star_ids[star] for star in problem.image_stars), "Star", "star"),
+        names_column((GROUPS[group] for group in problem.image_groups), "Orientation", "orientation"),
     ]
 
 
@@ -338,8 +278,8 @@ def worst(result: Result, most: int) -> Table:
     columns = [
         point,
         star,
-        Quantity(1e6 * result.solved.residuals, _UM, "deviation", head="Residual", decimals=2),
-        Quantity(tests.images, _UM, head=f"Test value {'w' if tests.known else 't'}", decimals=2),
+        column(result.solved.residuals, UM_OF_M, "Residual", 2, parts="x, y"),
+        column(tests.images, None, f"Test value {'w' if tests.known else 't'}", 2, parts="x, y"),
     ]
     note = f"The {len(order)} plate coordinates of the largest test values."
     places = np.column_stack(np.unravel_index(order, sizes.shape))
@@ -355,14 +295,12 @@ def _before(result: Result, weights: Floats) -> Floats:
 def means(result: Result) -> Table:
     """Return means of stars with two images at least, and radial and tangential parts of their residuals."""
     rows = list(star_means(result))
-    values = np.reshape([[*xy, *v, *parts] for _, xy, v, parts in rows], (-1, 6))
-    um: Any = {"kind": "deviation", "decimals": 3}
     columns = [
-        _named([star for star, *_ in rows], "star", "Star"),
-        Quantity(values[:, :2], _MM, "deviation", member="xy_m", head="{}", decimals=5),
-        Quantity(1e6 * values[:, 2:4], _UM, member="residual_um", head="Residual {}", **um),
-        Quantity(1e6 * values[:, 4], _UM[:1], member="radial_um", head="Radial", **um),
-        Quantity(1e6 * values[:, 5], _UM[:1], member="tangential_um", head="Tangential", **um),
+        names_column((star for star, *_ in rows), "Star", "star"),
+        column([xy for _, xy, *_ in rows], MM, "{}", 5, "xy_m", "x, y"),
+        column([1e6 * v for *_, v, _ in rows], UM, "Residual {}", 3, "residual_um", "x, y"),
+        column([1e6 * radial for *_, (radial, _) in rows], UM, "Radial", 3, "radial_um"),
+        column([1e6 * along for *_, (_, along) in rows], UM, "Tangential", 3, "tangential_um"),
     ]
     return Table("star_means", "Mean plate coordinates", columns)
 
@@ -370,11 +308,10 @@ def means(result: Result) -> Table:
 def pre_run(result: Result) -> Table:
     """Return residuals of the images without a part in the minimum solution."""
     found = result.pre_run
-    residuals = np.zeros((0, 2)) if found is None else found.residuals
     columns = [
-        _named(found.stars if found else [], "", "Star"),
-        _named(found.points if found else [], "", "Point"),
-        Quantity(residuals, _axis("m", "um", 1e6, "x", "y"), "deviation", head="Residual {}", decimals=3),
+        names_column(found.stars if found else (), "Star"),
+        names_column(found.points if found else (), "Point"),
+        column(found.residuals if found else [], UM_OF_M, "Residual {}", 3, parts="x, y"),
     ]
     return Table("pre-run", "Images that took no part in the minimum solution", columns)
 
@@ -382,16 +319,15 @@ def pre_run(result: Result) -> Table:
 def movement(result: Result) -> Table:
     """Return angles between the directions of a point under two attitudes."""
     found = result.movement
-    names = ("ra cos dec", "declination", "azimuth sin z", "elevation")
-    differences = np.reshape([m.differences for m in found], (-1, 4))
+    parts = "ra cos dec, declination, azimuth sin z, elevation"
     columns = [
-        _named([f"{m.second} - {m.first}" for m in found], "", "Pair"),
+        names_column((f"{m.second} - {m.first}" for m in found), "Pair"),
         of_each(found, "first"),
         of_each(found, "second"),
-        of_each(found, "xy", _MM[:1], "deviation", head="x = y", decimals=0),
-        of_each(found, "angle", _angles(), "deviation", head="Angle", decimals=3),
-        of_each(found, "mean_error", _angles(), "deviation", head="Mean error", decimals=3),
-        Quantity(differences, _angles(*names), "deviation", member="differences", head="{}", decimals=3),
+        column([m.xy for m in found], MM, "x = y", 0, "xy"),
+        column([m.angle for m in found], ARCSEC_OF_RAD, "Angle", 3, "angle"),
+        column([m.mean_error for m in found], ARCSEC_OF_RAD, "Mean error", 3, "mean_error"),
+        column([m.differences for m in found], ARCSEC_OF_RAD, "{}", 3, "differences", parts),
     ]
     about = "Angles between the directions of a point of the plate under two attitudes."
     return Table("movement", "Movement of the camera", columns, about=about)
@@ -400,18 +336,12 @@ def movement(result: Result) -> Table:
 def distortion(result: Result) -> Table:
     """Return distortion and its mean errors over the distance from its centre."""
     curves = distortion_curves(result) if result.problem.options.curves else None
-    columns = [
-        Quantity(getattr(curves, name, _NONE), axes, "deviation", head=head, decimals=decimals)
-        for name, head, axes, decimals in (
-            ("distance", "Distance", _MM[:1], 1),
-            ("radial", "Radial", _UM_OF_M, 3),
-            ("radial_error", "Mean error", _UM_OF_M, 3),
-            ("transformed", "Transformed", _UM_OF_M, 3),
-            ("transformed_error", "Mean error", _UM_OF_M, 3),
-            ("decentering", "Decentering", _UM_OF_M, 3),
-            ("decentering_error", "Mean error", _UM_OF_M, 3),
-        )
-    ]
+    columns = [column(getattr(curves, "distance", _NONE), MM, "Distance", 1)]
+    for name in ("radial", "transformed", "decentering"):
+        columns += [
+            column(getattr(curves, name, _NONE), UM_OF_M, name.capitalize(), 3),
+            column(getattr(curves, f"{name}_error", _NONE), UM_OF_M, "Mean error", 3),
+        ]
     about = (
         "Over the distance from its centre, with mean errors. Transformed: for the calibrated principal"
         " distance, with which it is zero at the crossover."
@@ -424,24 +354,15 @@ def refraction(result: Result) -> Table:
     groups = solved_groups(result) if result.problem.options.refraction else {}
     curves = [refraction_curves(result, group) for group in groups.values()]
     names = np.repeat([*groups], [len(curve.zenith_distance) for curve in curves])
-    columns = [
-        _named(names, "", "Orientation"),
-        *(
-            Quantity(
-                np.concatenate([_NONE, *(getattr(curve, name) for curve in curves)]),
-                axes,
-                "deviation",
-                head=head,
-                decimals=decimals,
-            )
-            for name, head, axes, decimals in (
-                ("zenith_distance", "Zenith distance", _degrees(), 3),
-                ("given", "Given", _angles(), 4),
-                ("corrected", "Corrected", _angles(), 4),
-                ("error", "Mean error", _angles(), 4),
-            )
-        ),
-    ]
+    columns = [names_column(names, "Orientation")]
+    for name, head, unit, decimals in (
+        ("zenith_distance", "Zenith distance", DEGREES, 3),
+        ("given", "Given", ARCSEC_OF_RAD, 4),
+        ("corrected", "Corrected", ARCSEC_OF_RAD, 4),
+        ("error", "Mean error", ARCSEC_OF_RAD, 4),
+    ):
+        values = np.concatenate([_NONE, *(getattr(curve, name) for curve in curves)])
+        columns.append(column(values, unit, head, decimals))
     return Table("refraction", "Refraction curves", columns)
 
 
@@ -451,10 +372,10 @@ def histograms(result: Result) -> list[Table]:
     for name, values in residual_classes(result).items():
         found = histogram(1e6 * values)
         columns = [
-            Quantity(found.edges[:-1], _UM[:1], "deviation", head="From", decimals=3),
-            Quantity(found.edges[1:], _UM[:1], "deviation", head="To", decimals=3),
-            Quantity(found.counts, head="Number"),
-            Quantity(found.expected, head="Normal", decimals=2),
+            column(found.edges[:-1], UM, "From", 3),
+            column(found.edges[1:], UM, "To", 3),
+            column(found.counts, None, "Number", 0),
+            column(found.expected, None, "Normal", 2),
         ]
         note = f"mean {found.mean:.4f} µm, standard deviation {found.sd:.4f} µm"
         tables.append(Table(f"histogram-{name}", f"Residuals in {name}", columns, note))
