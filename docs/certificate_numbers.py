@@ -9,6 +9,8 @@ from textwrap import wrap
 
 from photogram.film import Certificate, compare_cameras
 from photogram.film.years.example import simulated_certificates
+from photogram.show.cells import written
+from photogram.show.forms import table_text
 
 EXAMPLE = files("photogram") / "examples" / "certificate" / "rc10.toml"
 
@@ -18,15 +20,17 @@ def slip_lines() -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "rc10.toml"
         path.write_text(EXAMPLE.read_text(encoding="utf-8").replace("220.018", "220.108"), encoding="utf-8")
-        report = Certificate.read(path).report()
-    first, last = report.index("Distances beside"), report.index("Marks\n")
-    return report[first:last].rstrip().splitlines()
+        document = Certificate.read(path).document()
+    tables = [document.table("distances"), document.table("explanations")]
+    return [line for table in tables for line in (table.title, *table_text(written(table)), "")][:-1]
 
 
 def years_lines() -> list[str]:
     """Compare the simulated certificates of the example of `camera compare`."""
     found = compare_cameras(simulated_certificates())
-    return [*wrap(found.verdict.headline, 118), "", *found.report().splitlines()]
+    tables = [found.document().table(key) for key in ("calibrations", "series")]
+    lines = [line for table in tables for line in ("", *table_text(written(table)))]
+    return [*wrap(found.verdict.headline, 118), *lines]
 
 
 BLOCKS = {"slip": slip_lines, "years": years_lines}

@@ -32,8 +32,10 @@ from photogram.film.marks import usual_places
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.cameras import Camera
-from photogram.show.methods import Shown
+from photogram.show.methods import Documented, Judged
+from photogram.show.page import Document
 from photogram.show.summary import Brief, Rows
+from photogram.statistics.findings import Findings
 
 SD_PLACE = 0.002
 """Of a coordinate that is printed to 0.001 mm."""
@@ -69,7 +71,7 @@ class CalibratedMarks:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Certificate(Shown, Brief):
+class Certificate(Documented, Judged, Brief):
     """A certificate, mm, the data strip at the left. :meth:`read` reads files.
 
     Parameters
@@ -365,6 +367,17 @@ class Certificate(Shown, Brief):
         radius = self.c * np.tan(self.radial.angle)
         powers = radius[:, np.newaxis] ** (2 * np.arange(len(self.radial_coefficients)) + 1)
         return float(np.abs(powers @ self.radial_coefficients - sign * self.radial.distortion).max())
+
+    def document(self) -> Document:
+        """Return the document of the certificate: distances, marks, lens, camera."""
+        from photogram.film.certificate_document import certificate_document
+
+        return certificate_document(self)
+
+    def _findings(self) -> Findings:
+        from photogram.film.certificate_findings import certificate_findings
+
+        return certificate_findings(self)
 
     def told(self) -> list[str]:
         """Return what a user should know beside the verdict, as sentences."""

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.film.certificate import Certificate
 from photogram.messages import counted
-from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import GlobalTest, global_test
 
+if TYPE_CHECKING:
+    from photogram.film import Certificate
 
-@findings_of.register(Certificate)
+
 def certificate_findings(certificate: Certificate) -> Findings:
     """Return the tests of a certificate: distances beside coordinates, distances alone, the lens."""
     compared = certificate.check()

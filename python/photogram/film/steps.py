@@ -6,19 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io import json
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
-from photogram.show.cells import page_table
-from photogram.show.judgement import judged
-from photogram.show.lines import fact_lines, field, table_lines
-from photogram.show.methods import Paged, document_of, page_of, report_of
+from photogram.show.judgement import judged, tests_section
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
-from photogram.show.quantity import Axis, Quantity, records
-from photogram.show.sections import composed, headline, verdict_sections
+from photogram.show.quantity import Axis, Quantity, Table
 from photogram.show.summary import Brief, Rows
 
 if TYPE_CHECKING:
@@ -26,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StepsCompared(Paged, Brief):
+class StepsCompared(Documented, Brief):
     """Points of one block from one step and from two. Standard deviations are a priori: unit weight is 1.
 
     Attributes
@@ -67,13 +62,35 @@ class StepsCompared(Paged, Brief):
         """Return the comparison in a line."""
         return "Films inside the adjustment, and fitted before", [("points", self.sentence)]
 
-    def report(self) -> str:
-        """Return the comparison as text."""
-        return report_of(self)
-
-    def to_json(self) -> bytes:
-        """Return the comparison as a JSON document (UTF-8); docs/film.md lists the members."""
-        return document_of(self)
+    def document(self) -> Document:
+        """Return the document of the comparison; docs/film.md lists the members of its JSON form."""
+        results = {"inside": self.inside, "before": self.before}
+        sentence = f"{self.sentence[:1].upper()}{self.sentence[1:]}."
+        of_axes = replace(_axes(self), note=sentence)
+        return Document(
+            what=WHAT,
+            title=self.inside.block.title,
+            judgements=[judged(self.inside.verdict, "films inside the adjustment")],
+            advice=[],
+            highlights=_facts(self),
+            sections=[
+                Section("points", of_axes.title, [of_axes], _WHY),
+                tests_section(self.inside.verdict),
+            ],
+            members={
+                "kind": "film",
+                "verdict": self.inside.verdict.document(),
+                "said": self.sentence,
+                "unit": self.inside.block.linear_unit,
+                "points": len(self.rows),
+                "sums": {
+                    name: dict(
+                        zip(("sum_of_squares", "degrees_of_freedom"), own.sum_and_freedom, strict=True)
+                    )
+                    for name, own in results.items()
+                },
+            },
+        )
 
 
 def compare_steps(inside: Result, before: Result) -> StepsCompared:
@@ -109,19 +126,15 @@ _WHY = (
 )
 
 
-def _said(found: StepsCompared) -> str:
-    return found.sentence[:1].upper() + found.sentence[1:]
-
-
-def _axes(found: StepsCompared) -> list[Quantity]:
-    """Return what of each coordinate is compared."""
+def _axes(found: StepsCompared) -> Table:
+    """Return medians of standard deviations and differences of each coordinate."""
     unit = (Axis.of("", found.inside.block.linear_unit),)
     own = found.sd[0]
     size = found.difference / own
     worst = np.abs(size).argmax(axis=0)
     names = [found.inside.block.point_ids[found.rows[row]] for row in worst.tolist()]
     rms = np.sqrt(np.mean(found.difference**2, axis=0))
-    return [
+    columns = [
         Quantity([*"XYZ"], kind="name", member="axis", head="Axis"),
         Quantity(found.median_sd[0], unit, "value", member="sd_inside", head="sd, one step"),
         Quantity(found.median_sd[1], unit, "value", member="sd_before", head="sd, two steps"),
@@ -132,6 +145,7 @@ def _axes(found: StepsCompared) -> list[Quantity]:
         ),
         Quantity(names, kind="name", member="largest_at", head="At"),
     ]
+    return Table("axes", "Medians of standard deviations, and differences of points", columns)
 
 
 def _facts(found: StepsCompared) -> list[Fact]:
@@ -143,62 +157,3 @@ def _facts(found: StepsCompared) -> list[Fact]:
             expected = f"expected {low:.3g} to {high:.3g}"
             facts.append(Fact(f"Unit variance, {name}", f"{test.variance:.4g}", note=expected))
     return [*facts, Fact("Points compared", counted(len(found.rows), "point"))]
-
-
-@report_of.register(StepsCompared)
-def steps_text(found: StepsCompared) -> str:
-    """Return the comparison as text."""
-    axes, one, two, percent, rms, largest, at = _axes(found)
-    form = {"form": ".5g"}
-    lines = table_lines(
-        [
-            *field(axes, 6, head="axis"),
-            *field(one, 14, **form, head="one step {unit}"),
-            *field(two, 15, **form, head="two steps {unit}"),
-            *field(percent, 9, ".2f", "%"),
-            *field(rms, 15, **form, head="differ rms {unit}"),
-            *field(largest, 14, ".2f", "most, in sd"),
-            *field(at, 0, head="at", gap="  "),
-        ]
-    )
-    said = f"{_said(found)}."
-    sections = [
-        *verdict_sections(found.inside.verdict)[:1],
-        (WHAT, [said, "", "medians of standard deviations; by how much two steps differ from one", *lines]),
-        ("Both", fact_lines(_facts(found))),
-    ]
-    return composed(headline("film", found.inside.block.title), sections)
-
-
-@document_of.register(StepsCompared)
-def steps_document(found: StepsCompared) -> bytes:
-    """Return the comparison as JSON."""
-    sums = {"inside": found.inside, "before": found.before}
-    document = {
-        "program": f"photogram {_photocore.__version__}",
-        "kind": "film",
-        "verdict": found.inside.verdict.document(),
-        "said": found.sentence,
-        "unit": found.inside.block.linear_unit,
-        "points": len(found.rows),
-        "axes": records(_axes(found)),
-        "sums": {
-            name: dict(zip(("sum_of_squares", "degrees_of_freedom"), own.sum_and_freedom, strict=True))
-            for name, own in sums.items()
-        },
-    }
-    return json.to_json(document)
-
-
-@page_of.register(StepsCompared)
-def steps_page(found: StepsCompared) -> Document:
-    """Return the comparison for the browser."""
-    verdict = found.inside.verdict
-    return Document(
-        what=WHAT,
-        title=found.inside.block.title,
-        judgements=[judged(verdict, "films inside the adjustment")],
-        advice=[],
-        highlights=_facts(found),
-        sections=[Section("points", "Points", [page_table(_said(found), _axes(found))], _WHY)],
-    )

@@ -1,0 +1,160 @@
+"""The document of a certificate; `docs/certificates.md` lists the members of its JSON form."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photogram.arguments.types import Floats
+from photogram.film.certificate_tables import (
+    compared,
+    curve,
+    distortion,
+    explanations,
+    marks,
+    observed,
+    parameters,
+    terms,
+)
+from photogram.network.cameras import Camera
+from photogram.show.judgement import judged, tests_section
+from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
+from photogram.show.quantity import members
+from photogram.show.sketch.declared import Panel, spread
+from photogram.show.sketch.marks import Line, Mark, Markers, band, error_bars
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import FAINT, INK, MARKED
+
+if TYPE_CHECKING:
+    from photogram.film import Certificate
+
+CURVE = (
+    "Readings with their standard deviation, the fitted curve with its own; beyond the table it is dashed."
+)
+
+
+def certificate_document(certificate: Certificate) -> Document:
+    """Return the document of a certificate."""
+    facts, verdict, cameras = _facts(certificate), certificate.verdict, _cameras(certificate)
+    differences = certificate.check()
+    distances = compared(differences)
+    mark_parts, of_marks = _marks(certificate)
+    lens_parts, of_lens = _lens(certificate)
+    return Document(
+        what="Certificate of a camera",
+        title=certificate.name,
+        judgements=[judged(verdict)],
+        advice=verdict.next,
+        highlights=facts[1:4],
+        sections=[
+            Section("distances", distances.title, [distances, explanations(differences)], distances.about),
+            Section("marks", "Marks", mark_parts),
+            Section("lens", "Lens", lens_parts),
+            Section("camera", "Camera", [*map(parameters, cameras)]),
+            tests_section(verdict),
+            Section("certificate", "Certificate", [Facts("Certificate", facts)]),
+        ],
+        members={
+            "kind": "certificate",
+            "camera": certificate.name,
+            "type": certificate.camera_type or None,
+            "date": certificate.day.isoformat() if certificate.day else None,
+            "verdict": verdict.document(),
+            "remarks": certificate.told(),
+            "marks": of_marks,
+            "lens": of_lens,
+            "cameras": [_camera_members(each) for each in cameras],
+        },
+    )
+
+
+def _marks(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]:
+    """Return the parts on marks, and their members in JSON."""
+    if not (certificate.places or certificate.distances):
+        return [], None
+    found = certificate.fiducials()
+    parts: list[Part] = [marks(found)]
+    order = [f"{name}.{axis}" for name in found.names for axis in "xy"]
+    own: dict[str, Any] = {
+        "covariance_mm2": {"order": order, "matrix": found.covariance},
+        "adjustment": None,
+    }
+    if found.adjusted is not None:
+        test = found.adjusted.test
+        parts.append(observed(found.adjusted))
+        own["adjustment"] = {
+            **members(found.adjusted, "degrees_of_freedom", free_movements="free"),
+            "omega": test.weighted_sum_of_squares if test else None,
+            "probability": test.probability_above if test else None,
+        }
+    return parts, own
+
+
+def _lens(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]:
+    """Return the parts on the lens, and their members in JSON."""
+    if certificate.radial is None:
+        return [], None
+    own = certificate.curve()
+    drawing = Drawing("picture-distortion", "Radial distortion", CURVE, partial(_sketch, certificate))
+    tables = [distortion(certificate.radial, own), terms(certificate.curves(), own.terms), curve(own)]
+    return [drawing, *tables], {
+        **members(own, "terms", focal_length_mm="focal_length", sd_focal_length_mm="sd_focal_length"),
+        "brown_apart_mm": certificate.lens("brown").apart,
+        "printed_coefficients_apart_mm": certificate.printed_coefficients(),
+    }
+
+
+def _camera_members(camera: Camera) -> dict[str, Any]:
+    assert camera.covariance is not None
+    names, matrix = camera.covariance
+    return {
+        **members(camera, "model", "unit"),
+        "parameters": dict(camera.parameters),
+        "covariance": {"order": [*names], "matrix": np.asarray(matrix)},
+    }
+
+
+def _cameras(certificate: Certificate) -> list[Camera]:
+    """Return the camera forward and, where decentring allows, backward; none without a focal length."""
+    if certificate.c is None:
+        return []
+    if certificate.radial is None or certificate.tangential is not None:
+        return [certificate.camera()]
+    return [certificate.camera("brown_forward"), certificate.camera("brown")]
+
+
+def _facts(certificate: Certificate) -> list[Fact]:
+    """Return what it is of, and how it was taken."""
+    (xp, yp), sd, what = certificate.principal_point
+    found = [
+        Fact("Camera", certificate.name, note=certificate.camera_type),
+        Fact("Date", certificate.day.isoformat() if certificate.day else "not given"),
+    ]
+    if certificate.c is not None:
+        found += [
+            Fact("Calibrated focal length", f"{certificate.c:.3f}", "mm"),
+            Fact("Principal point", f"{xp:.4f}, {yp:.4f}", "mm", f"{what}, sd {sd:g} mm"),
+        ]
+    if certificate.radial is not None:
+        apart = certificate.lens("brown").apart
+        found.append(Fact("Conversion to brown", significant(1e3 * apart, 2), "um", "differs by at most"))
+    return found
+
+
+def _sketch(certificate: Certificate) -> Plot:
+    assert certificate.radial is not None
+    own, um, given = certificate.curve(), 1e3, certificate.radial
+    edge = float(own.radius.max())
+    drawn, ends = list[Mark](), list[Floats]()
+    for radius, dash in ((np.linspace(0, edge, 200), ""), (np.linspace(edge, 1.1 * edge, 40), "--")):
+        value, sd = um * own.at(radius), um * own.sd_at(radius)
+        drawn.append(band(radius, value - sd, value + sd, FAINT, 0.4))
+        drawn.append(Line(np.column_stack([radius, value]), INK, 1.2, dash))
+        ends += [value - sd, value + sd]
+    places = np.column_stack([own.radius, um * given.distortion])
+    low, high = (um * (given.distortion + sign * given.sd) for sign in (-1, 1))
+    drawn += [Line(error_bars(places, low, high), MARKED, 1.5), Markers(places, "o", 4.0, MARKED)]
+    limits = np.column_stack([spread(0.0, 1.1 * edge), spread(low, high, *ends)])
+    return Plot(6.4, 3.6, [Panel(limits, drawn, "", "radius, mm", "distortion, µm")])
