@@ -239,7 +239,6 @@ def good(tmp_path_factory):
             "simulate_calibration": {"grid": plate, "cases": 1},
             "to_cards": {"session": session},
             "to_csv": {"session": session},
-            "to_json": {"calibration": calibration},
         },
         "photogram.network.geometry": {
             "Spheroid": {"a": 6378137.0, "b": 6356752.0},

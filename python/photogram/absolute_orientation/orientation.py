@@ -277,7 +277,9 @@ class Orientation(Documented, Judged, Brief):
 
     def control_table(self) -> pd.DataFrame:
         """Return stations as a data frame: residuals in both units, redundancy numbers, test values."""
-        return self.document().table("control").frame()
+        from photogram.absolute_orientation.tables import control
+
+        return control(self).frame()
 
     def document(self) -> Document:
         """Return the document of the orientation: parameters, control with tests, transformed points."""
