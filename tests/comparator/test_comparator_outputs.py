@@ -100,7 +100,7 @@ def test_feature_18_the_net_is_drawn_at_fixed_nodes_and_10_000_times():
 
 
 def test_feature_18_every_case_has_its_table_and_pictures_where_they_are_wanted(full):
-    from photogram.comparator.pictures.book import sketches
+    from photogram.comparator.pictures import sketches
 
     session = replace(noisy(30, correction=bent()), plot_each_case=True)
     calibration = calibrate(session, QUICK)
@@ -117,7 +117,7 @@ def _widths(panel):
 
 
 def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
-    from photogram.comparator.pictures.book import sketches
+    from photogram.comparator.pictures import sketches
     from photogram.comparator.pictures.ellipses import total_ellipses
 
     made = sketches(full)
