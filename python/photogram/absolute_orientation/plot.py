@@ -13,8 +13,7 @@ from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Names
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, PURPLE, VERMILION
 
-LONGEST = 0.12
-"""Length of the longest residual, as a fraction of the plan's larger side."""
+LONGEST_RESIDUAL = 0.12  # As a part of the larger side of the plan
 
 
 def control_plot(
@@ -39,11 +38,11 @@ def control_plot(
     unit = stations.ground_unit
     size = float(np.ptp(plan, axis=0).max())
     largest = float(np.nanmax(np.abs(residuals)))
-    factor = LONGEST * size / largest if largest > 0 else 0.0
+    factor = LONGEST_RESIDUAL * size / largest if largest > 0 else 0.0
     high = float(np.clip(5.5 * np.ptp(plan[:, 1]) / (np.ptp(plan[:, 0]) or 1.0), 2.0, 8.0))
     vectors, ends = _residuals(plan, residuals * factor)
     names = [stations.ids[row] for row in rows.tolist()]
-    length = round_length(LONGEST * size / factor) if factor else 0.0
+    length = round_length(LONGEST_RESIDUAL * size / factor) if factor else 0.0
     panel = Panel(
         around(np.vstack([plan, ends]), 0.1),
         [*_stations(used, plan), *vectors, Names(plan, names, [INK] * len(names), ends)],

@@ -14,10 +14,8 @@ from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers, band
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import INK, MARKED
 
-LONGEST = 0.12
-"""The longest residual vector, as part of the extent of the grid."""
-SAME_RADIUS = 0.02
-"""Points whose radii differ by less than this part of the largest have one mean in the curve."""
+LONGEST_RESIDUAL = 0.12  # As a part of the extent of the grid
+SAME_RADIUS = 0.02  # Points have one mean if their radii differ by less than this part of the largest
 
 
 def run_sketch(results: Sequence[PerspectiveCenter]) -> Plot:
@@ -41,12 +39,12 @@ def _residual_vectors(result: PerspectiveCenter, longest: float) -> Panel:
     """Return measured minus projected; `longest` is the residual that has the longest vector."""
     places, known = result.projected, round_length(longest)
     extent = float(np.ptp(places, axis=0).max()) or 1.0
-    scale = LONGEST * extent / longest if longest > 0 else 1.0
+    scale = LONGEST_RESIDUAL * extent / longest if longest > 0 else 1.0
     marks: list[Mark] = [Markers(places, "o", 2.5), Arrows(places, result.residual * scale, MARKED, 0.004)]
     bar = known * scale, MARKED, f"{known:g} model units (x {scale:,.0f})"
     title = f"{set_name(result)}: measured − projected"
     axes = "X, model units", "Y, model units"
-    return Panel(around(places, LONGEST), marks, title, *axes, equal=True, bars=[bar])
+    return Panel(around(places, LONGEST_RESIDUAL), marks, title, *axes, equal=True, bars=[bar])
 
 
 def _distortion_curve(result: PerspectiveCenter, largest: float) -> Panel:

@@ -19,10 +19,8 @@ if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.planning.pattern import Pattern
 
-_PANEL = 6.0
-"""Longer side of a panel, inches."""
-_ELONGATED = 2.5
-"""Panels of blocks that are so much wider than high stand one above the other."""
+_PANEL_INCHES = 6.0  # Longer side of a panel
+_MAX_SIDE_BY_SIDE = 2.5  # Width over height of a block; panels of wider blocks are stacked
 _KINDS = (("full control", "^"), ("height control", "o"), ("plane control", "s"))
 
 
@@ -39,10 +37,10 @@ def plan_sketch(patterns: Sequence[Pattern]) -> Plot:
     panels = [_panel(pattern, limits, shades) for pattern in patterns]
     panels[-1] = _with_legend(panels)
     width, height = np.maximum(np.ptp(plan, axis=0), 1e-9).tolist()
-    stacked = width > _ELONGATED * height
+    stacked = width > _MAX_SIDE_BY_SIDE * height
     rows, columns = (len(panels), 1) if stacked else (1, len(panels))
-    across = max(2 * _PANEL if stacked else min(_PANEL, _PANEL * width / height), 3.5)
-    up = min(across * height / width, _PANEL)
+    across = max(2 * _PANEL_INCHES if stacked else min(_PANEL_INCHES, _PANEL_INCHES * width / height), 3.5)
+    up = min(across * height / width, _PANEL_INCHES)
     size = columns * (across + 0.5) + 3.0, rows * (up + 1.0) + 0.4
     return Plot(*size, panels, columns, shades)
 

@@ -10,10 +10,8 @@ from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Mesh, Shades, Texts
 from photogram.show.sketch.plot import Plot
 
-CAMERAS = 4
-"""That have a panel at most."""
-WRITTEN = 14
-"""Parameters whose coefficients are written into the matrix at most."""
+MAX_CAMERAS = 4
+MAX_WRITTEN_PARAMETERS = 14  # Coefficients of more parameters are not written into the matrix
 SHADES = Shades(-1.0, 1.0, "correlation, -1 to 1", "signed")
 
 
@@ -28,7 +26,7 @@ def correlations(result: object) -> Plot:
     cameras = pictured(result).correlations
     if not cameras:
         raise InputError("there are no correlations to draw: no camera has two estimated parameters")
-    shown = cameras[:CAMERAS]
+    shown = cameras[:MAX_CAMERAS]
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
     side = 2.2 + 0.36 * max(len(each.names) for each in shown)
@@ -42,7 +40,7 @@ def _matrix(each: Correlated, said: str) -> Panel:
     count = len(each.names)
     first, last = -0.5, count - 0.5
     marks: list[Mark] = [Mesh(np.array([[first, first], [last, last]]), each.coefficients, SHADES)]
-    if count <= WRITTEN:
+    if count <= MAX_WRITTEN_PARAMETERS:
         rows, columns = np.nonzero(~np.eye(count, dtype=bool))
         values = each.coefficients[rows, columns].tolist()
         texts = [

@@ -14,8 +14,7 @@ from photogram.show.sketch.marks import Level, Line, Mark, band
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT, INK
 
-CAMERAS = 3
-"""That are drawn at most, side by side."""
+MAX_CAMERAS = 3
 
 
 def distortion(result: object) -> Plot:
@@ -28,7 +27,7 @@ def distortion(result: object) -> Plot:
     InputError
         No camera has radial distortion.
     """
-    cameras = pictured(result).distortion[:CAMERAS]
+    cameras = pictured(result).distortion[:MAX_CAMERAS]
     if not cameras:
         raise InputError("there is no distortion to draw: no camera has radial terms, or they are all zero")
     found = side_by_side(cameras)

@@ -11,10 +11,8 @@ from photogram.show.sketch.marks import Level, Line, Mark, Markers
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 
-SHOWN = 4
-"""Features that have a panel at most."""
-NAMED = 40
-"""Points whose names are written at most."""
+MAX_FEATURES = 4
+MAX_POINT_NAMES = 40
 
 
 def features(result: object) -> Plot:
@@ -28,8 +26,8 @@ def features(result: object) -> Plot:
     every = pictured(result).deviations
     if not every:
         raise InputError("there are no deviations to draw: no feature is fitted to more than two points")
-    shown = every[:SHOWN]
-    said = f"the first {SHOWN} of {len(every)} features are drawn" if len(every) > SHOWN else ""
+    shown = every[:MAX_FEATURES]
+    said = f"the first {MAX_FEATURES} of {len(every)} features are drawn" if len(every) > MAX_FEATURES else ""
     panels = [_panel(each, said if each is shown[-1] else "") for each in shown]
     return Plot(7.0, 0.4 + 2.5 * len(shown), panels)
 
@@ -46,7 +44,7 @@ def _panel(each: Deviations, said: str) -> Panel:
         ends = np.stack([at, at], axis=1)
         ends[:, :, 1] += bars[:, k, np.newaxis] * [-1.0, 1.0]
         marks += [Line(ends, COLOURS[k], 1.0), Markers(at, "o", 3.5, COLOURS[k], label=direction)]
-    named = len(places) <= NAMED
+    named = len(places) <= MAX_POINT_NAMES
     return Panel(
         np.column_stack([spread(across), spread(0.0, values - bars, values + bars)]),
         marks,

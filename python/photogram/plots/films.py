@@ -12,12 +12,9 @@ from photogram.show.sketch.marks import Arrows, Mark, Markers, Names
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK
 
-SHOWN = 6
-"""Fields that have a panel at most."""
-ROOM = 0.14
-"""Around the places, of their extent."""
-LONGEST = 0.11
-"""Of the longest vector, of the extent of the places."""
+MAX_FIELDS = 6
+MARGIN = 0.14  # Around the places, as a part of their extent
+LONGEST_VECTOR = 0.11  # As a part of the extent of the places
 
 
 def films(result: object) -> Plot:
@@ -31,9 +28,9 @@ def films(result: object) -> Plot:
     every = pictured(result).films
     if not every:
         raise InputError("there are neither residuals of marks nor patterns of films to draw")
-    shown = every[:SHOWN]
+    shown = every[:MAX_FIELDS]
     columns = min(2, len(shown))
-    said = f"the first {SHOWN} of {len(every)} fields are drawn" if len(every) > SHOWN else ""
+    said = f"the first {MAX_FIELDS} of {len(every)} fields are drawn" if len(every) > MAX_FIELDS else ""
     panels = [_panel(each, said if each is shown[-1] else "") for each in shown]
     return Plot(4.6 * columns, 4.9 * -(-len(shown) // columns), panels, columns)
 
@@ -41,12 +38,12 @@ def films(result: object) -> Plot:
 def _panel(each: VectorField, said: str) -> Panel:
     low, high = each.places.min(axis=0), each.places.max(axis=0)
     extent = max(float((high - low).max()), 1e-12)
-    margin = ROOM * extent
+    margin = MARGIN * extent
     marks: list[Mark] = [Markers(each.places, ".", 4.0, FAINT, layer=1.0)]
     longest = float(np.hypot(*each.vectors.T).max(initial=0.0))
     bars: list[ScaleBar] = []
     if longest > 0:
-        scale = LONGEST * extent / longest
+        scale = LONGEST_VECTOR * extent / longest
         marks.append(Arrows(each.places, scale * each.vectors, INK, 0.004))
         bar = round_length(1e3 * longest)
         bars = [(1e-3 * scale * bar, INK, f"{bar:g} µm")]

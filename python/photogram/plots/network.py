@@ -26,21 +26,15 @@ from photogram.show.sketch.marks import (
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION
 
-POINTS, PHOTOS, FOOTPRINTS, ELLIPSES, VECTORS = 6000, 2000, 400, 150, 300
-"""How many of each are drawn at most."""
-NAMED = 40
-"""Photos, and control and check points, that are named at most."""
-WITHIN = 0.995
-"""Part of the points that sets the limits of the picture, where others are far away."""
-LARGER = 1.8
-"""Footprints that reach further than so many times the network do not set the limits."""
-HIDES = 0.5
-"""A plane in which a network covers less than this part of what it covers in another hides too much."""
+MAX_POINTS, MAX_PHOTOS, MAX_FOOTPRINTS, MAX_ELLIPSES, MAX_VECTORS = 6000, 2000, 400, 150, 300
+MAX_NAMES = 40  # Of photos, and of control and check points
+CENTRAL = 0.995  # Part of the points that sets the limits if others are far away
+LARGE_FOOTPRINT = 1.8  # Extent in networks beyond which footprints do not set the limits
+MIN_AREA = 0.5  # Area of a plane over the largest area below which the plane hides too much
 CONFIDENCE = 0.95
-RAYS = (1, 2, 3, 4, 5, 7, 10, 20)
-"""Least numbers of rays of the classes of points."""
+MIN_RAYS_OF_CLASSES = (1, 2, 3, 4, 5, 7, 10, 20)
+# Axes to the right, upwards, and out of the plot
 PLANES = {"XY": (0, 1, 2), "XZ": (0, 2, 1), "YZ": (1, 2, 0)}
-"""Axes to the right and up, and the one that is not seen."""
 
 
 def network(result: object, *, plane: str | None = None) -> Plot:
@@ -103,15 +97,15 @@ def _plane(plan: Plan, plane: str | None) -> tuple[int, int, int]:
     if len(known) < 2:
         return PLANES["XY"]
     of_points, of_all = _areas(known), _areas(np.concatenate([known, plan.photos]))
-    there = {name: of_all[name] for name in PLANES if of_points[name] >= HIDES * max(of_points.values())}
+    there = {name: of_all[name] for name in PLANES if of_points[name] >= MIN_AREA * max(of_points.values())}
     # From above, unless that hides most.
-    above = there.get("XY", 0.0) >= HIDES * max(there.values())
+    above = there.get("XY", 0.0) >= MIN_AREA * max(there.values())
     return PLANES["XY" if above else max(there, key=lambda name: there[name])]
 
 
 def _areas(places: Floats) -> dict[str, float]:
     """Return what nearly all of (k, 3) places cover in each plane."""
-    extent = np.ptp(np.quantile(places, [1 - WITHIN, WITHIN], axis=0), axis=0)
+    extent = np.ptp(np.quantile(places, [1 - CENTRAL, CENTRAL], axis=0), axis=0)
     return {name: float(extent[a] * extent[b]) for name, (a, b, _) in PLANES.items()}
 
 
@@ -124,16 +118,16 @@ def _limits(plan: Plan, seen: tuple[int, int, int], outlines: Floats | None = No
     points = plan.points[np.isfinite(plan.points).all(axis=1)][:, axes]
     parts = [plan.photos[:, axes]]
     if len(points):
-        parts.append(np.quantile(points, [1 - WITHIN, WITHIN], axis=0) if len(points) > 500 else points)
+        parts.append(np.quantile(points, [1 - CENTRAL, CENTRAL], axis=0) if len(points) > 500 else points)
         parts.append(points[(plan.kinds != "pass")[np.isfinite(plan.points).all(axis=1)]])
     stations = parts[0]
     if len(stations) > 500:
-        parts[0] = np.quantile(stations, [1 - WITHIN, WITHIN], axis=0)
+        parts[0] = np.quantile(stations, [1 - CENTRAL, CENTRAL], axis=0)
     every = np.concatenate(parts)
     low, high = every.min(axis=0), every.max(axis=0)
     shown = np.empty((0, 2)) if outlines is None else outlines[..., axes].reshape(-1, 2)
     shown = shown[np.isfinite(shown).all(axis=1)]
-    if len(shown) and (np.ptp(shown, axis=0) < LARGER * (high - low).max()).all():
+    if len(shown) and (np.ptp(shown, axis=0) < LARGE_FOOTPRINT * (high - low).max()).all():
         low, high = np.minimum(low, shown.min(axis=0)), np.maximum(high, shown.max(axis=0))
     margin = 0.05 * max(float((high - low).max()), 1e-9)
     return np.array([low - margin, high + margin])
@@ -166,7 +160,7 @@ def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark]
     good = np.flatnonzero(np.isfinite(outlines).all(axis=(1, 2)))
     if not len(good):
         return [], ""
-    chosen, said = thinned("footprints", good, FOOTPRINTS)
+    chosen, said = thinned("footprints", good, MAX_FOOTPRINTS)
     shown = outlines[chosen][:, :, list(seen[:2])]
     inside = float(np.clip(0.4 / len(shown), 0.003, 0.06))
     edge = float(np.clip(25.0 / len(shown), 0.5, 0.7))
@@ -174,7 +168,7 @@ def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark]
 
 
 def _photos(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
-    chosen, said = thinned("photos", np.arange(len(plan.photos)), PHOTOS)
+    chosen, said = thinned("photos", np.arange(len(plan.photos)), MAX_PHOTOS)
     shown = plan.photos[chosen][:, list(seen[:2])]
     size = float(np.clip(60.0 / np.sqrt(len(shown)), 2.0, 7.0))
     colour, label = INK if len(shown) <= 300 else FAINT, f"photo ({len(plan.photos):,})"
@@ -185,10 +179,10 @@ def _points(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
     rows = np.flatnonzero((plan.kinds == "pass") & np.isfinite(plan.points).all(axis=1))
     if not len(rows):
         return [], ""
-    every = np.searchsorted(RAYS, plan.rays, side="right") - 1
+    every = np.searchsorted(MIN_RAYS_OF_CLASSES, plan.rays, side="right") - 1
     classes = every[rows]
     there = np.unique(classes).tolist()
-    chosen, said = thinned("points", rows, POINTS)
+    chosen, said = thinned("points", rows, MAX_POINTS)
     size = float(np.sqrt(np.clip(9000.0 / len(chosen), 2.0, 14.0)))
     colours = rgb(Shades(0.0, 1.0, ""), np.linspace(0.82 if len(there) > 1 else 0.0, 0.0, len(there)))
     marks = list[Mark]()
@@ -200,10 +194,10 @@ def _points(plan: Plan, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
 
 
 def _class(number: int, rays: Indices) -> str:
-    low = RAYS[number]
-    if number + 1 == len(RAYS):
+    low = MIN_RAYS_OF_CLASSES[number]
+    if number + 1 == len(MIN_RAYS_OF_CLASSES):
         return f"{low} rays and more"
-    high = min(RAYS[number + 1] - 1, int(rays.max()))
+    high = min(MIN_RAYS_OF_CLASSES[number + 1] - 1, int(rays.max()))
     return f"{low} ray{'s' * (low > 1)}" if high <= low else f"{low} to {high} rays"
 
 
@@ -222,7 +216,7 @@ def _ellipses(
     if not len(rows) or not axes_of[:, 0].any():
         return []
     extent = float((limits[1] - limits[0]).max())
-    if len(rows) > ELLIPSES:
+    if len(rows) > MAX_ELLIPSES:
         chosen = _of_cells(plan.points[rows][:, pair], axes_of[:, 0], extent / 12.0)
         said.append(f"error ellipses: of {len(rows):,} points, the median one of each of {len(chosen)} cells")
     else:
@@ -275,7 +269,7 @@ def _vectors(
         rows = np.flatnonzero((plan.kinds == kind) & there)
         if not len(rows):
             continue
-        chosen, remark = thinned(f"{kind} points", rows, VECTORS)
+        chosen, remark = thinned(f"{kind} points", rows, MAX_VECTORS)
         said.append(remark)
         size = float(np.clip(60.0 / np.sqrt(len(chosen)), 3.0, 7.0))
         label, places = f"{kind} point ({len(rows):,})", plan.points[chosen][:, pair]
@@ -320,8 +314,8 @@ def _beyond(plan: Plan, seen: tuple[int, int, int], limits: Floats) -> int:
 def _names(plan: Plan, seen: tuple[int, int, int], ends: Floats) -> list[Mark]:
     """Name control and check points, and photos, where these are few."""
     held = np.flatnonzero((plan.kinds != "pass") & np.isfinite(plan.points).all(axis=1))
-    held = held if len(held) <= NAMED else held[:0]
-    photos = np.arange(len(plan.photos) if len(plan.photos) <= NAMED else 0)
+    held = held if len(held) <= MAX_NAMES else held[:0]
+    photos = np.arange(len(plan.photos) if len(plan.photos) <= MAX_NAMES else 0)
     places = np.concatenate([plan.points[held], plan.photos[photos]])[:, list(seen[:2])]
     texts = [plan.point_ids[row] for row in held.tolist()] + [plan.photo_ids[row] for row in photos.tolist()]
     colours = [INK] * len(held) + [SOFT] * len(photos)

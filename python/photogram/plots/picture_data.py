@@ -1,13 +1,13 @@
-"""What pictures are drawn from: arrays that every adjusted network has, in metric axes.
+"""The data of plots: arrays that every adjusted network has, in metric axes.
 
-A picture knows no class of results. `pictured` gives what it draws; the file `pictured.py` beside each class
-of results defines it for that class, and is imported with its package.
+A plot knows no class of results: `pictured` returns its data. A file `picture_data.py` of each package of
+results defines `pictured` for its class.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,68 +20,34 @@ from photogram.statistics.findings import Observations
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A network in metric axes.
+    """A network of P photos and n points in metric axes."""
 
-    Attributes
-    ----------
-    axes, unit
-        What the three axes are called, and what lengths along them are measured in; no unit where the scale
-        of the object space is arbitrary.
-    photo_ids, photos
-        Names, and (P, 3) stations.
-    point_ids, points
-        Names, and (n, 3) positions; NaN for points that were left out.
-    rays
-        (n,) numbers of images of the points.
-    kinds
-        (n,) `control`, `check` or `pass`.
-    differences
-        (n, 3) adjusted minus given coordinates of control and check points; NaN where none are given.
-    """
-
-    axes: tuple[str, str, str]
-    unit: str
+    axes: tuple[str, str, str]  # Names of the axes
+    unit: str  # Of lengths; empty if the scale of the object space is arbitrary
     photo_ids: Sequence[str]
-    photos: Floats
+    photos: Floats  # (P, 3) stations
     point_ids: Sequence[str]
-    points: Floats
-    rays: Indices
-    kinds: NDArray[np.str_]
-    differences: Floats
+    points: Floats  # (n, 3) positions; NaN for points that did not take part
+    rays: Indices  # (n,) numbers of images
+    kinds: NDArray[np.str_]  # (n,) `control`, `check` or `pass`
+    differences: Floats  # (n, 3) adjusted minus given coordinates of control and check points; NaN for others
 
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """Image observations that took part.
+    """The m image observations that took part."""
 
-    Attributes
-    ----------
-    unit
-        Of image coordinates: `mm` or `px`.
-    photos, points
-        (m,) which photo and which point.
-    xy, residuals, redundancy
-        (m, 2) image coordinates, observed minus adjusted, and redundancy numbers (NaN without covariances).
-    cameras
-        (m,) which of the cameras.
-    names
-        What the cameras are called.
-    down
-        Whether y counts downwards, as rows of pixels do.
-    scanned
-        (m,) whether the coordinates are sample and line of a scanner: residuals are in its focal plane all
-        the same. Such images have cameras of their own.
-    """
-
-    unit: str
-    photos: Indices
+    unit: str  # Of image coordinates: `mm` or `px`
+    photos: Indices  # (m,) rows of photos and of points
     points: Indices
-    xy: Floats
-    residuals: Floats
-    redundancy: Floats
-    cameras: Indices
-    names: Sequence[str]
-    down: bool
+    xy: Floats  # (m, 2) image coordinates
+    residuals: Floats  # (m, 2) observed minus adjusted
+    redundancy: Floats  # (m, 2) redundancy numbers; NaN without covariances
+    cameras: Indices  # (m,) rows of cameras
+    names: Sequence[str]  # Of the cameras
+    down: bool  # Whether y counts downwards, as rows of pixels
+    # (m,) whether coordinates are sample and line of a scanner. Their residuals are in its focal plane. Such
+    # images have cameras of their own.
     scanned: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def of_scanner(self, camera: int) -> bool:
@@ -90,8 +56,12 @@ class Images:
 
     @property
     def shown_as(self) -> tuple[float, str]:
-        """What residuals are multiplied by, and the unit that they then have."""
-        return (1000.0, "µm") if self.unit == "mm" else (1.0, self.unit)
+        """The factor of residuals in plots, and their unit."""
+        return _enlarged(self.unit)
+
+
+def _enlarged(unit: str) -> tuple[float, str]:
+    return (1000.0, "µm") if unit == "mm" else (1.0, unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,21 +76,11 @@ class Correlated:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve over r radii.
-
-    Attributes
-    ----------
-    name
-        What it is.
-    values
-        (r,) the curve.
-    bands
-        (r,) standard deviations by what they are of.
-    """
+    """A curve over r radii."""
 
     name: str
-    values: Floats
-    bands: dict[str, Floats]
+    values: Floats  # (r,)
+    bands: dict[str, Floats]  # (r,) standard deviations by their names
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,8 +97,8 @@ class Curves:
 
     @property
     def shown_as(self) -> tuple[float, str]:
-        """What the curves are multiplied by, and the unit that they then have."""
-        return (1000.0, "µm") if self.unit == "mm" else (1.0, self.unit)
+        """The factor of the curves in plots, and their unit."""
+        return _enlarged(self.unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +114,7 @@ class Deviations:
 
     @property
     def shown_as(self) -> tuple[float, str]:
-        """What deviations are multiplied by, and the unit that they then have."""
+        """The factor of deviations in plots, and their unit."""
         largest = float(np.abs(self.values).max(initial=0.0))
         small = {"m": (1e6, "µm") if largest < 1e-3 else (1e3, "mm"), "mm": (1e3, "µm")}
         return small[self.unit] if self.unit in small and largest < 1.0 else (1.0, self.unit)
@@ -170,53 +130,44 @@ class VectorField:
     labels: Sequence[str] = ()  # What the places are called, or nothing
 
 
-class Pictured(ABC):
-    """What is drawn of an adjusted network. Each part is computed when it is asked for."""
+class Pictured(Protocol):
+    """The data of the plots of an adjusted network; each part is computed when it is used."""
 
     @property
-    @abstractmethod
     def title(self) -> str:
-        """What the network is called; nothing where it has no name."""
+        """Name of the network, or an empty text."""
 
     @property
-    @abstractmethod
     def plan(self) -> Plan:
         """The network."""
 
-    @abstractmethod
     def covariances(self, points: Indices) -> Floats:
-        """Return (k, 3, 3) covariances of points along the axes of the plan; NaN where there are none."""
+        """Return (k, 3, 3) covariances of points along the axes of the plan; NaN if there are none."""
 
     @property
-    @abstractmethod
     def footprints(self) -> Floats:
-        """(P, v, 3) closed outlines, in the axes of the plan, of what photos show of level ground.
+        """(P, v, 3) closed outlines of photos on level ground, in the axes of the plan.
 
-        NaN for photos that show none of it; (0, v, 3) where no axis of the plan is vertical.
+        NaN for photos without ground; (0, v, 3) if no axis of the plan is vertical.
         """
 
     @property
-    @abstractmethod
     def images(self) -> Images:
         """The image observations that took part."""
 
     @property
-    @abstractmethod
     def tested(self) -> list[Observations]:
-        """All observations with their standardized residuals, kind by kind."""
+        """All observations with their standardized residuals, by kind."""
 
     @property
-    @abstractmethod
     def unit_weight(self) -> float:
-        """The root of the variance of unit weight; 1 where there is none."""
+        """The root of the variance of unit weight; 1 if there is none."""
 
     @property
-    @abstractmethod
     def correlations(self) -> list[Correlated]:
         """Cameras with two or more estimated parameters; none without covariances."""
 
     @property
-    @abstractmethod
     def distortion(self) -> list[Curves]:
         """Cameras with radial distortion."""
 

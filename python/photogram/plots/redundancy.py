@@ -15,16 +15,11 @@ from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Markers, Mesh, Shades
 from photogram.show.sketch.plot import Plot
 
-SINGLE = 600
-"""Image points that are drawn one by one at most."""
-CELLS = 16
-"""Along the longer side of the frame."""
-POINTS = 6000
-"""Points of the network that are drawn one by one at most; of more, the means of cells."""
-CELLS_OF_PLAN = 60
-"""Along the longer side of the network."""
-PHOTOS = 1000
-"""That are marked at most."""
+MAX_SINGLE_IMAGES = 600  # More image points are drawn as means of cells
+CELLS_OF_FRAME = 16  # Along the longer side
+MAX_SINGLE_POINTS = 6000  # More points of the network are drawn as means of cells
+CELLS_OF_NETWORK = 60  # Along the longer side
+MAX_PHOTOS = 1000
 SHADES = Shades(0.0, 1.0, "redundancy number, 0 to 1")
 
 
@@ -54,10 +49,10 @@ def _over_frame(images: Images, values: Floats) -> Panel:
     kept = ~images.scanned if images.scanned.any() and not scanned else np.ones(len(values), dtype=bool)
     xy, shown = images.xy[kept], values[kept]
     said = "" if kept.all() else f"{np.count_nonzero(~kept):,} images of scanners are left out"
-    grid = cells(xy, CELLS)
+    grid = cells(xy, CELLS_OF_FRAME)
     over = "samples and lines" if scanned else "the frame"
     marks, cells_are = _shaded(xy, shown, np.sqrt(14.0)), ""
-    if len(shown) > SINGLE:
+    if len(shown) > MAX_SINGLE_IMAGES:
         marks, cells_are = _mesh(grid, shown, "images")
     return replace(
         frame(images, grid.edges, scanned=scanned),
@@ -79,9 +74,9 @@ def _over_network(drawn: Pictured, values: Floats) -> Panel:
     rows, places = rows[inside], places[inside]
     size = float(np.sqrt(np.clip(9000.0 / max(len(rows), 1), 3.0, 20.0)))
     marks, cells_are = _shaded(places, least[rows], size), ""
-    if len(rows) > POINTS:
-        marks, cells_are = _mesh(cells(places, CELLS_OF_PLAN), least[rows], "points")
-    photos, _ = thinned("photos", np.arange(len(plan.photos)), PHOTOS)
+    if len(rows) > MAX_SINGLE_POINTS:
+        marks, cells_are = _mesh(cells(places, CELLS_OF_NETWORK), least[rows], "points")
+    photos, _ = thinned("photos", np.arange(len(plan.photos)), MAX_PHOTOS)
     stations = Markers(plan.photos[photos][:, list(seen[:2])], "+", 3.0, edge=0.5, opacity=0.5)
     title = "Over the network: the least of the images of a point"
     return replace(panel, marks=[marks, stations], title=title, notes=[cells_are])

@@ -14,22 +14,14 @@ from photogram.show.sketch.marks import Arrows, Mark, Markers
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 
-SINGLE = 900
-"""Image points of a camera whose residuals are drawn one by one at most; of more, the means of cells."""
-CELLS = 16
-"""Along the longer side of the frame at most."""
-IN_CELL = 12
-"""Images of a cell on the average, at least."""
-CAMERAS = 6
-"""That have a panel at most: those with the most images."""
-FEWEST = 8
-"""Images of a cell whose mean is drawn."""
-ROOM = 0.06
-"""Around the frame, of its longer side."""
-LONGEST = 2.5
-"""Vectors that are longer than so many times the scale's are cut short."""
-LEVEL = 0.01
-"""Of a false alarm in any cell of a panel."""
+MAX_SINGLE_IMAGES = 900  # More image points of a camera are drawn as means of cells
+MAX_CELLS = 16  # Along the longer side of the frame
+MEAN_IMAGES_OF_CELL = 12
+MAX_CAMERAS = 6  # Those with the most images
+MIN_IMAGES = 8
+MARGIN = 0.06  # Around the frame, as a part of its longer side
+LONGEST_VECTOR = 2.5  # Multiple of the typical vector; longer vectors are cut short
+LEVEL = 0.01  # Probability of a false alarm in any cell of a panel
 
 
 def residuals(result: object) -> Plot:
@@ -44,8 +36,8 @@ def residuals(result: object) -> Plot:
     width = 6.4 if columns == 1 else 4.2 * columns
     shown = images.cameras == cameras[0]
     extent = np.ptp(images.xy[shown], axis=0) if shown.any() else np.ones(2)
-    across, up = np.maximum(extent + 2 * ROOM * extent.max(), 1e-12)
-    many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > SINGLE
+    across, up = np.maximum(extent + 2 * MARGIN * extent.max(), 1e-12)
+    many = np.bincount(images.cameras[np.isin(images.cameras, cameras)]).max(initial=0) > MAX_SINGLE_IMAGES
     # Title, scale and labels; where means are drawn, also what they are.
     beside = 1.95 if many else 1.25
     high = rows * (float(np.clip(up / across, 0.3, 1.5)) * (width / columns - 0.75) + beside)
@@ -53,7 +45,7 @@ def residuals(result: object) -> Plot:
     return Plot(width, high, found, columns)
 
 
-def largest_cameras(images: Images, most: int = CAMERAS) -> tuple[list[int], str]:
+def largest_cameras(images: Images, most: int = MAX_CAMERAS) -> tuple[list[int], str]:
     """Return the cameras with the most images, in their order, and what is to be said of the others."""
     counts = np.bincount(images.cameras, minlength=len(images.names))
     there = int((counts > 0).sum())
@@ -67,7 +59,7 @@ def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
 
     Of a scanner they are samples and lines, upwards: so residuals point as they do in its focal plane.
     """
-    margin = ROOM * float((edges[1] - edges[0]).max())
+    margin = MARGIN * float((edges[1] - edges[0]).max())
     limits = edges + margin * np.array([[-1.0], [1.0]])
     if images.down and not scanned:
         limits[:, 1] = limits[::-1, 1]
@@ -82,11 +74,11 @@ def _field(images: Images, camera: int, left_out: str) -> Panel | None:
     factor, unit = images.shown_as
     if not len(xy):
         return None
-    longer = int(np.clip(np.sqrt(len(xy) / IN_CELL), 6, CELLS))
+    longer = int(np.clip(np.sqrt(len(xy) / MEAN_IMAGES_OF_CELL), 6, MAX_CELLS))
     grid = cells(xy, longer)
     scanned = images.of_scanner(camera)
     remark: list[str] = []
-    if len(xy) <= SINGLE:
+    if len(xy) <= MAX_SINGLE_IMAGES:
         places, shown, colours = xy, vectors, [INK] * len(xy)
     else:
         places, shown, colours, remark = _means(grid, vectors)
@@ -96,8 +88,8 @@ def _field(images: Images, camera: int, left_out: str) -> Panel | None:
     extent = float((grid.edges[1] - grid.edges[0]).max())
     bars: list[ScaleBar] = []
     if size > 0:
-        scale = 0.7 * extent / longer / size if len(xy) > SINGLE else 0.045 * extent / size
-        longest = LONGEST * 0.1 * extent / scale
+        scale = 0.7 * extent / longer / size if len(xy) > MAX_SINGLE_IMAGES else 0.045 * extent / size
+        longest = LONGEST_VECTOR * 0.1 * extent / scale
         lengths = np.hypot(*shown.T)
         cut = int((lengths > longest).sum())
         shown = shown * np.minimum(1.0, longest / np.maximum(lengths, 1e-300))[:, np.newaxis]
@@ -121,13 +113,13 @@ def _means(grid: Cells, vectors: Floats) -> tuple[Floats, Floats, list[str], lis
 
     means = np.column_stack([grid.means(vectors[:, axis]) for axis in (0, 1)])
     variance = (vectors**2).mean(axis=0)
-    filled = np.flatnonzero(grid.counts >= min(FEWEST, int(grid.counts.max())))
+    filled = np.flatnonzero(grid.counts >= min(MIN_IMAGES, int(grid.counts.max())))
     with np.errstate(invalid="ignore", divide="ignore"):
         square = (means[filled] ** 2 * grid.counts[filled, np.newaxis] / variance).sum(axis=1)
     beyond = square > critical_chi_square(LEVEL / len(filled), 2)
     colours = np.where(beyond, MARKED, INK).tolist()
     per_cell = _between(grid.counts[filled])
-    said = [f"means of cells with {per_cell} images,", f"those with less than {FEWEST} are left out"]
+    said = [f"means of cells with {per_cell} images,", f"those with less than {MIN_IMAGES} are left out"]
     if beyond.any():
         said.append(f"{int(beyond.sum())} of {len(filled)} are larger than chance gives (coloured)")
     return grid.middles[filled], means[filled], colours, said

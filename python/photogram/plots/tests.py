@@ -22,15 +22,11 @@ from photogram.statistics.patterns import SPEAKING
 if TYPE_CHECKING:
     from photogram.statistics.findings import Observations
 
-QUANTILES = 1500
-"""Test values that are drawn against the normal distribution at most; the largest are always among them."""
-ENDS = 200
-"""Of these, the smallest and largest, each."""
-NAMED = 5
-"""Test values beyond the limit that are named at most."""
+MAX_QUANTILES = 1500  # Test values drawn against the normal distribution, with all of the ends
+END_VALUES = 200  # Smallest and largest test values that are all drawn
+MAX_NAMES = 5
 LEVEL = 0.05
-WIDEST = 6.0
-"""What the histogram shows: values beyond are counted at its ends."""
+MAX_TEST_VALUE = 6.0  # The histogram counts test values beyond at its ends
 
 
 def tests(result: object) -> Plot:
@@ -62,7 +58,7 @@ def _speaking(group: Observations) -> Observations:
 
 
 def _histogram(values: Floats, unit_weight: float) -> Panel:
-    reach = float(np.clip(1.02 * np.abs(values).max(), 3.5 * min(unit_weight, 1.0), WIDEST))
+    reach = float(np.clip(1.02 * np.abs(values).max(), 3.5 * min(unit_weight, 1.0), MAX_TEST_VALUE))
     number = int(np.clip(2 * round(np.sqrt(len(values))), 12, 60))
     edges = np.linspace(-reach, reach, number + 1)
     counts, _ = np.histogram(values, edges)
@@ -136,10 +132,12 @@ def _count(values: Floats, limit: float) -> str:
 
 def _rows(n: int) -> Any:
     """Return which of n ordered values are drawn: all of the ends, and as many between as there is room."""
-    if n <= QUANTILES:
+    if n <= MAX_QUANTILES:
         return np.arange(n)
-    inner = np.linspace(ENDS, n - ENDS - 1, QUANTILES - 2 * ENDS).round().astype(np.int64)
-    return np.concatenate([np.arange(ENDS), inner, np.arange(n - ENDS, n)])
+    inner = np.linspace(END_VALUES, n - END_VALUES - 1, MAX_QUANTILES - 2 * END_VALUES)
+    return np.concatenate(
+        [np.arange(END_VALUES), inner.round().astype(np.int64), np.arange(n - END_VALUES, n)]
+    )
 
 
 def _worst(groups: list[Observations], limit: float) -> list[tuple[float, str]]:
@@ -147,12 +145,12 @@ def _worst(groups: list[Observations], limit: float) -> list[tuple[float, str]]:
     found = []
     for each in groups:
         sizes = np.nan_to_num(np.abs(each.values))
-        order = np.argsort(-sizes, axis=None)[:NAMED]
+        order = np.argsort(-sizes, axis=None)[:MAX_NAMES]
         for flat in order.tolist():
             index = tuple(int(k) for k in np.unravel_index(flat, sizes.shape))
             if sizes[index] > limit:
                 found.append((float(each.values[index]), each.name(index)))
-    return sorted(found, key=lambda pair: -abs(pair[0]))[:NAMED]
+    return sorted(found, key=lambda pair: -abs(pair[0]))[:MAX_NAMES]
 
 
 @cache

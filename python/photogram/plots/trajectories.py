@@ -14,11 +14,9 @@ from photogram.show.sketch.marks import Line, Mark, band, error_bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, GREEN, INK, VERMILION
 
-TIMES = 160
-"""At which corrections and their bands are computed."""
+TIMES_OF_CURVE = 160
 COLOURS = (BLUE, VERMILION, GREEN)
-TALL = 0.03
-"""Marks of the times of observations, of the height of a panel."""
+TICK_HEIGHT = 0.03  # Of the times of observations, as a part of the height of the panel
 
 
 def trajectory(result: Any, *, name: str | None = None) -> Plot:
@@ -47,7 +45,7 @@ def trajectory(result: Any, *, name: str | None = None) -> Plot:
     first, last = own.given.table.span
     if not last > first:
         raise InputError(f"the trajectory {name} has one record, and so no span of time")
-    times = np.linspace(first, last, TIMES)
+    times = np.linspace(first, last, TIMES_OF_CURVE)
     corrections, sd = own.corrections(times), own.poses(times).sd
     records = [
         each.moment.time
@@ -74,5 +72,5 @@ def _panel(times: Floats, values: Floats, sd: Floats, records: list[float], head
         marks.append(Line(np.column_stack([times, own]), colour, 1.2, label="xyz"[k]))
     if records:
         feet = np.column_stack([records, np.full(len(records), low)])
-        marks.append(Line(error_bars(feet, feet[:, 1], feet[:, 1] + TALL * (high - low)), INK, 1.0))
+        marks.append(Line(error_bars(feet, feet[:, 1], feet[:, 1] + TICK_HEIGHT * (high - low)), INK, 1.0))
     return Panel(np.column_stack([spread(times), (low, high)]), marks, "", "time, s", head)

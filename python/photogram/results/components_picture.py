@@ -12,10 +12,8 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK, MARKED
 from photogram.statistics.components import Component
 
-INCHES = 0.32
-"""Of height for each component."""
-ROOM = 1.1
-"""By what limits are beyond the values."""
+INCHES_OF_COMPONENT = 0.32
+MARGIN = 1.1  # Limits over the extreme values
 
 
 def components_sketch(components: Sequence[Component]) -> Plot:
@@ -32,9 +30,9 @@ def components_sketch(components: Sequence[Component]) -> Plot:
     known = np.concatenate([mark.places[:, 0] for mark in marks if isinstance(mark, Line | Markers)])
     known = np.append(known[np.isfinite(known) & (known > 0)], 1.0)
     up = (len(components) - 0.5, -0.5)
-    limits = np.column_stack([(known.min() / ROOM, known.max() * ROOM), up])
+    limits = np.column_stack([(known.min() / MARGIN, known.max() * MARGIN), up])
     given = Line(np.column_stack([[1.0, 1.0], up]), FAINT, 0.8)
     across = "factor of the given standard deviation, 95 percent; circles: held"
     names = [each.name for each in components]
     panel = Panel(limits, [given, *marks], "", across, up_names=names, log_across=True)
-    return Plot(6.4, 1.6 + INCHES * len(components), [panel])
+    return Plot(6.4, 1.6 + INCHES_OF_COMPONENT * len(components), [panel])

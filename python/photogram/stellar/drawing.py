@@ -15,8 +15,7 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, INK, MARKED, SKY
 from photogram.stellar.curves import histogram
 
-_LENGTH = 0.05
-"""Length of a residual of the mean size, of the extent of the picture."""
+_MEAN_RESIDUAL = 0.05  # Length in the plot, as a part of its extent
 
 
 def band(x: Floats, y: Floats, error: Floats, colour: str, label: str) -> list[Mark]:
@@ -49,7 +48,7 @@ def vectors(
     """
     extent = float(np.ptp(places, axis=0).max()) or 1.0
     size = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) or 1.0
-    scale = _LENGTH * extent / size
+    scale = _MEAN_RESIDUAL * extent / size
     marks = [
         Arrows(places[chosen], scale * residuals[chosen], COLOURS[k % len(COLOURS)], 0.0022, label=label)
         for k, (label, chosen) in enumerate(groups)

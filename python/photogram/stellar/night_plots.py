@@ -15,8 +15,7 @@ from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.drawing import band, bells, curves, vectors
 from photogram.stellar.night_result import CalibratedNight
 
-_NAMED = len(COLOURS)
-"""Exposures that have a colour of their own; more are drawn alike."""
+_MAX_COLOURS = len(COLOURS)  # More exposures are drawn alike
 
 
 def sketches(result: CalibratedNight) -> dict[str, Plot]:
@@ -44,7 +43,7 @@ def _frame(result: CalibratedNight, title: str, marks: Sequence[Mark], bars: Seq
 
 def _groups(result: CalibratedNight) -> list[tuple[str, Any]]:
     of = result.calibration.exposures
-    if len(result.names) > _NAMED:
+    if len(result.names) > _MAX_COLOURS:
         return [(f"{len(result.names)} exposures", np.ones(len(of), bool))]
     return [(f"exposure {name}", of == k) for k, name in enumerate(result.names)]
 

@@ -27,14 +27,10 @@ __all__ = [
     "steps_of_125",
 ]
 
-DOTS = 4000
-"""Corners that are drawn: of more every so many-th."""
-ARROWS = 24
-"""Vectors along the longer side of a picture."""
-WIDTH = 7.6
-"""Inches."""
-STEPS = 4
-"""Of colour from one contour to the next."""
+MAX_CORNERS = 4000
+VECTORS_ACROSS = 24  # Along the longer side of a picture
+WIDTH_INCHES = 7.6
+COLOURS_OF_LEVEL = 4  # Steps of colour from one contour to the next
 
 
 def steps_of_125(low: float, high: float) -> Floats:
@@ -57,7 +53,7 @@ def plot_uncertainty(found: UncertaintyMap) -> Plot:
     marks = [*_known(found), *_seen(found.corners, found.coverage)]
     panel = _map(found.size, found.columns, found.rows, found.sd, "px", marks)
     title = found.title + "\n" + found.model.replace("; ", "\n")
-    return Plot(WIDTH, _height(found.size), [replace(panel, title=title)])
+    return Plot(WIDTH_INCHES, _height(found.size), [replace(panel, title=title)])
 
 
 def plot_uncertainty_curve(found: UncertaintyCurve) -> Plot:
@@ -96,7 +92,7 @@ def plot_uncertainty_curve(found: UncertaintyCurve) -> Plot:
         log_across=True,
         log_up=True,
     )
-    return Plot(WIDTH, 0.6 * WIDTH, [panel])
+    return Plot(WIDTH_INCHES, 0.6 * WIDTH_INCHES, [panel])
 
 
 def plot_difference(found: CameraDifference) -> Plot:
@@ -117,7 +113,7 @@ def plot_difference(found: CameraDifference) -> Plot:
     rows = len(found.distances)
     columns = len(panels) // rows
     panels[-columns] = replace(panels[-columns], notes=found.remarks)
-    return Plot(WIDTH * columns, rows * _height(found.size), panels, columns)
+    return Plot(WIDTH_INCHES * columns, rows * _height(found.size), panels, columns)
 
 
 def plot_cross_validation(cross: CrossValidation, over: UncertaintyMap) -> Plot:
@@ -136,7 +132,7 @@ def plot_cross_validation(cross: CrossValidation, over: UncertaintyMap) -> Plot:
     away = distance_text(over.distance, over.unit)
     left = own.panel(f"{over.camera}: second part of the views less the first, {away}, px")
     panels = [replace(left, notes=[cross.verdict]), own.beside(found.chi2.reshape(shape) / 2)]
-    return Plot(2 * WIDTH, _height(over.size), panels, 2)
+    return Plot(2 * WIDTH_INCHES, _height(over.size), panels, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +148,7 @@ class _Apart:
     def panel(self, title: str) -> Panel:
         """Return lengths as contours, and some of the vectors, the longest as long as they are apart."""
         lengths = np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
-        step = max(1, round(len(self.columns) / ARROWS))
+        step = max(1, round(len(self.columns) / VECTORS_ACROSS))
         every = (slice(None, None, step), slice(None, None, step))
         places = np.stack(np.meshgrid(self.columns, self.rows), axis=-1)[every].reshape(-1, 2)
         vectors = self.vectors[every].reshape(-1, 2)
@@ -170,7 +166,7 @@ class _Apart:
 
 
 def _height(size: tuple[int, int]) -> float:
-    return 1.1 + 0.82 * WIDTH * size[1] / size[0]
+    return 1.1 + 0.82 * WIDTH_INCHES * size[1] / size[0]
 
 
 def _map(
@@ -191,7 +187,7 @@ def _map(
     levels = steps_of_125(max(float(positive.min()), lowest * high), high)
     shades = Shades(float(levels[0]), float(levels[-1]), unit, log=True)
     shown = np.where(values > 0, values, np.nan)
-    contours = Contours(columns, rows, shown, levels, shades, steps=STEPS)
+    contours = Contours(columns, rows, shown, levels, shades, steps=COLOURS_OF_LEVEL)
     return replace(panel, marks=[contours, *marks], shades=shades)
 
 
@@ -213,7 +209,7 @@ def _known(found: UncertaintyMap) -> list[Mark]:
 def _seen(corners: Floats, coverage: Floats) -> list[Mark]:
     if not len(corners):
         return []
-    step = -(-len(corners) // DOTS)
+    step = -(-len(corners) // MAX_CORNERS)
     return [
         Markers(corners[::step], ".", 2.5, "white", edge=0.0, opacity=0.6),
         Line(np.vstack([coverage, coverage[:1]]), VERMILION, 1.2),

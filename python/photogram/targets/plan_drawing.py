@@ -16,8 +16,7 @@ from photogram.targets.view_plan_result import ViewPlan
 
 __all__ = ["plot_planned_views"]
 
-ACROSS, PANEL = 4, 2.2
-"""Panels side by side, and how wide each is, inches."""
+ACROSS, PANEL = 4, 2.2  # Panels side by side, and the width of a panel in inches
 
 
 def plot_planned_views(plan: ViewPlan) -> Plot:

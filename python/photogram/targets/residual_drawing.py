@@ -19,10 +19,8 @@ from photogram.targets.tables import view_rms
 
 __all__ = ["plot_board_residuals", "plot_poorest_views"]
 
-POOREST = 3
-"""Views that are drawn."""
-LONGEST, OUTLIER = 1.5, 3.0
-"""Spacings of the points, of the longest vector; what one that is far longer takes of these."""
+MAX_VIEWS = 3
+LONGEST, OUTLIER = 1.5, 3.0  # Longest vector in spacings of the points; limit of one that is far longer
 
 
 def plot_board_residuals(calibrated: Calibrated) -> Plot:
@@ -59,7 +57,7 @@ def plot_poorest_views(calibrated: Calibrated) -> Plot:
     corners, result = calibrated.calibration.corners, calibrated.result
     picture = corners.picture[corners.use]
     rms = view_rms(picture, result.residuals, len(corners.pictures))
-    worst = np.argsort(-np.nan_to_num(rms), kind="stable")[:POOREST].tolist()
+    worst = np.argsort(-np.nan_to_num(rms), kind="stable")[:MAX_VIEWS].tolist()
     panels = []
     for each in worst:
         own = picture == each

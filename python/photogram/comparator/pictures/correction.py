@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from photogram.comparator.polynomial import Polynomial
 
 FINE = 121
-MAGNIFICATION = 10_000
-"""Of the net: a micrometre is drawn as 10 mm."""
+MAGNIFICATION = 10_000  # Of the net: a micrometre is drawn as 10 mm
 
 
 def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:

@@ -9,11 +9,11 @@ import numpy as np
 
 from photogram.comparator.pictures.style import (
     ACCENT,
-    ACROSS,
     MAIN,
     MM,
     OF_COMPARATOR,
     OF_PLATE,
+    PANELS_ACROSS,
     plan,
     spacing,
 )
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from photogram.comparator.pointing import Ellipse, Precision
 
 LEVELS = " / ".join(str(percent) for percent in CONFIDENCE_FACTORS)
-LEAST = 39
-"""Percent of the standard ellipse, which the program draws."""
+STANDARD_PERCENT = 39  # Of the standard ellipse, which the program draws
 
 
 def pointing_ellipses(calibration: Calibration) -> Plot:
@@ -45,7 +44,7 @@ def pointing_ellipses(calibration: Calibration) -> Plot:
     panels = [
         plan(
             limits,
-            _ellipses(at, own, {LEAST: scale}),
+            _ellipses(at, own, {STANDARD_PERCENT: scale}),
             f"case {case.number}, pooled {case.placed.precision.sd_point_um:.2f} µm",
             OF_COMPARATOR,
             (scale, round_length(largest)),
@@ -53,7 +52,7 @@ def pointing_ellipses(calibration: Calibration) -> Plot:
         for at, case, own in zip(places, calibration.cases, ellipses, strict=True)
     ]
     return side_by_side(
-        panels, ACROSS, 3.4, "Error ellipses of single pointings (39 percent; * no deviation)"
+        panels, PANELS_ACROSS, 3.4, "Error ellipses of single pointings (39 percent; * no deviation)"
     )
 
 
@@ -117,7 +116,7 @@ def pooled_ellipses(calibration: Calibration) -> Plot:
         for name, own in known
     ]
     title = f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)"
-    return side_by_side(panels or [Panel(limits)], ACROSS, 2.6, title)
+    return side_by_side(panels or [Panel(limits)], PANELS_ACROSS, 2.6, title)
 
 
 def _scale(places_mm: Floats, largest_um: float) -> float:
@@ -131,7 +130,7 @@ def _ellipses(places: Floats, ellipses: Sequence[Ellipse], scales: Mapping[int, 
     turns = np.degrees([each.angle_rad for each in ellipses])
     marks: list[Mark] = [Markers(places, "+", 4.0, FAINT)]
     for percent, scale in scales.items():
-        colour, width = (MAIN, 1.0) if percent == LEAST else (FAINT, 0.7)
+        colour, width = (MAIN, 1.0) if percent == STANDARD_PERCENT else (FAINT, 0.7)
         marks.append(Ellipses(places, scale * semi_axes, turns, colour, width))
     none = places[semi_axes[:, 0] == 0.0]
     return [*marks, Markers(none, "*", 5.0, ACCENT)] if len(none) else marks

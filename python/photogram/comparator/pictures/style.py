@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 MAIN, ACCENT = BLUE, VERMILION
 MM = 1000.0
-ACROSS = 4
-"""Panels beside each other."""
+PANELS_ACROSS = 4
 OF_PLATE = ("X of the plate, mm", "Y of the plate, mm")
 OF_COMPARATOR = ("x, mm", "y, mm")
 

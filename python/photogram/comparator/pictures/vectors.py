@@ -10,10 +10,10 @@ import numpy as np
 from photogram.comparator.case import exchanged
 from photogram.comparator.pictures.style import (
     ACCENT,
-    ACROSS,
     MM,
     OF_COMPARATOR,
     OF_PLATE,
+    PANELS_ACROSS,
     arrows,
     limits_of,
     magnification,
@@ -80,7 +80,7 @@ def _by_case(
         )
         for case, own, vector in zip(calibration.cases, places, vectors, strict=True)
     ]
-    return side_by_side(panels, ACROSS, 3.4, title)
+    return side_by_side(panels, PANELS_ACROSS, 3.4, title)
 
 
 def average_vectors(calibration: Calibration, plate: int) -> Plot:
@@ -106,7 +106,7 @@ def average_vectors(calibration: Calibration, plate: int) -> Plot:
     marks, title = arrows(own, corrections, scale, ACCENT), "by grid point: correction of the grid"
     panels.append(plan(limits_of(own, corrections, scale), marks, title, OF_PLATE, key))
     return side_by_side(
-        panels, ACROSS, 4.2, f"Average residuals of {len(averages.cases)} cases, plate {plate}"
+        panels, PANELS_ACROSS, 4.2, f"Average residuals of {len(averages.cases)} cases, plate {plate}"
     )
 
 

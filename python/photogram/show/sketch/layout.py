@@ -17,17 +17,12 @@ from photogram.show.sketch.marks import Labelled, Level, Line, Markers, Polygons
 from photogram.show.sketch.names import Box
 from photogram.show.sketch.ticks import Ticks, ticks
 
-HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0
-"""Sizes of letters, as in the settings of matplotlib."""
+HEAD, TITLE, LABEL, NUMBER, LEGEND, NOTE, NAME = 11.0, 10.0, 9.0, 8.0, 8.0, 7.5, 7.0  # Sizes of letters
 HEAD_LINE, TITLE_LINE, NOTE_LINE, LEGEND_LINE, BAR_LINE = 15.0, 13.0, 9.6, 11.5, 12.0
-SWATCH = 16.0
-"""Width of the sample of a mark in a legend."""
-GAP = 8.0
-"""Between things that have nothing to do with each other."""
-OF_COLOURS = 62.0
-"""Width of the bar of colours with all that is written beside it."""
-SMALLEST = 40.0
-"""Sides of a box at least."""
+SWATCH = 16.0  # Width of the sample of a mark in a legend
+GAP = 8.0  # Between unrelated things
+COLOUR_BAR = 62.0  # Width of a bar of colours with its numbers and name
+MIN_SIDE = 40.0  # Of a box
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +95,7 @@ def laid_out(sketch: Sketch) -> list[Placed]:
         said.append((numbered, title, notes))
         tops[row] = max(tops[row], above(panel, title))
         belows[row] = max(belows[row], below(panel, numbered) + NOTE_LINE * len(notes) + GAP)
-    high = max((72.0 * sketch.height - head - sum(tops) - sum(belows)) / sketch.rows, SMALLEST)
+    high = max((72.0 * sketch.height - head - sum(tops) - sum(belows)) / sketch.rows, MIN_SIDE)
     sizes = [_size(panel, wide, high) for *_, panel in cells]
     # Panels that are lower than there is room leave none of it between them.
     heights = [0.0] * sketch.rows
@@ -137,8 +132,8 @@ def _columns(
         for known, own in zip((numbers, named, rights), sides, strict=True):
             known[column] = max(known[column], own)
     lefts = [one + other for one, other in zip(numbers, named, strict=True)]
-    beside = sum(lefts) + sum(rights) + (OF_COLOURS if sketch.shades else 0.0)
-    return lefts, rights, max((72.0 * sketch.width - beside) / sketch.columns, SMALLEST)
+    beside = sum(lefts) + sum(rights) + (COLOUR_BAR if sketch.shades else 0.0)
+    return lefts, rights, max((72.0 * sketch.width - beside) / sketch.columns, MIN_SIDE)
 
 
 def above(panel: Panel, title: list[str]) -> float:
@@ -170,7 +165,7 @@ def _sides(panel: Panel, wide: float, high: float) -> tuple[float, float, float]
     right = GAP + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER))
     if panel.legend == "beside":
         right = GAP + legend_size(labelled(panel))[0] + GAP
-    return numbers, named, right + OF_COLOURS if panel.shades else right
+    return numbers, named, right + COLOUR_BAR if panel.shades else right
 
 
 def _ticks(panel: Panel, wide: float, high: float) -> tuple[Ticks, Ticks]:
@@ -248,7 +243,7 @@ def right_end(placed: Placed) -> float:
     ends.append(left + widest(placed.notes, NOTE))
     ends.append(left + legend_size(labelled(panel))[0] if panel.legend == "below" else 0.0)
     ends.append(0.5 * (left + right + width(named_axis(panel.across, placed.across.power), LABEL)))
-    ends.append(right_side(placed) + (GAP + OF_COLOURS if panel.shades else 0.0))
+    ends.append(right_side(placed) + (GAP + COLOUR_BAR if panel.shades else 0.0))
     scale = (right - left) / abs(panel.limits[1, 0] - panel.limits[0, 0])
     ends += [left + scale * length + 5.0 + width(text, LEGEND) for length, _, text in panel.bars]
     return max(ends)

@@ -13,15 +13,15 @@ _ASCII = (
     " 278 579 278 974 634 612 635 635 411 521 392 634 592 818 592 592 525 636 337 636 838"
 )
 _WIDTHS = {chr(32 + k): int(width) for k, width in enumerate(_ASCII.split())} | dict.fromkeys("±×−", 838)
-_OTHERS = 640
-"""Of Latin, Greek and Cyrillic letters, about."""
-_WIDE = 1000
-"""Of letters from East Asia, which begin here: 0x2E80."""
+_OTHER = 640  # Latin, Greek and Cyrillic letters, about
+_EAST_ASIAN = 1000  # Letters from 0x2E80
 
 
 def width(text: str, size: float) -> float:
     """Return how wide a line of text is, in the unit of the size of its letters."""
-    return size / 1000.0 * sum(_WIDTHS.get(each, _WIDE if each >= "\u2e80" else _OTHERS) for each in text)
+    return (
+        size / 1000.0 * sum(_WIDTHS.get(each, _EAST_ASIAN if each >= "\u2e80" else _OTHER) for each in text)
+    )
 
 
 def widest(texts: Sequence[str], size: float) -> float:

@@ -10,6 +10,7 @@ from photogram.show.sketch.colours import hexadecimal, stops
 from photogram.show.sketch.declared import Panel, Sketch
 from photogram.show.sketch.layout import (
     BAR_LINE,
+    COLOUR_BAR,
     GAP,
     HEAD,
     HEAD_LINE,
@@ -19,7 +20,6 @@ from photogram.show.sketch.layout import (
     NOTE,
     NOTE_LINE,
     NUMBER,
-    OF_COLOURS,
     SWATCH,
     TITLE,
     TITLE_LINE,
@@ -44,8 +44,7 @@ from photogram.show.sketch.svg_marks import Attributes, element, names, number, 
 from photogram.show.sketch.ticks import Ticks, ticks
 from photogram.show.style import FAINT, INK, SETTINGS
 
-TICK = 3.5
-"""Length of the small lines at numbers."""
+TICK_LENGTH = 3.5
 LETTERS = ", ".join([*SETTINGS["font.sans-serif"], "sans-serif"])
 
 
@@ -68,7 +67,7 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
     wide, high = max(map(right_end, panels)), max(map(low_end, panels))
     if sketch.shades is not None:
         parts.append(_colour_bar(sketch.shades, f"{name}-shades", panels))
-        wide = max(wide, max(map(right_side, panels)) + GAP + OF_COLOURS)
+        wide = max(wide, max(map(right_side, panels)) + GAP + COLOUR_BAR)
     if said := heading(sketch):
         x = min(each.box[0] for each in panels)
         lines = "".join(text(x, HEAD_LINE * (k + 0.75), each) for k, each in enumerate(said))
@@ -105,8 +104,8 @@ def _axes(placed: Placed) -> str:
     found = []
     if not panel.bare:
         lines = f"M{number(left)} {number(top)}V{number(low)}H{number(right)}"
-        lines += "".join(f"M{x:.2f} {low:.2f}v{TICK}" for x in over[:, 0].tolist())
-        lines += "".join(f"M{left:.2f} {y:.2f}h-{TICK}" for y in beside[:, 1].tolist())
+        lines += "".join(f"M{x:.2f} {low:.2f}v{TICK_LENGTH}" for x in over[:, 0].tolist())
+        lines += "".join(f"M{left:.2f} {y:.2f}h-{TICK_LENGTH}" for y in beside[:, 1].tolist())
         found.append(path(lines, fill="none", stroke=FAINT, stroke_width=0.8))
     if placed.numbered:
         found.append(_across(placed.across, over[:, 0].tolist(), low, turned=panel.turned))
@@ -209,9 +208,9 @@ def _colour_bar(shades: Shades, name: str, beside: Sequence[Placed]) -> str:
     given = ticks(ends, low - top, NUMBER, across=False, log=shades.log).signed(beside[0].panel.decimal)
     heights = low - shades.parts(given.values) * (low - top)
     for y, said in zip(heights.tolist(), given.texts, strict=True):
-        found.append(path(f"M{number(right)} {number(y)}h{TICK}", stroke=FAINT, stroke_width=0.8))
+        found.append(path(f"M{number(right)} {number(y)}h{TICK_LENGTH}", stroke=FAINT, stroke_width=0.8))
         found.append(text(right + 6.0, y + 0.36 * NUMBER, said, fill=INK))
-    x, y = left + OF_COLOURS - 8.0, 0.5 * (top + low)
+    x, y = left + COLOUR_BAR - 8.0, 0.5 * (top + low)
     turned = f"rotate(-90 {number(x)} {number(y)})"
     look: Attributes = {"fill": INK, "font_size": LABEL, "text_anchor": "middle", "transform": turned}
     found.append(text(x, y, shades.label, **look))

@@ -14,10 +14,8 @@ from photogram.show.sketch.marks import Contours, Shades
 from photogram.show.sketch.names import Box, overlap
 from photogram.show.sketch.svg_marks import HALO, element, joined, path, svg, text
 
-SHORTEST = 30.0
-"""Points of a line at least, on which its level is written."""
-FAR = 4.0
-"""Points between levels that are written."""
+MIN_LABELLED_LENGTH = 30.0  # Points of a line on which its level is written
+MIN_GAP = 4.0  # Points between levels that are written
 
 
 def _generator(mark: Contours) -> Any:
@@ -71,12 +69,12 @@ def levels_written(placed: Placed, taken: list[Box]) -> str:
 def _free(line: Floats, wide: float, room: Box, taken: list[Box]) -> Box | None:
     """Return a box in the middle of a line, or nearer to its ends, that is within the room and free."""
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    if lengths[-1] < SHORTEST:
+    if lengths[-1] < MIN_LABELLED_LENGTH:
         return None
     for part in (0.5, 0.3, 0.7, 0.15, 0.85):
         x, y = (float(np.interp(part * lengths[-1], lengths, own)) for own in line.T)
         box = x - 0.5 * wide, y - 0.5 * NUMBER, x + 0.5 * wide, y + 0.5 * NUMBER
-        around = box[0] - FAR, box[1] - FAR, box[2] + FAR, box[3] + FAR
+        around = box[0] - MIN_GAP, box[1] - MIN_GAP, box[2] + MIN_GAP, box[3] + MIN_GAP
         inside = room[0] < box[0] and box[2] < room[2] and room[1] < box[1] and box[3] < room[3]
         if inside and not any(overlap(around, other) for other in taken):
             return box

@@ -32,18 +32,14 @@ from photogram.show.sketch.marks import (
 )
 from photogram.show.sketch.names import Box, free_side
 
-LEVELS = 48
-"""Colours that values are given of a map."""
-MANY = 300
-"""Places of a line whose coordinates are rounded to a tenth of a point, those of others to a hundredth."""
-FAR = 1e5
-"""Points, beyond which no line is drawn."""
-DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}
-"""Lengths of strokes and gaps in widths of the line, as matplotlib has them."""
+COLOURS_OF_MAP = 48
+MAX_EXACT_PLACES = 300  # Lines of more places have coordinates in tenths of a point, others in hundredths
+MAX_COORDINATE = 1e5  # Points
+DASHES = {"--": (3.7, 1.6), ":": (1.0, 1.65)}  # Strokes and gaps in widths of the line
+# Directions of the corners of a star from the top, outer and inner in turn
 STAR = np.stack([np.sin(np.pi / 5 * np.arange(10)), -np.cos(np.pi / 5 * np.arange(10))], axis=1)
-"""Directions of the corners of a star, from the top; every other one is an inner one."""
+# Of words over other things
 HALO: dict[str, str | float] = {"stroke": "white", "stroke_linejoin": "round", "paint_order": "stroke"}
-"""Of words over other things."""
 Attributes: TypeAlias = dict[str, str | float]
 
 
@@ -74,7 +70,8 @@ def path(data: str, **attributes: str | float) -> str:
 
 def joined(places: Floats, end: str = "") -> str:
     """Return a line through (n, 2) points of the picture."""
-    known = np.clip(places[np.isfinite(places).all(axis=1)], -FAR, FAR).round(1 if len(places) > MANY else 2)
+    decimals = 1 if len(places) > MAX_EXACT_PLACES else 2
+    known = np.clip(places[np.isfinite(places).all(axis=1)], -MAX_COORDINATE, MAX_COORDINATE).round(decimals)
     return "M" + " ".join(f"{x:g} {y:g}" for x, y in known.tolist()) + end if len(known) > 1 else ""
 
 
@@ -98,10 +95,10 @@ def _markers(mark: Markers, placed: Placed) -> str:
     if mark.values is None or mark.shades is None:
         return _signs(mark, at, mark.colour)
     shades, values = mark.shades, mark.values[inside]
-    levels = np.round((LEVELS - 1) * np.clip(shades.parts(values), 0.0, 1.0))
+    levels = np.round((COLOURS_OF_MAP - 1) * np.clip(shades.parts(values), 0.0, 1.0))
     found = []
     for level in np.unique(levels[np.isfinite(levels)])[:: 1 if mark.rising else -1].tolist():
-        colour = rgb(Shades(0.0, LEVELS - 1.0, "", shades.map), np.array(level))
+        colour = rgb(Shades(0.0, COLOURS_OF_MAP - 1.0, "", shades.map), np.array(level))
         found.append(_signs(mark, at[levels == level], hexadecimal(colour)))
     return "".join(found)
 

@@ -10,8 +10,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.sketch.letters import widest
 
-MOST = 8
-"""Steps of an axis at most."""
+MAX_STEPS = 8
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -48,7 +47,7 @@ def ticks(limits: Floats, length: float, size: float, *, across: bool, log: bool
     extent = high - low
     if not extent > 0:
         return _written(np.array([low]), extent)
-    least = extent / MOST if across else max(extent / MOST, 2.6 * size / max(length, 1e-9) * extent)
+    least = extent / MAX_STEPS if across else max(extent / MAX_STEPS, 2.6 * size / max(length, 1e-9) * extent)
     power = 10.0 ** math.floor(math.log10(least))
     for step in (power * factor for factor in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)):
         values = step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
