@@ -38,7 +38,6 @@ def films(result: object) -> Plot:
 def _panel(each: VectorField, said: str) -> Panel:
     low, high = each.places.min(axis=0), each.places.max(axis=0)
     extent = max(float((high - low).max()), 1e-12)
-    margin = MARGIN * extent
     marks: list[Mark] = [Markers(each.places, ".", 4.0, FAINT, layer=1.0)]
     longest = float(np.hypot(*each.vectors.T).max(initial=0.0))
     bars: list[ScaleBar] = []
@@ -49,5 +48,5 @@ def _panel(each: VectorField, said: str) -> Panel:
         bars = [(1e-3 * scale * bar, INK, f"{bar:g} µm")]
     if each.labels:
         marks.append(Names(each.places, each.labels, [INK] * len(each.labels)))
-    limits = np.array([low - margin, high + margin])
+    limits = np.array([low, high]) + MARGIN * extent * np.array([[-1.0], [1.0]])
     return Panel(limits, marks, each.title, "x, mm", "y, mm", equal=True, notes=[said], bars=bars)

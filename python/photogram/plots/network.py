@@ -62,7 +62,8 @@ def network(result: object, *, plane: str | None = None) -> Plot:
         said.append(part[1])
     arrows, ends = _vectors(plan, seen, limits, marks, said)
     bars = [*_ellipses(drawn, seen, limits, marks, said), *arrows]
-    beyond = _beyond(plan, seen, limits)
+    known = plan.points[np.isfinite(plan.points).all(axis=1)][:, list(seen[:2])]
+    beyond = int((~((known >= limits[0]) & (known <= limits[1])).all(axis=1)).sum())
     said.append(f"{beyond} points lie beyond the picture" if beyond else "")
     panel = replace(
         _frame(plan, seen, limits),
@@ -154,9 +155,7 @@ def thinned(what: str, rows: Indices, most: int) -> tuple[Indices, str]:
 
 
 def _footprints(drawn: Pictured, seen: tuple[int, int, int]) -> tuple[list[Mark], str]:
-    outlines = drawn.footprints
-    if seen[2] != 2 or not len(outlines):
-        return [], ""
+    outlines = drawn.footprints if seen[2] == 2 else np.empty((0, 1, 3))
     good = np.flatnonzero(np.isfinite(outlines).all(axis=(1, 2)))
     if not len(good):
         return [], ""
@@ -258,9 +257,7 @@ def _vectors(
 ) -> tuple[list[ScaleBar], Floats]:
     """Add control and check points with the differences of their coordinates.
 
-    Returns
-    -------
-    Scale bars, and (k, 2) places on the arrows, which names should not cover.
+    Return scale bars, and (k, 2) places on the arrows, which names should not cover.
     """
     pair = list(seen[:2])
     there = np.isfinite(plan.points).all(axis=1)
@@ -304,11 +301,6 @@ def _usual(differences: Floats) -> float:
     """Return a size that nine tenths of (k, 3) differences do not exceed; 0 where there are none."""
     sizes = np.sqrt(np.nansum(differences**2, axis=1))
     return float(np.quantile(sizes[sizes > 0], 0.9)) if (sizes > 0).any() else 0.0
-
-
-def _beyond(plan: Plan, seen: tuple[int, int, int], limits: Floats) -> int:
-    known = plan.points[np.isfinite(plan.points).all(axis=1)][:, list(seen[:2])]
-    return int((~((known >= limits[0]) & (known <= limits[1])).all(axis=1)).sum())
 
 
 def _names(plan: Plan, seen: tuple[int, int, int], ends: Floats) -> list[Mark]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,7 @@ from photogram.statistics.patterns import SPEAKING
 if TYPE_CHECKING:
     from photogram.statistics.findings import Observations
 
+NORMAL = NormalDist()
 MAX_QUANTILES = 1500  # Test values drawn against the normal distribution, with all of the ends
 END_VALUES = 200  # Smallest and largest test values that are all drawn
 MAX_NAMES = 5
@@ -107,7 +107,8 @@ def _quantiles(values: Floats, groups: list[Observations], unit_weight: float) -
     beyond = np.abs(ordered) > limit
     marks.append(Markers(places[~beyond], ".", 4.0, BLUE))
     if beyond.any():
-        marks.append(Markers(places[beyond], "D", 4.0, MARKED, label=_count(values, limit)))
+        label = f"beyond the limit ({int((np.abs(values) > limit).sum()):,})"
+        marks.append(Markers(places[beyond], "D", 4.0, MARKED, label=label))
     marks += [Level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
     if worst := _worst(groups, limit):
         sizes = [value for value, _ in worst]
@@ -125,19 +126,12 @@ def _quantiles(values: Floats, groups: list[Observations], unit_weight: float) -
     )
 
 
-def _count(values: Floats, limit: float) -> str:
-    count = int((np.abs(values) > limit).sum())
-    return f"beyond the limit ({count:,})"
-
-
 def _rows(n: int) -> Any:
     """Return which of n ordered values are drawn: all of the ends, and as many between as there is room."""
     if n <= MAX_QUANTILES:
         return np.arange(n)
     inner = np.linspace(END_VALUES, n - END_VALUES - 1, MAX_QUANTILES - 2 * END_VALUES)
-    return np.concatenate(
-        [np.arange(END_VALUES), inner.round().astype(np.int64), np.arange(n - END_VALUES, n)]
-    )
+    return np.r_[:END_VALUES, inner.round().astype(np.int64), n - END_VALUES : n]
 
 
 def _worst(groups: list[Observations], limit: float) -> list[tuple[float, str]]:
@@ -153,11 +147,6 @@ def _worst(groups: list[Observations], limit: float) -> list[tuple[float, str]]:
     return sorted(found, key=lambda pair: -abs(pair[0]))[:MAX_NAMES]
 
 
-@cache
-def _normal() -> NormalDist:
-    return NormalDist()
-
-
 def normal_quantiles(probability: Floats) -> Floats:
     """Return quantiles of the normal distribution."""
-    return np.array([_normal().inv_cdf(p) for p in probability.tolist()])
+    return np.array([NORMAL.inv_cdf(p) for p in probability.tolist()])

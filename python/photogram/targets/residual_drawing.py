@@ -51,8 +51,8 @@ def plot_poorest_views(calibrated: Calibrated) -> Plot:
 
     Parameters
     ----------
-    calibrated, path, ax
-        As of :func:`plot_board_residuals`; three axes, fewer where there are fewer pictures.
+    calibrated
+        The adjusted calibration.
     """
     corners, result = calibrated.calibration.corners, calibrated.result
     picture = corners.picture[corners.use]
