@@ -21,7 +21,9 @@ WaterModel = Literal["giant", "snell", "none"]
 JsonFile = Annotated[
     OutputFile, typer.Option(metavar="FILE", help="Write the whole result as one JSON document.")
 ]
-Plots = Annotated[bool, typer.Option("--plots", help="Draw the pictures too, into --out (needs matplotlib).")]
+Plots = Annotated[
+    bool, typer.Option("--plots", help="Write the plots to --out, too (png and pdf need matplotlib).")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 Strict = Annotated[
     bool, typer.Option("--strict", help="End with exit code 4 also where the verdict is a warning.")

@@ -55,13 +55,13 @@ SETTINGS: dict[str, Any] = {
 
 
 def need_matplotlib() -> None:
-    """Say how to get matplotlib where it is absent: the error names the extra."""
+    """Raise an error with the name of the extra if matplotlib is absent."""
     try:
         import matplotlib  # noqa: F401
     except ModuleNotFoundError as error:
         if error.name != "matplotlib":
             raise
-        said = "pictures need matplotlib: pip install 'photogram[plots]'"
+        said = "plots in formats other than SVG need matplotlib: pip install 'photogram[plots]'"
         raise ModuleNotFoundError(said, name="matplotlib") from None
 
 

@@ -1,4 +1,4 @@
-"""Pictures of what calibrations are worth; to draw them needs `pip install 'photogram[plots]'`."""
+"""Plots of the uncertainty of calibrations, and of the differences of two calibrations."""
 
 from __future__ import annotations
 

@@ -59,14 +59,15 @@ class Plot(Sketch):
         Parameters
         ----------
         ending
-            `svg`, which needs no further package; `png`, `pdf` or another format of matplotlib.
+            `svg`, or a format of matplotlib: `png`, `pdf` ...
 
         Raises
         ------
         InputError
             matplotlib has no such format.
         ModuleNotFoundError
-            matplotlib is absent (`pip install 'photogram[plots]'`).
+            matplotlib is absent, which all formats but `svg` need (`pip install 'photogram[plots]'`), or
+            contourpy, which contours need (`pip install 'photogram[report]'`).
         """
         if ending == "svg":
             return svg_of(self, "plot", self._name).encode()
@@ -90,7 +91,7 @@ class Plot(Sketch):
         InputError
             The suffix is the name of no format.
         ModuleNotFoundError
-            matplotlib, which all formats but SVG need, is absent (`pip install 'photogram[plots]'`).
+            As of :meth:`render`.
         """
         from photogram.io.writing import write_whole
 

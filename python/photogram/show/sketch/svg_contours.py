@@ -19,7 +19,11 @@ MIN_GAP = 4.0  # Points between levels that are written
 
 
 def _generator(mark: Contours) -> Any:
-    from contourpy import FillType, LineType, contour_generator  # of matplotlib, loaded in a moment
+    try:
+        from contourpy import FillType, LineType, contour_generator  # of matplotlib, loaded in a moment
+    except ModuleNotFoundError:
+        message = "contours need contourpy: pip install 'photogram[report]'"
+        raise ModuleNotFoundError(message, name="contourpy") from None
 
     return contour_generator(
         mark.across,
