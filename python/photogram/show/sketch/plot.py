@@ -35,7 +35,9 @@ class Plot(Sketch):
     >>> import photogram
     >>> result = photogram.adjust(photogram.simulate(strips=2, photos_per_strip=4, seed=5).block)
     >>> plot = result.plot.network()
-    >>> plot.save("network.svg")
+    >>> plot.render("svg")[:4]
+    b'<svg'
+    >>> plot.save("network.svg")  # doctest: +SKIP
     """
 
     def __repr__(self) -> str:
@@ -50,8 +52,12 @@ class Plot(Sketch):
 
     def _repr_svg_(self) -> str:
         # A page that shows several plots needs a different identifier for each.
-        plain = svg_of(self, "plot", self._name)
-        return svg_of(self, f"plot{zlib.crc32(plain.encode()):08x}", self._name)
+        return self._svg(f"plot{zlib.crc32(self.render()):08x}")
+
+    def _svg(self, name: str) -> str:
+        """Return the plot as SVG on white ground, for pages and programs with dark ones."""
+        head, sign, content = svg_of(self, name, self._name).partition(">")
+        return f'{head}{sign}<rect width="100%" height="100%" fill="white"/>{content}' if content else head
 
     def render(self, ending: str = "svg") -> bytes:
         """Return the plot as the content of a file.
@@ -70,7 +76,7 @@ class Plot(Sketch):
             contourpy, which contours need (`pip install 'photogram[report]'`).
         """
         if ending == "svg":
-            return svg_of(self, "plot", self._name).encode()
+            return self._svg("plot").encode()
         drawn, content = self.figure(), io.BytesIO()
         if ending not in drawn.canvas.get_supported_filetypes():
             raise InputError(f"matplotlib does not write the format {ending!r}: use svg, png or pdf")
