@@ -20,11 +20,8 @@ CORRELATED = 0.95
 Unit = tuple[str, str, float]
 """The unit of values, the unit that people read, and the factor between them."""
 MM, UM_OF_M, UM = ("m", "mm", 1e3), ("m", "um", 1e6), ("um", "um", 1.0)
-SECONDS, ARCSEC_OF_RAD, ARC_SECONDS = (
-    ("s", "s", 1.0),
-    ("rad", "arcsec", 1 / ARCSEC),
-    ("arcsec", "arcsec", 1.0),
-)
+SECONDS, ARC_SECONDS = ("s", "s", 1.0), ("arcsec", "arcsec", 1.0)
+ARCSEC_OF_RAD = ("rad", "arcsec", 1 / ARCSEC)
 DEGREES, GRADS = ("rad", "deg", math.degrees(1)), ("rad", "grads", 1 / GRAD)
 
 
@@ -34,14 +31,21 @@ def names_column(values: Iterable[object], head: str, member: str = "") -> Quant
 
 
 def column(
-    values: ArrayLike, unit: Unit | None, head: str, decimals: int, member: str = "", parts: str = ""
+    values: ArrayLike,
+    unit: Unit | None,
+    head: str,
+    decimals: int | None,
+    member: str = "",
+    parts: str = "",
+    **more: Any,
 ) -> Quantity:
     """Return numbers (n,), or (n, k) of k parts whose names are separated by commas; None: without a unit."""
     own, small, factor = unit or ("", "", 1.0)
     axes = tuple(Axis(part, own, small=small, factor=factor) for part in parts.split(", "))
     numbers = np.reshape(np.asarray(values, dtype=float), (-1, len(axes)) if len(axes) > 1 else -1)
     kind: Kind = "deviation" if unit else "number"
-    return Quantity(numbers, axes, kind, member or None, member, head=head, decimals=decimals)
+    texts = {"name": member or None, "member": member, "head": head, "decimals": decimals}
+    return Quantity(numbers, axes, kind, **{**texts, **more})
 
 
 def correlations(covariance: Floats) -> Floats:

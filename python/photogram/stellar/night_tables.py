@@ -7,19 +7,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Indices
 from photogram.show.angles import ARCSEC
 from photogram.show.page import Fact
 from photogram.show.quantity import Axis, Quantities, Quantity, Table, chosen, of_each
-from photogram.stellar.camera_tables import parameter_table
+from photogram.stellar.camera_tables import (
+    ARC_SECONDS,
+    ARCSEC_OF_RAD,
+    GRADS,
+    column,
+    names_column,
+    parameter_table,
+)
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
 from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
-from photogram.stellar.parameters import GRAD
 from photogram.stellar.pointing import axis_of
 
 _PIXELS = (Axis.of("x", "px", "_px"), Axis.of("y", "px", "_px"))
-_PLACE = (Axis.of("ra", "arcsec"), Axis.of("dec", "arcsec"))
+_DEGREES = ("deg", "deg", 1.0)
 
 
 def parameters(result: CalibratedNight) -> Table:
@@ -90,14 +96,10 @@ def _fit(result: CalibratedNight) -> list[Quantity]:
         Quantity(result.identified, name="identified", member="identified", head="Identified"),
         Quantity(result.rejected, name="left_out", member="rejected", head="Left out"),
         Quantity(rms, _PIXELS[:1], "deviation", head="rms", decimals=3),
-        Quantity(
-            result.odds, name="by_chance", member="expected_chance_matches", head="By chance", figures=1
-        ),
-        Quantity(
-            result.probabilities, name="probability", member="probability", head="Probability", decimals=6
-        ),
-        Quantity(result.log_odds, name="log_odds", member="log_odds", head="Log odds", decimals=1),
-        Quantity(1.0 - least, head="Least certain star: 1 - probability", figures=1),
+        column(result.odds, None, "By chance", None, "expected_chance_matches", name="by_chance", figures=1),
+        column(result.probabilities, None, "Probability", 6, "probability"),
+        column(result.log_odds, None, "Log odds", 1, "log_odds"),
+        column(1.0 - least, None, "Least certain star: 1 - probability", None, figures=1),
     ]
 
 
@@ -106,15 +108,13 @@ def _attitudes(result: CalibratedNight) -> list[Quantity]:
     found = result.calibration
     azimuth, elevation = np.degrees([axis_of(each) for each in found.attitudes]).T
     errors = np.sqrt(np.diagonal(found.attitude_covariances, axis1=1, axis2=2))
-    angles = tuple(map(Axis.turned, ("alpha", "omega", "kappa")))
-    grads = tuple(Axis(axis.name, "rad", small="grads", factor=1 / GRAD) for axis in angles)
-    south = "Azimuth from south, positive west"
+    south, angles = "Azimuth from south, positive west", "alpha, omega, kappa"
     return [
         _exposure(result),
-        _degrees(azimuth, "azimuth_south_deg", south, 5, "azimuth_deg"),
-        _degrees(elevation, "elevation_deg", "Elevation", 5, "elevation_deg"),
-        Quantity(found.attitudes, grads, "deviation", member="alpha_omega_kappa_rad", head="{}", decimals=6),
-        Quantity(errors, angles, "deviation", head="sd {}", decimals=2),
+        column(azimuth, _DEGREES, south, 5, "azimuth_deg", name="azimuth_south_deg"),
+        column(elevation, _DEGREES, "Elevation", 5, "elevation_deg"),
+        column(found.attitudes, GRADS, "{}", 6, "alpha_omega_kappa_rad", angles, name=None),
+        column(errors, ARCSEC_OF_RAD, "sd {}", 2, parts=angles),
         Quantity(found.attitude_covariances, member="covariance"),
         Quantity(found.cross_covariances, member="covariance_with_camera"),
     ]
@@ -125,7 +125,6 @@ def _inertial(result: CalibratedNight) -> list[Quantity]:
     found = result.inertial
     ra, dec = np.degrees([each.axis for each in found]).T
     covariances = np.array([each.covariance for each in found])
-    turns = tuple(Axis("about " + name, "rad", small="arcsec", factor=1 / ARCSEC) for name in "xyz")
     upper = tuple(Axis(f"{a}{b}") for k, a in enumerate("xyz") for b in "xyz"[k:])
     members = [
         {
@@ -137,17 +136,14 @@ def _inertial(result: CalibratedNight) -> list[Quantity]:
         }
         for each, right_ascension, declination in zip(found, ra.tolist(), dec.tolist(), strict=True)
     ]
-    quaternions, axes = (
-        np.array([each.quaternion for each in found]),
-        tuple(map(Axis, ("qw", "qx", "qy", "qz"))),
-    )
+    quaternions = [each.quaternion for each in found]
     errors = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     return [
         _exposure(result),
-        _degrees(ra, "ra_deg", "Right ascension in ICRS", 6),
-        _degrees(dec, "dec_deg", "Declination in ICRS", 6),
-        Quantity(quaternions, axes, name="", head="{}", decimals=9),
-        Quantity(errors, turns, "deviation", head="sd {}", decimals=2),
+        column(ra, _DEGREES, "Right ascension in ICRS", 6, name="ra_deg"),
+        column(dec, _DEGREES, "Declination in ICRS", 6, name="dec_deg"),
+        column(quaternions, None, "{}", 9, parts="qw, qx, qy, qz", name=""),
+        column(errors, ARCSEC_OF_RAD, "sd {}", 2, parts="about x, about y, about z"),
         Quantity(covariances[:, *np.triu_indices(3)], upper, name="cov"),
         Quantity(members, member="icrs"),
     ]
@@ -156,11 +152,6 @@ def _inertial(result: CalibratedNight) -> list[Quantity]:
 def _exposure(result: CalibratedNight) -> Quantity:
     names = np.array(result.names, dtype=object)
     return Quantity(names, kind="name", name="exposure", member="name", head="Exposure")
-
-
-def _degrees(values: Floats, name: str, head: str, decimals: int, member: str = "") -> Quantity:
-    axis = (Axis.of("", "deg"),)
-    return Quantity(values, axis, "value", name=name, member=member, head=head, decimals=decimals)
 
 
 def images(result: CalibratedNight) -> Table:
@@ -178,8 +169,8 @@ def images(result: CalibratedNight) -> Table:
         Quantity(
             found.standardized, _PIXELS, "number", "standardized", "standardized", head="w {}", decimals=2
         ),
-        Quantity(likely, name="probability", member="probability"),
-        Quantity(1.0 - likely, head="1 - probability", figures=1),
+        column(likely, None, "", None, "probability"),
+        column(1.0 - likely, None, "1 - probability", None, figures=1),
     ]
     about = "Pixels right and down, measured minus computed; probability of the star of each image."
     return Table("images", "Images and their stars", columns, about=about)
@@ -204,16 +195,9 @@ def stars(result: CalibratedNight) -> Table:
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
     columns = [
         Quantity(ids[found.catalogue], kind="name", member="id", head="Star"),
-        Quantity(
-            found.star_residuals / ARCSEC,
-            _PLACE,
-            "deviation",
-            member="residual",
-            head="Correction {}",
-            decimals=5,
-        ),
-        Quantity(found.star_redundancy, _PLACE, member="redundancy"),
-        Quantity(found.star_standardized, _PLACE, member="standardized", head="w {}", decimals=2),
+        column(found.star_residuals / ARCSEC, ARC_SECONDS, "Correction {}", 5, "residual", "ra, dec"),
+        column(found.star_redundancy, None, "", None, "redundancy", "ra, dec"),
+        column(found.star_standardized, None, "w {}", 2, "standardized", "ra, dec"),
     ]
     estimated = np.flatnonzero(np.isfinite(found.star_residuals[:, 0]))
     return Table("stars", "Corrections of stars", chosen(columns, estimated))
@@ -248,10 +232,8 @@ def lenses(result: CalibratedNight) -> Table:
     )
     columns = [
         of_each(found, "lens", kind="name", head="Lens"),
-        *(Quantity(values, head=head, decimals=decimals) for values, head, decimals in heads),
-        Quantity(
-            [each.reason and f"not adjusted: {each.reason}" for each in found], kind="name", head="Remark"
-        ),
+        *(column(values, None, head, decimals) for values, head, decimals in heads),
+        names_column((each.reason and f"not adjusted: {each.reason}" for each in found), "Remark"),
     ]
     note = f"The first is used; a difference above {DECISIVE:g} is decisive, above {POSITIVE:g} positive."
     return _for_people("lenses", "Lenses that were tried", columns, note)

@@ -155,7 +155,7 @@ def stars(result: Result) -> Table:
         column(residuals, ARC_SECONDS, "Residual {}", 4, "residual", place),
         column(redundancy, None, "r {}", 2, "redundancy", place),
         column(standardized, None, "w {}", 2, "standardized", place),
-        replace(column(before, ARCSEC_OF_RAD, "Before {}", 3, parts=place), words={0.0: "fixed"}),
+        column(before, ARCSEC_OF_RAD, "Before {}", 3, parts=place, words={0.0: "fixed"}),
     ]
     if not known.all():
         columns += _unknown(result)
