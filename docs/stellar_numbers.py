@@ -57,7 +57,7 @@ def section_lines(result: Result | CalibratedNight, *titles: str) -> list[str]:
 def adjustment_lines() -> list[str]:
     """Show the figures of the packaged plate."""
     # The digits of sums that vanish, and the last ones of parts of a minimum, are noise.
-    noisy = ("sums of", "weighted sum of squares, plate", "weighted sum of squares, stars")
+    noisy = ("weighted sum of squares, plate", "weighted sum of squares, stars")
     figures = section_lines(plate(), "How much, how good", "Remarks")
     return [*summary(plate().document()), "", *(line for line in figures if not line.startswith(noisy))]
 

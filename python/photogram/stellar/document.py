@@ -57,6 +57,7 @@ def plate_document(result: Result) -> Document:
         Section("problem", "Problem", [Facts("Problem", _problem(result))]),
         Section("descriptors", "Problem descriptors", [Remarks([*descriptors(result), *_forms(result)])]),
         *map(Section.of, tables.stages(result)),
+        Section("residuals", "Residuals", [Facts("Residuals", _residuals(result))]),
         *of_solution.values(),
         Section.of(tables.pre_run(result)),
         Section.of(tables.fictitious(result)),
@@ -81,7 +82,7 @@ def _solution_sections(result: Result) -> dict[str, Section]:
     cofactors = result.solved.cofactors[np.ix_(rows, rows)]
     title = "Inverse of the reduced normal equations"
     found = [
-        tables.parameters(result),
+        *tables.parameters(result),
         tables.transformed(result),
         tables.stars(result),
         tables.directions(result),
@@ -101,7 +102,8 @@ def _combined(result: Result) -> list[Section]:
         return []
     names = sorted({name for pair in combined.pairs for name in pair}, key=GROUPS.index)
     intro = f"ORIENTATIONS FROM {', '.join(names).upper()} CONSTRAINED TO COMMON VALUES"
-    size = [Facts("How much", _much(combined)), Facts("How good", _good(combined))]
+    good = [*_good(combined), *_residuals(combined)]
+    size = [Facts("How much", _much(combined)), Facts("How good", good)]
     sections = [Section("combined", "Combined solution", size, intro)]
     for key, section in _solution_sections(combined).items():
         title = f"Combined solution: {section.title}"
@@ -192,8 +194,7 @@ def _much(result: Result) -> list[Fact]:
 
 
 def _good(result: Result) -> list[Fact]:
-    problem, sums = result.problem, result.solved.sums
-    weights = problem.star_weights[problem.known & ~problem.held]
+    sums = result.solved.sums
     squares = zip(("plate", "stars", "parameters", "total"), (*sums, sum(sums)), strict=True)
     return [
         Fact("Mean error of unit weight, computed", significant(1e6 * result.computed_mean_error, 9), "µm"),
@@ -202,17 +203,25 @@ def _good(result: Result) -> list[Fact]:
             Fact(f"Weighted sum of squares, {name}", significant(1e12 * float(square), 9), "µm²")
             for name, square in squares
         ),
+        Fact("Test of cx = cy", _scale_test(result)),
+    ]
+
+
+def _residuals(result: Result) -> list[Fact]:
+    """Return the common mean errors before the adjustment, and the sums of residuals."""
+    problem, residuals = result.problem, 1e6 * result.solved.residuals.T
+    weights = problem.star_weights[problem.known & ~problem.held]
+    return [
         Fact("Common mean error of the plate", *_before(result, problem.image_weights, 1e-6, "µm")),
         Fact("Common mean error of the stars", *_before(result, weights, ARCSEC, "arcsec")),
         *(
             Fact(
                 f"Sums of {axis} residuals: +, -, both",
-                f"{1e6 * v[v > 0].sum():.3f}, {1e6 * v[v < 0].sum():.3f}, {1e6 * v.sum():z.3f}",
+                f"{v[v > 0].sum():.3f}, {v[v < 0].sum():.3f}, {v.sum():z.3f}",
                 "µm",
             )
-            for axis, v in zip("xy", result.solved.residuals.T, strict=True)
+            for axis, v in zip("xy", residuals, strict=True)
         ),
-        Fact("Test of cx = cy", _scale_test(result)),
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
-from photogram.show.quantity import Axis, Quantity, Table, of_each
+from photogram.show.quantity import Axis, Quantity, Table, component, of_each
 from photogram.stellar.camera_tables import (
     ARC_SECONDS,
     ARCSEC_OF_RAD,
@@ -41,8 +41,8 @@ _AZIMUTHS = "Azimuths from south, positive west; elevations above the horizon."
 _NONE = np.zeros(0)
 
 
-def parameters(result: Result) -> Table:
-    """Return the parameters: given, adjusted, and the change (section 5.9a)."""
+def parameters(result: Result) -> list[Table]:
+    """Return the parameters, given and adjusted, and their changes with weights (section 5.9a)."""
     problem, count = result.problem, len(NAMES) if result.problem.options.refraction else 22
     names, free = NAMES[:count], result.solved.free[:count]
     weights = np.diag(problem.parameter_weights)[:count]
@@ -58,15 +58,22 @@ def parameters(result: Result) -> Table:
     values = result.solved.parameters[:count]
     more = [
         Quantity(given, member="given"),
-        Quantity(weights, name="weight", member="weight", head="Weight" * bool(weights.any()), figures=6),
-        Quantity(values - given, axes, "deviation", head="Change", figures=6, of=of),
+        Quantity(weights, name="weight", member="weight"),
         Quantity(free, name="estimated", member="estimated"),
     ]
     errors = np.sqrt(np.maximum(np.diag(result.covariance), 0))[:count]
     about = "Lengths in metres, angles in grads (400 to the circle)."
-    return parameter_table(
-        axes, values, errors, np.array([given, before]), result.significance(), more, about=about
-    )
+    changes = [
+        component(axes, of)[0],
+        Quantity(values - given, axes, "deviation", head="Change", figures=8, of=of),
+        Quantity(weights, head="Weight", figures=6),
+    ]
+    return [
+        parameter_table(
+            axes, values, errors, np.array([given, before]), result.significance(), more, about=about
+        ),
+        Table("changes", "Changes of the parameters", changes),
+    ]
 
 
 def stages(result: Result) -> list[Table]:
