@@ -13,10 +13,10 @@ from photogram.io import json
 from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES
 from photogram.show.cells import page_table
-from photogram.show.forms import record, text
+from photogram.show.forms import MAX_ROWS, record, summary, text
 from photogram.show.html import page_html
 from photogram.show.lines import fact_lines, field, marks, table_lines
-from photogram.show.page import Cell, Document, Fact, Section, probability_written
+from photogram.show.page import Cell, Document, Fact, Layers, Section, probability_written
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each, records, units
 
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
@@ -158,3 +158,13 @@ def test_parts_of_many_things_are_columns_of_json():
     rows = members_of_each([VALUES, SD], "kind", size="values.size")
     assert records(rows) == [{"kind": "value", "size": 3}, {"kind": "deviation", "size": 3}]
     assert records(members_of_each([], "kind")) == []
+
+
+def test_a_summary_has_the_first_rows_of_its_tables_also_of_those_in_layers():
+    table = Table("rows", "Rows", [Quantity(np.arange(MAX_ROWS + 2), head="Row")])
+    document = Document("What", "", [], [], [], [Section("rows", "Rows", [Layers("layers", [table])])])
+    first, head, *rows = summary(document, "rows")
+    assert (first, head.strip()) == ("What", "Row")
+    assert [line.strip() for line in rows[-2:]] == [str(MAX_ROWS - 1), "and 2 more rows"]
+    assert document.tables() == []
+    assert document.table("rows") is table

@@ -90,6 +90,9 @@ def test_standard_deviations_to_be_relied_on_decide_by_the_normal_distribution(e
     assert estimated.tested[row, 2] == estimated.studentized[row, 2]
     assert known.limit == pytest.approx(2.935, abs=0.001)
     assert "V203 Z (w " in " ".join(known.problems)
+    frame, names = known.control_table(), np.array(example.ids)[known.took_part]
+    assert frame["id"].tolist() == names.tolist()
+    np.testing.assert_array_equal(frame["standardized_Z"], known.standardized[known.took_part, 2])
     marked = [each.name for each in known.document().table("control").columns if each.marked is not None]
     assert marked == ["standardized"]
 

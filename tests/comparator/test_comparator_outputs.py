@@ -22,6 +22,7 @@ from photogram.comparator.case import exchanged
 from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.joint import Weights, adjust_jointly
 from photogram.comparator.listing.parameters import correction_table, table_nodes
+from photogram.comparator.tables import LINEAR
 from photogram.comparator.variance import AxisSigma, _f_max_tail, compare_case_variances, difference
 from photogram.show.sketch.marks import Ellipses
 
@@ -172,6 +173,26 @@ def test_feature_18_pictures(full):
     assert page.count("<figure") == len(made)
     assert "Systematic comparator, linear" in page
     assert "SYSTEMATIC COMPARATOR" not in page
+
+
+def test_the_document_has_each_table_once(full):
+    document, written = full.document(), json.loads(full.to_json())
+    correction, covariance = full.linear.correction, full.linear.covariance
+    _, values, sd, _ = document.table("linear").columns
+    assert values.values[[0, 1, 3]] == pytest.approx([written["linear"][name] for name in LINEAR], rel=1e-15)
+    assert sd.values[[0, 1, 3]] == pytest.approx(np.sqrt(np.diag(covariance))[:3])
+    ratio = correction.scale_x / correction.scale_y
+    assert values.values[2] == ratio
+    totals = document.table("variance").columns[1].values[:, 2]
+    assert totals[0] == full.variance.before.total
+    assert totals[-1] == full.variance.random
+    terms = written["polynomial"]["terms"]
+    assert len(terms) == len(document.table("polynomial.terms").columns[0].values) == 12
+    assert [case["case"] for case in written["cases"]] == [case.number for case in full.cases]
+    assert written["far_pointings"] == [
+        {name: getattr(each, name) for name in each.__dataclass_fields__} for each in full.far_pointings
+    ]
+    assert "Linear parameters" in full.report()
 
 
 # 19: averages

@@ -51,8 +51,12 @@ def test_exchanged_digits_end_with_4_and_are_named(run, tmp_path):
 
 
 def test_figures_are_explained_as_they_were_typed(written):
-    found = written(EXAMPLE.replace("220.002", "220.020")).check()
-    (each,) = (one for one in found if one.beyond)
+    certificate = written(EXAMPLE.replace("220.002", "220.020"))
+    (each,) = (one for one in certificate.check() if one.beyond)
+    names, changes, leaves, _ = certificate.document().table("explanations").columns
+    assert set(names.values) == {each.name}
+    assert changes.values == [*map(str, each.explanations)]
+    assert leaves.values.tolist() == [one.remaining for one in each.explanations]
     assert each.explanations[0].typed == "220.020"
     assert each.explanations[0].perhaps == "220.002"
 

@@ -73,7 +73,10 @@ def test_single_changes_explain_what_they_are_said_to(reports):
 
 
 def test_usual_places_decide_between_changes_of_a_kind(reports):
-    found = next(d for d in reports["Report_RT-R_216"].check() if d.beyond)
+    report = reports["Report_RT-R_216"]
+    found = next(d for d in report.check() if d.beyond)
+    *_, moved = report.document().table("explanations").columns
+    assert moved.values[:2] == pytest.approx([0.004, 3.018])
     assert found.explanations[0].perhaps == "-109.996"
     assert found.explanations[0].from_usual == pytest.approx(0.004)
     assert found.explanations[1].from_usual == pytest.approx(3.018)
