@@ -198,7 +198,7 @@ def large(planted: Planted, block: Block, names: set[str]) -> set[str]:
     """Return the planted errors that their own group shows: d' R d of 1.5 lambda0 or more."""
     reliability = adjust(block).reliability(level=0.05 / len(block.image_xy))
     suspects, tests = reliability.suspects, reliability.tests
-    number = {suspects.name(group): group for group in range(len(suspects))}
+    number = {str(suspects.name(group)): group for group in range(len(suspects))}
     found = set()
     for name in names:
         group = number[name]

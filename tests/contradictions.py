@@ -96,7 +96,7 @@ def contradictions(sentences: Iterable[str]) -> list[tuple[str, str]]:
 
 def sentences_of(verdict: Verdict, page: Document | None, report: str, document: bytes | None) -> list[str]:
     """Return what a command ends by, and all that its page, its text and its document say."""
-    told = [f"exit code {verdict.exit}", verdict.headline, *verdict.lines, *verdict.next]
+    told = [f"exit code {verdict.exit}", verdict.headline, *map(str, [*verdict.lines, *verdict.next])]
     told += [f"test {test.name.partition(':')[0]} {'passes' if test.accepted else 'rejects'}"
              for test in verdict.tests]  # fmt: skip
     if page is not None:
@@ -110,7 +110,7 @@ def sentences_of(verdict: Verdict, page: Document | None, report: str, document:
 def _of_page(page: Document) -> Iterator[str]:
     for each in page.judgements:
         yield from (f"mark {each.mark}", each.headline, *each.lines)
-    yield from page.advice
+    yield from map(str, page.advice)
     for fact in page.highlights:
         yield f"{fact.name} {fact.value} {fact.unit}"
         yield fact.note
@@ -180,4 +180,4 @@ def assert_one_judgement(
         for sentence in (verdict.headline, *verdict.lines, *verdict.next):
             assert plain_words(str(sentence)) in words
     if document is not None and "verdict" in (members := json.loads(document)):
-        assert members["verdict"]["next"] == list(verdict.next)
+        assert members["verdict"]["next"] == [str(each) for each in verdict.next]

@@ -94,7 +94,7 @@ def test_a_wrong_check_point_heads_the_verdict():
                     result.verdict.headline)  # fmt: skip
     page = page_of(result)
     assert page.judgements[0].tone == "bad"
-    assert page.advice[0].startswith("Look at the check points that are named")
+    assert page.advice[0].code == "advice.wrong-checks"
     assert not any("Nothing needs" in each for each in page.advice)
     good = adjust(block())
     assert good.verdict.exit == 0
@@ -119,10 +119,9 @@ def test_their_own_standard_deviations_count():
     assert unknown.check_points.assumed.all()
     assert np.allclose(unknown.check_points.given_sd, np.median(held))
     assert unknown.verdict.exit == 4
-    assert any(
-        "standard deviations of 8 of 8 check points are not given" in line for line in unknown.verdict.lines
-    )
-    assert not any("not given" in line for line in adjust(one).verdict.lines)
+    (line,) = (line for line in unknown.verdict.lines if line.code == "line.checks-assumed")
+    assert (line.fields["assumed"], line.fields["n"]) == (8, 8)
+    assert "line.checks-assumed" not in {line.code for line in adjust(one).verdict.lines}
 
 
 def test_all_outputs_have_them():
@@ -159,7 +158,8 @@ def test_a_datum_of_its_own_has_no_check():
     free = one.replace(point_sd=np.inf)
     result = adjust(free, datum=InnerConstraints())
     assert result.check_points.agreement is None
-    assert any("check points are not tested: the datum" in line for line in result.verdict.lines)
+    (line,) = (line for line in result.verdict.lines if line.code == "line.checks-untested")
+    assert line.fields["reason"].startswith("the datum")
 
 
 def test_without_joint_covariances_each_is_tested():

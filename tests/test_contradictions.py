@@ -278,7 +278,7 @@ def test_projectors(tmp_path, options, broken):
         text = "\n".join(summary(set_document(each), "parameters"))
         assert_one_judgement(each.verdict, alone.document(), text, None)
         document = json.loads(alone.to_json())["sets"][0]
-        assert document["verdict"]["next"] == list(each.verdict.next)
+        assert document["verdict"]["next"] == [str(step) for step in each.verdict.next]
     assert run.document().advice == list(dict.fromkeys(s for each in run.results for s in each.verdict.next))
     assert options or any(each.verdict.warning for each in run.results) == broken
 

@@ -10,6 +10,7 @@ import pytest
 from photogram import Camera, adjust, diagnose, first_values, simulate, snoop
 from photogram.diagnosis import names as names_of_points
 from photogram.results.exchanged_names import exchanged_names
+from photogram.words import Phrase
 
 
 def block_of(seed, **options):
@@ -44,7 +45,7 @@ def test_a_pair_is_named(seed):
     # Only where both points stand on the same two photos do the images not tell on which.
     assert len(found.photos) <= 2
     assert found.exchanged < 0.001 * found.as_named
-    assert found.sentence in snooped.verdict.headline
+    assert found.sentence in snooped.verdict.message.fields["exchanged"]
     assert f"{found.sentence}: {found.reason}" in snooped.report()
     [member] = json.loads(snooped.to_json())["snooping"]["exchanged_names"]
     assert set(member["points"]) == names
@@ -112,9 +113,11 @@ def test_the_verdict_of_an_adjustment_names_a_pair_before_all_images():
         verdict = result.verdict
         codes.add(verdict.code)
         for each in result.exchanged:
-            assert all(name in each for name in names)
-            assert photo in each
-            assert any(each in line for line in (verdict.headline, *verdict.lines))
+            assert {each.fields["one"], each.fields["other"]} == set(names)
+            assert photo in each.fields["photos"]
+            messages = [verdict.message, *verdict.lines]
+            fields = [line.fields.get(name, ()) for line in messages for name in ("suspects", "exchanged")]
+            assert any(each in own for own in [messages, *fields])
         assert len(result.exchanged) <= 1
         told += len(result.exchanged)
     assert told >= 95
@@ -125,11 +128,11 @@ def test_the_verdict_of_an_adjustment_names_a_pair_before_all_images():
 def test_the_headline_of_an_adjustment():
     block, _, _ = exchanged(block_of(2).block, 2)
     result = explained(block)
-    assert result.verdict.headline.startswith(
-        "Gross errors likely: images of points P000058 and P000072 on photo 0303 have probably each other's"
-        " names; 1) image of point "
-    )
-    assert result.exchanged[0] in result.report()
+    exchange, tests = result.verdict.message.fields["suspects"]
+    fields = {"one": "P000058", "other": "P000072", "photos": ["0303"]}
+    assert exchange == Phrase("exchange.probable", fields) == result.exchanged[0]
+    assert tests.fields["tests"][0].fields["name"].code == "named.image"
+    assert str(exchange) in result.report()
 
 
 def test_clean_blocks_have_no_pair():
@@ -157,7 +160,7 @@ def test_pairs_far_apart_in_a_larger_block_of_a_calibrated_camera():
         names.append({block.point_ids[block.image_points[row]] for row in (a, b)})
     found = explained(block.replace(image_xy=xy)).exchanged
     assert len(found) == 2
-    assert all(any(all(name in each for name in pair) for each in found) for pair in names)
+    assert all(pair in [{each.fields["one"], each.fields["other"]} for each in found] for pair in names)
 
 
 def test_a_pair_of_a_large_block_is_found_among_some_of_its_images(monkeypatch):
@@ -174,6 +177,6 @@ def test_a_pair_of_a_large_block_is_found_among_some_of_its_images(monkeypatch):
     monkeypatch.setattr(names_of_points, "MOST_IMAGES", 100)
     monkeypatch.setattr(names_of_points, "EACH", 6)
     assert explained(block).exchanged == (pair,)
-    assert all(name in pair for name in names)
-    assert photo in pair
+    assert {pair.fields["one"], pair.fields["other"]} == set(names)
+    assert photo in pair.fields["photos"]
     assert asked[-1] < 0.8 * asked[0]

@@ -39,6 +39,7 @@ FLOORS = (
     ("memory",),
     ("errors",),
     ("messages",),
+    ("words",),
     ("lazy_dataclasses",),
 )
 """From the top down, as CONTRIBUTING has them: a file knows its own folder and floors below."""

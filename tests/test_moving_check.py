@@ -182,7 +182,7 @@ def test_what_is_held_is_tested_where_it_can_be():
     result = adjust(drone.replace(point_sd=sd, point_positions=wrong))
     found = held_tested(result)[0]
     place = found.largest()
-    assert found.name(place) == f"control point {drone.point_ids[row]}, which is held"
+    assert str(found.name(place)) == f"control point {drone.point_ids[row]}, which is held"
     # Rows of pixels count downwards, those of a camera without lens upwards: T was 846 in place of 10,224.
     sd[row] = np.inf
     without = adjust(drone.replace(point_sd=sd, point_positions=wrong))

@@ -11,6 +11,7 @@ from photogram.collection import AdjustedCollection
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Shown, columns_of, report_of
+from photogram.words import Phrase
 
 KINDS = {
     "image": ("residuals", "redundancy", "standardized"),
@@ -133,7 +134,7 @@ def test_a_wrong_weighted_point_of_a_collection_is_named():
     positions = result.collection.point_positions.copy()
     positions[3, 2] += 0.5
     wrong = collection.adjust(result.collection.replace(point_positions=positions))
-    assert any("control point 3" in line for line in wrong.verdict.outliers)
+    assert Phrase("named.control", {"point": "3"}) in [line.fields["name"] for line in wrong.verdict.outliers]
     assert not result.verdict.outliers
 
 

@@ -105,7 +105,7 @@ def test_groups_of_the_golden_block():
     trial.core.stand()
     tests = trial.core.tests()
     suspects = trial.suspects
-    number = {suspects.name(group): group for group in range(len(suspects))}
+    number = {str(suspects.name(group)): group for group in range(len(suspects))}
     blocks = np.concatenate([[0], np.cumsum(np.diff(suspects.row_starts) ** 2)])
     effects = trial.core.effects(list(range(len(suspects))))
     moved = trial.core.most_moved(list(range(len(suspects))))
@@ -146,7 +146,7 @@ def test_correlations_on_a_point():
     for given in data["adjustment"]["test_correlations_on_a_point"]:
         point = block.point_ids.index(given["point"])
         groups, _, r = trial.core.on_points([point])[0]
-        names = [trial.suspects.name(group) for group in groups]
+        names = [str(trial.suspects.name(group)) for group in groups]
         order = [
             2 * names.index(called(["image", photo, given["point"]])) + "xy".index(axis)
             for photo, axis in given["rows"]
@@ -365,7 +365,7 @@ def test_reliability():
     result = photogram.adjust(block, tolerance=1e-9)
     found = result.reliability()
     suspects = found.suspects
-    number = {suspects.name(group): group for group in range(len(suspects))}
+    number = {str(suspects.name(group)): group for group in range(len(suspects))}
     for own in data["adjustment"]["observations"]:
         group = number[called(own["observation"])]
         rows = suspects.rows(group)

@@ -26,6 +26,7 @@ from photogram.statistics.findings import (
 )
 from photogram.statistics.findings import Tested as Group
 from photogram.statistics.verdict import verdict, worst
+from photogram.words import Phrase
 
 F = 81
 
@@ -108,9 +109,10 @@ def test_what_does_not_give_the_headline_follows():
     found = findings(with_blunder, 2.0, hints=["probably feet"], systematic=[pattern()], remarks=["a remark"])
     made = verdict(found)
     assert made.code == "hint"
-    assert made.lines[0].startswith("Gross errors likely")
-    assert any("The model is likely wrong" in line for line in made.lines)
-    assert made.lines[-1] == "a remark"
+    codes = [line.code for line in made.lines]
+    assert codes[0] == "verdict.gross-errors"
+    assert "verdict.model" in codes
+    assert made.lines[-1].fields == {"text": "a remark"}
 
 
 def test_gross_errors_beside_a_common_factor():
@@ -122,7 +124,7 @@ def test_gross_errors_beside_a_common_factor():
     few = np.array([[0.3, -1.2], [0.8, 9.0], [-0.5, 1.1]])
     made = findings(few, global_test=global_test(84.0, 4), degrees_of_freedom=4)
     assert verdict(made).code == "gross-errors"
-    assert any("only gross disagreement" in line for line in verdict(made).lines)
+    assert "line.few" in {line.code for line in verdict(made).lines}
     alike = findings(few * [1.0, 0.4], global_test=global_test(4 * 4.5, 4), degrees_of_freedom=4)
     assert verdict(alike).code == "weights"
 
@@ -133,7 +135,7 @@ def test_a_few_gross_errors_that_spoil_everything_are_no_model():
     w[:3] *= 60.0
     few = findings(w, 400.0, systematic=[pattern()])
     assert verdict(few).code == "gross-errors"
-    assert any("The model is likely wrong" in line for line in verdict(few).lines)
+    assert "verdict.model" in {line.code for line in verdict(few).lines}
     w[:3] = good(factor=5.0)[:3]
     w[0, 0] = 30.0
     assert verdict(findings(w, 27.0, systematic=[pattern()])).code == "model"
@@ -167,9 +169,15 @@ def test_the_level_is_shared_and_stated():
     single = made.tests[1]
     assert single.level == pytest.approx(0.05 / 240)
     assert single.limits == (pytest.approx(-3.7089, abs=1e-3), pytest.approx(3.7089, abs=1e-3))
-    assert any("w (Baarda; the unit weight is known)" in line for line in made.lines)
+    assert statistics_of(made) == ["judged.w"]
     by_others = findings(good(), observations=[by_t(Observations("images", good(), named), F, F)])
-    assert any("externally studentized" in line for line in verdict(by_others).lines)
+    assert statistics_of(verdict(by_others)) == ["judged.t"]
+
+
+def statistics_of(made):
+    """Return codes of the statistics by which single observations are judged."""
+    line = next(line for line in made.lines if line.code == "line.tests")
+    return [each.code for each in line.fields["statistics"]]
 
 
 def test_one_observation_that_makes_up_everything_is_found():
@@ -193,7 +201,7 @@ def test_no_probability_is_lost():
     assert math.isfinite(made.tests[0].log10_p)
     (title, lines), (other, next_lines) = verdict_sections(made)
     assert (title, other) == ("Verdict", "What to do next")
-    assert next_lines == list(made.next)
+    assert next_lines == list(map(str, made.next))
     # The report says that it is tiny, the document how tiny.
     assert any("< 1e-99" in line and "rejected" in line for line in lines)
 
@@ -242,6 +250,7 @@ def test_a_good_block(simulated):
         "warning",
         "lines",
         "next",
+        "messages",
         "tests",
         "removed",
         "outliers",
@@ -311,7 +320,7 @@ def test_reliability_stands_in_report_and_document(simulated):
     images = [each for each in summary.weakest if each.kind == "image"]
     checked = (every.suspects.kinds == 0) & (every.tests.least > 0.01)
     assert images[0].external_sd == pytest.approx(np.nanmax(every.group_external[checked]))
-    group = [every.suspects.name(each) for each in range(len(checked))].index(images[0].name)
+    group = [str(every.suspects.name(each)) for each in range(len(checked))].index(images[0].name)
     moved = np.linalg.norm(every.own_point_effect[every.suspects.rows(group)], axis=1)
     assert images[0].own_point == pytest.approx(moved.max())
     assert all(0.9 < pair.correlation <= 1 for pair in summary.pairs)
@@ -378,7 +387,10 @@ def checks(*, error=0.0, together=1.0):
     own = by_w(Observations("check points", values, lambda place: f"K{place[0]}"))
     points = replace(own, statistic="T", dimension=np.full(3, 3.0))
     return Agreement(
-        points, global_test(9 * together, 9), np.ones((3, 3)), lambda place, sd: f"off by {sd[0]:g} m in Z"
+        points,
+        global_test(9 * together, 9),
+        np.ones((3, 3)),
+        lambda place, sd: {"difference": 2.0, "unit": "m", "axis": "Z", "sd": float(sd[0])},
     )
 
 
@@ -426,8 +438,9 @@ def test_an_exchange_is_named_although_another_sentence_contains_it():
     short, long = "1 and 2 are exchanged on photo 7", "1 and 2 are exchanged on photo 71"
     base = vars(findings(good()))
     snooped = Removed([{"name": "a"}], exchanged=[long])
-    assert short in verdict(Findings(**{**base, "snooped": snooped, "exchanged": [short]})).lines
-    assert long not in verdict(Findings(**{**base, "snooped": snooped, "exchanged": [long]})).lines
+    for exchanged, alone in ((short, True), (long, False)):
+        made = verdict(Findings(**{**base, "snooped": snooped, "exchanged": [exchanged]}))
+        assert ({"text": exchanged} in [line.fields for line in made.lines]) == alone
 
 
 @pytest.mark.parametrize("first", SITUATIONS)
@@ -438,9 +451,9 @@ def test_no_two_sentences_contradict_each_other(first):
     ]:
         situation = {**SITUATIONS[first], **SITUATIONS[second], **SITUATIONS[third]}
         ways = {
-            "snoop": "--snoop",
-            "take_out": "`--snoop` takes them out",
-            "calibrate": "--self-calibrate all",
+            "can_snoop": True,
+            "take_out": Phrase("advice.snoop"),
+            "calibrate": Phrase("how.calibrate", {"names": "c"}),
         }
         base = {**vars(findings(good())), **ways}
         made = verdict(Findings(**{**base, **situation}))
@@ -457,5 +470,5 @@ def test_no_two_sentences_contradict_each_other(first):
         # The headline is of the gravest.
         assert made.exit or "model is likely wrong" not in text, case
         if made.code == "model" and situation.get("systematic") == SITUATIONS["lens"]["systematic"]:
-            assert "--self-calibrate" in made.next[0], case
-            assert "--snoop" not in text, case
+            assert made.next[0].code == "advice.calibrate", case
+            assert "photogram.snoop" not in text, case

@@ -13,6 +13,7 @@ from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
 from photogram.network.wider_models import with_parameters
 from photogram.show.methods import page_of
+from photogram.words import Phrase
 
 
 @pytest.fixture
@@ -71,16 +72,16 @@ def test_a_hint_heads_the_verdict():
     plain = adjust(mirrored)
     assert plain.hints == ()
     assert plain.verdict.exit
-    assert any("photogram.diagnose" in line for line in plain.verdict.next)
+    checks = [step.fields["check"] for step in plain.verdict.next if "check" in step.fields]
+    assert Phrase("how.check.network") in checks
     found = diagnose(mirrored, plain)
     down = found.result
     assert found.verdict.headline == down.verdict.headline
     assert [each.text for each in found.grave] == list(down.hints) != []
     assert down.verdict.hints == down.hints
     assert down.verdict.exit in (3, 4)
-    lines = [down.verdict.headline, *down.verdict.lines]
-    assert any("y of the images has the wrong sign" in line for line in lines)
-    assert any("nothing was corrected" in line for line in lines)
+    assert any("y of the images has the wrong sign" in hint for hint in down.verdict.hints)
+    assert "line.hints" in {line.code for line in down.verdict.lines}
     good = adjust(block)
     assert good.hints == good.verdict.hints == ()
 
@@ -142,15 +143,17 @@ def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_pat
     ).block
     found = adjust(block)
     assert (found.verdict.code, found.verdict.exit) == ("model", 4)
-    assert "--self-calibrate c,xp,yp,K1,K2,P1,P2 estimates it" in found.verdict.headline
+    names = "c,xp,yp,K1,K2,P1,P2"
+    remedy = found.verdict.message.fields["remedy"]
+    assert (remedy.code, remedy.fields["how"].fields) == ("part.calibrate.first", {"names": names})
     page = page_of(found)
-    assert "--self-calibrate c,xp,yp,K1,K2,P1,P2" in page.advice[0]
-    words = " ".join([found.verdict.headline, *found.verdict.lines, *page.advice])
-    assert "--snoop" not in words
+    assert (page.advice[0].code, page.advice[0].fields) == ("advice.calibrate", {"names": names})
+    words = " ".join(map(str, [found.verdict.headline, *found.verdict.lines, *page.advice]))
+    assert "photogram.snoop" not in words
     assert "gross" not in words.lower()
     looked = diagnose(block)
     assert [each.kind for each in looked.grave] == ["lens"]
-    assert "--self-calibrate c,xp,yp,K1,K2,P1,P2 estimates it" in looked.grave[0].text
+    assert f"{names} (`Camera.sd`) estimates it" in looked.grave[0].text
     # A wrong observation is still one, and no lens.
     good = block.replace(cameras=[lens])
     xy = good.image_xy.copy()
@@ -165,8 +168,8 @@ def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_pat
 @pytest.mark.parametrize(
     ("model", "principal", "advice"),
     [
-        ("pinhole", ("fx", "fy"), "--self-calibrate f,cx,cy,k1,k2,p1,p2"),
-        ("simple_pinhole", ("f",), "--self-calibrate f,cx,cy,k1,k2"),
+        ("pinhole", ("fx", "fy"), "f,cx,cy,k1,k2,p1,p2"),
+        ("simple_pinhole", ("f",), "f,cx,cy,k1,k2"),
     ],
 )
 @pytest.mark.parametrize("free", [False, True])
@@ -181,11 +184,11 @@ def test_a_pinhole_with_distorted_images_gets_lens_terms(run, tmp_path, model, p
     ).block
     found = adjust(block)
     assert found.verdict.code == "model"
-    assert f"{advice} estimates it" in found.verdict.headline
-    assert any(advice in each for each in found.verdict.next)
+    assert found.verdict.message.fields["remedy"].fields["how"].fields == {"names": advice}
+    assert Phrase("advice.calibrate", {"names": advice}) in found.verdict.next
     looked = diagnose(block)
     assert [each.kind for each in looked.grave] == ["lens"]
-    assert f"{advice} estimates it" in looked.grave[0].text
+    assert f"{advice} (`Camera.sd`) estimates it" in looked.grave[0].text
     assert looked.grave[0].values["times_smaller"] > 3
     project = formats.Project(
         block=block,
@@ -198,7 +201,7 @@ def test_a_pinhole_with_distorted_images_gets_lens_terms(run, tmp_path, model, p
     for name, content in formats.to_files(project, "plain").items():
         (tmp_path / "block" / name).parent.mkdir(exist_ok=True)
         (tmp_path / "block" / name).write_bytes(content)
-    done = run("adjust", "block", *advice.split(), "--json", "result.json", "-q")
+    done = run("adjust", "block", "--self-calibrate", advice, "--json", "result.json", "-q")
     assert done.exit_code in (0, 4), done.output
     document = json.loads(Path("result.json").read_bytes())
     assert document["verdict"]["code"] != "model"

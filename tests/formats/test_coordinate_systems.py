@@ -11,6 +11,7 @@ from photogram import InputError, adjust, formats
 from photogram.formats import Frame
 from photogram.formats.supplements import with_control
 from photogram.io.delimited import read_columns
+from photogram.words import Phrase
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")
@@ -188,7 +189,9 @@ def test_weighted_control_of_another_system_is_control(utm):
     own = result.kinds["control"].residuals[:4]
     np.testing.assert_allclose(np.linalg.norm(differences, axis=1), np.linalg.norm(own, axis=1), rtol=1e-9)
     np.testing.assert_allclose(differences[:, 2], -own[:, 2], atol=1e-4)
-    free = formats.read(EXAMPLE).replace(frame=FRAME, lacks=("no control (--control FILE)",))
+    free = formats.read(EXAMPLE).replace(
+        frame=FRAME, lacks=(Phrase("read.free", {"option": Phrase("option.control")}),)
+    )
     assert with_control(free, table, {}, "EPSG:32632").lacks == ()
 
 

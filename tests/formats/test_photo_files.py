@@ -12,6 +12,7 @@ from photogram import InputError, Position, formats
 from photogram.formats import PhotoFiles, Wishes, read_metadata
 from photogram.formats.metadata.search import Photos
 from photogram.formats.metadata.systems import located
+from photogram.words import Phrase, option_sd
 
 MRK = "{}\t384233.385421\t[2264]\t -40,N\t 0,E\t 86,V\t{},Lat\t{},Lon\t{},Ellh\t0.021, 0.022, 0.043\t50,Q\n"
 PLACE = (8.5, 47.3, 500.0)
@@ -229,7 +230,7 @@ def test_deviations_that_lack_are_told_and_given_by_the_option(tmp_path):
     block_with_pictures(tmp_path, write=write)
     project = adjusted(tmp_path)
     assert positions(project) == {}
-    assert "no standard deviations of 6 positions of photos (--sd gnss=...)" in project.lacks
+    assert Phrase("read.positions", {"n": 6, "option": option_sd("gnss")}) in project.lacks
     project = adjusted(tmp_path, sd={"gnss": (0.02, 0.02, 0.04)})
     assert len(positions(project)) == 6
     assert "standard deviations: 6 given (--sd gnss)" in said(project)
@@ -422,6 +423,6 @@ def test_positions_that_are_not_used_are_of_no_kind(tmp_path):
     block_with_pictures(tmp_path, write=write)
     project = adjusted(tmp_path)
     assert len(positions(project)) == 5
-    assert "no standard deviations of 1 position of photos (--sd gnss=...)" in project.lacks
+    assert Phrase("read.positions", {"n": 1, "option": option_sd("gnss")}) in project.lacks
     with pytest.raises(InputError, match="heights of two kinds"):
         adjusted(tmp_path, sd={"gnss": (5.0,)})

@@ -28,6 +28,7 @@ from photogram.io import delimited
 from photogram.io.delimited import read_columns
 from photogram.io.units import scaled
 from photogram.network import Attitude, Boresight, Control, Difference, Drift, Mount, Sensor, Shift
+from photogram.words import option_sd
 
 ANGLES = ("omega", "phi", "kappa")
 EXAMPLE = Path(formats.__file__).parents[1] / "examples" / "project"
@@ -179,7 +180,7 @@ def test_the_small_sample_has_no_more_than_it_needs():
     matrices = Attitudes.of("omega_phi_kappa", result.photo_attitudes).values("matrix_to_photo")
     for name, matrix in zip(result.block.photo_ids, matrices, strict=True):
         np.testing.assert_allclose(matrix, known[name]["rotation"], atol=1e-6)
-    assert "--sd images" in project.lacks[0]
+    assert project.lacks[0].fields["option"] == option_sd("images")
 
 
 @pytest.mark.parametrize(

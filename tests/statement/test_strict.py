@@ -9,6 +9,7 @@ import pytest
 from golden_statement import BLOCK
 
 from photogram.results.statement.judgement import judged
+from photogram.statistics.verdict import as_phrase
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +99,9 @@ def test_a_warning_of_the_adjustment_is_no_result_that_cannot_be_used(plain, mon
 @pytest.mark.parametrize("code", [3, 4])
 def test_a_verdict_that_forbids_the_use_forbids_the_statement(plain, monkeypatch, code):
     verdict = plain.result.verdict
-    monkeypatch.setitem(vars(plain.result), "verdict", replace(verdict, exit=code, headline="Undetermined"))
+    monkeypatch.setitem(
+        vars(plain.result), "verdict", replace(verdict, exit=code, message=as_phrase("Undetermined"))
+    )
     found = judge(plain, plain.left_out, strict=False)
     assert seen(found) == (4, "bad")
     assert found.headline == "The adjustment cannot be used as it is: Undetermined"

@@ -1,14 +1,17 @@
 """The words of statements: one table a language, the same keys and fields in all."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import photogram.results.statement as package
-from photogram.results.statement.texts import LANGUAGES, Texts, fields_of, table_of
+from photogram import words
+from photogram.results.statement.texts import LANGUAGES, Texts, fields_of
 from photogram.show.page import decimals_of
+from photogram.words import table_of
 
 SOURCES = Path(package.__file__).parent
 
@@ -18,10 +21,14 @@ def test_languages_have_the_same_keys_and_fields(language):
     english, own = table_of("en"), table_of(language)
     assert sorted(own) == sorted(english)
     for key, sentence in own.items():
-        # The verdict of the adjustment stands on English pages as it is, on others by its code.
-        lacking = {"said"} if language != "en" and key.startswith("verdict.") else set()
-        assert fields_of(sentence) == fields_of(english[key]) - lacking, key
+        assert fields_of(sentence) == fields_of(english[key]), key
     assert Texts(language).missing == []
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_file_of_words_is_toml(language):
+    source = Path(words.__file__).with_name(f"{language}.toml")
+    assert tomllib.loads(source.read_text(encoding="utf-8")) == table_of(language)
 
 
 def test_every_key_that_is_said_stands_in_the_table():

@@ -1,6 +1,5 @@
 """Words of other modules on pages in another language: a key for each, and nothing in English is left."""
 
-import ast
 import html
 import re
 from dataclasses import replace
@@ -17,29 +16,26 @@ from photogram.formats.crs import axes_of
 from photogram.network import Observation, Unknown
 from photogram.network.refraction import Air, Water
 from photogram.results import datum as datums
-from photogram.results import patterns
 from photogram.results.features import KINDS as FORMS
 from photogram.results.features_report import through
-from photogram.results.findings import PLURALS
-from photogram.results.fixed_tests import HELD
 from photogram.results.group_sums import observables
+from photogram.results.observation_kinds import named_observation, parts_of
 from photogram.results.result import adjusted
 from photogram.results.statement import budget, translation
-from photogram.results.statement.texts import LANGUAGES, Texts, table_of
+from photogram.results.statement.quantities import component_of
+from photogram.results.statement.texts import LANGUAGES, Texts
+from photogram.statistics.verdict import RULES
+from photogram.words import Phrase, option_sd, table_of
 
 PACKAGE = Path(photogram.__file__).parent
 CRATE = Path(__file__).parents[2] / "crates" / "photocore" / "src"
 ENGLISH, GERMAN = Texts("en"), Texts("de")
+LETTERS = ("x", "y", "z", "X", "Y", "Z", "omega", "phi", "kappa")
+"""Components with the same name in all languages."""
 
 
 def source(module):
     return Path(module.__file__).read_text(encoding="utf-8")
-
-
-def verdicts():
-    """Return the source of what verdicts say."""
-    names = ("verdict.py", "evidence.py")
-    return "".join((PACKAGE / "statistics" / name).read_text(encoding="utf-8") for name in names)
 
 
 def below(kind):
@@ -82,14 +78,11 @@ def test_every_component_has_a_word_or_is_a_letter():
     names |= {
         name for crs in ("ENU:48,9", "EPSG:4978", "EPSG:25832", "EPSG:4979") for name in axes_of(crs)[0]
     }
-    assert not lacking("axis", (names | {"column", "row"}) - set(translation.LETTERS))
+    assert not lacking("axis", (names | {"column", "row"}) - set(LETTERS))
 
 
 def test_every_verdict_datum_frame_and_reason_has_a_sentence(result):
-    codes = set(re.findall(r'_Line\(\s*"([a-z-]+)"', verdicts()))
-    codes |= set(re.findall(r'"(not-tested|accepted)",', verdicts()))
-    assert len(codes) > 20
-    assert not lacking("verdict", codes)
+    assert not lacking("verdict", {rule.code for rule in RULES})
     kinds = set(re.findall(r'self\.kind == "([a-z ]+)"', source(datums))) | {"observations"}
     assert len(kinds) == 5
     assert not lacking("datum", kinds)
@@ -105,85 +98,51 @@ def test_every_verdict_datum_frame_and_reason_has_a_sentence(result):
     assert not lacking("quantity", (set(adjusted(result).things) - {"step"}) | {"distance", "linear"})
 
 
-def test_every_test_of_a_verdict_is_known_again(result):
-    names = [*PLURALS.values(), HELD, "global", "check points", "check points together", "image coordinates"]
-    names += ["components of control", "components of stations", "observations of the kind distance"]
-    names += ["components of observations of the kind distance"]
-    patterned = re.findall(r'(?:name=|_regressed\(\s*)f?"([^"]+)"', source(patterns))
-    assert len(patterned) == 5
-    names += [re.sub(r"\{.*?\}", "X", each) for each in patterned]
-    for name in names:
-        assert ENGLISH.recognised("test", name.partition(": ")[0]) is not None, name
-    tests = [each.name for each in result.verdict.tests]
+def test_every_test_of_a_verdict_has_a_name_in_the_language(result):
+    tests = result.verdict.tests
     assert len(tests) > 8
-    for name in tests:
-        said = f"{name[:1].upper()}{name[1:]}"
-        assert translation.test(ENGLISH, name) == said
-        assert translation.test(GERMAN, name) != said, name
+    for test in tests:
+        assert ENGLISH.text(test.kind) == str(test.kind)
+        assert GERMAN.text(test.kind) != str(test.kind), test.kind
 
 
 @pytest.mark.parametrize(
-    ("said", "german"),
+    ("name", "english", "german"),
     [
-        ("image of point 7 on photo 3", "Bildpunkt 7 in Bild 3"),
-        ("control point G1", "Passpunkt G1"),
-        ("X, Y of control point G1", "X, Y von Passpunkt G1"),
-        ("length of distance A - B", "Länge von Strecke A - B"),
-        ("position of photo 3, which is held", "Position von Bild 3, festgehalten"),
-        ("all of photo 3", "alles von Bild 3"),
-        ("equal height A - B - C", "gleiche Höhe A - B - C"),
-        ("unknown flight", "Unbekannte flight"),
-        ("corner of house", "corner of house"),
-        ("C04", "C04"),
+        (Phrase("named.image", {"point": "A on photo B", "photo": "C"}),
+         "image of point A on photo B on photo C", "Bildpunkt A on photo B in Bild C"),
+        (named_observation("distance", "A - B"), "distance A - B", "Strecke A - B"),
+        (named_observation("prior, lever arm", "flight"),
+         "prior, lever arm flight", "Vorwert, Hebelarm flight"),
+        (named_observation("own kind", "A"), "own kind A", "own kind A"),
+        (parts_of(["length"], named_observation("distance", "A - B")), "length of distance A - B",
+         "Länge von Strecke A - B"),
+        (parts_of("XY", Phrase("named.control", {"point": "R, which is held"})),
+         "X, Y of control point R, which is held", "X, Y von Passpunkt R, which is held"),
+        (Phrase("named.held", {"named": Phrase("named.position", {"photo": "3"})}),
+         "position of photo 3, which is held", "Position von Bild 3, festgehalten"),
     ],
-)
-def test_names_of_observations_are_turned_and_those_of_users_are_not(said, german):
-    assert translation.named(GERMAN, said) == german
-    assert translation.named(ENGLISH, said) == said
-
-
-@pytest.mark.parametrize(
-    ("said", "german"),
-    [
-        ("image of point A on photo B on photo C", "Bildpunkt A on photo B in Bild C"),
-        ("image of point P on photo B on photo C", "Bildpunkt P in Bild B on photo C"),
-        ("point A on photo B on photo C", "Punkt A on photo B in Bild C"),
-        ("X, Y of control point A on photo B", "X, Y von Passpunkt A on photo B"),
-        ("control point X, Y of control point P", "Passpunkt X, Y of control point P"),
-        ("control point R, which is held", "Passpunkt R, which is held"),
-        ("control point R, which is held, which is held", "Passpunkt R, which is held, festgehalten"),
-        ("photo 301 (too few known points)", "Bild 301 (too few known points)"),
-    ],
-)
-def test_names_are_never_divided(said, german):
-    points = {"A on photo B", "P", "X, Y of control point P", "R, which is held"}
-    names = {"point": points, "photo": {"C", "B on photo C"}, "camera": {"left: wide", "wide"}}
-    both = [Texts(language, names=names) for language in ("en", "de")]
-    assert [translation.named(each, said) for each in both] == [said, german]
-    assert translation.test(both[1], f"images: {said}") == f"Bildpunkte: {german}"
-    assert translation.test(both[1], "pattern over the frame of left: wide").endswith(" von left: wide")
-    assert translation.quantity(
-        Texts("de", names={"point": {"gable rotation"}}), "point gable rotation x"
-    ) == ("Punkt gable rotation x")
-
-
-def test_names_of_points_are_the_users():
-    assert translation.test(GERMAN, "check points: plane 3 of house") == "Kontrollpunkte: plane 3 of house"
-    assert translation.test(GERMAN, "pattern by photo: line 4") == "Muster nach Bildern: line 4"
-    assert translation.quantity(GERMAN, "point roof height z") == "Punkt roof height z"
+)  # fmt: skip
+def test_names_of_observations_are_in_the_language_and_those_of_users_are_not(name, english, german):
+    assert str(name) == ENGLISH.text(name) == english
+    assert GERMAN.text(name) == german
 
 
 def test_quantities_and_parameters_are_named_in_the_language(result):
-    linear = "linear function of point C01, point C02"
-    for name, german in (
-        ("point C08 height", "Punkt C08 Höhe"),
-        ("distance C01 C30", "Strecke C01 C30"),
-        ("unknown flight z", "Unbekannte flight z"),
-        (linear, "lineare Funktion von Punkt C01, Punkt C02"),
+    points = [Phrase("quantity.point", {"of": name}) for name in ("C01", "C02")]
+    height, rotation = Phrase("axis.height"), Phrase("axis.rotation x")
+    for name, english, german in (
+        (Phrase("quantity.point", {"of": component_of("C08", height)}), "point C08 height", "Punkt C08 Höhe"),
+        (Phrase("quantity.distance", {"of": "C01 C30"}), "distance C01 C30", "Strecke C01 C30"),
+        (component_of("rig 1", rotation), "rig 1 rotation x", "rig 1 Drehung x"),
+        (
+            Phrase("quantity.linear", {"quantities": points}),
+            "linear function of point C01, point C02",
+            "lineare Funktion von Punkt C01, Punkt C02",
+        ),
     ):
-        assert translation.quantity(ENGLISH, name) == name
-        assert translation.quantity(GERMAN, name) == german
-    assert translation.parameter(GERMAN, "rig 1 rotation x") == "rig 1 Drehung x"
+        assert ENGLISH.text(name) == english
+        assert GERMAN.text(name) == german
     assert translation.observation(GERMAN, ("image", "3", "7", "row")) == "Bildpunkt 3 7 Zeile"
     gradient = {("point", "C01"): [0, 0, 1], ("point", "C02"): [0, 0, -1]}
     found = result.statement(language="de", budgets=(gradient,), standards=("plain",))
@@ -277,69 +236,23 @@ def test_a_point_that_says_nothing_has_its_reason_in_the_language(result):
     assert "Kontrollpunkt C05 sagt nichts aus: keine Bildpunkte." in found.judged.remarks
 
 
-def test_a_verdict_is_told_by_its_code_and_in_english_as_it_stands(result, monkeypatch):
-    own = replace(result.verdict, code="check-points", headline="Check points disagree: C04", exit=4)
-    monkeypatch.setitem(vars(result), "verdict", own)
-    found = {
-        each: result.statement(language=each, budgets=(), removed=("control point G01",))
-        for each in LANGUAGES
-    }
-    assert found["en"].headline == "The adjustment cannot be used as it is: Check points disagree: C04"
-    assert found["de"].headline == (
-        "Die Ausgleichung ist so nicht verwendbar: Die Kontrollpunkte widersprechen der Ausgleichung"
+def test_a_verdict_has_the_same_fields_in_both_languages(result, monkeypatch):
+    check = Phrase("part.check", {"name": "C04", "difference": 0.3, "unit": "m", "axis": "Z", "sd": 0.1})
+    message = Phrase("verdict.check-points", {"points": [check]})
+    monkeypatch.setitem(
+        vars(result), "verdict", replace(result.verdict, code="check-points", message=message, exit=4)
     )
+    removed = Phrase("named.control", {"point": "G01"})
+    found = {each: result.statement(language=each, budgets=(), removed=(removed,)) for each in LANGUAGES}
+    assert found["en"].headline.endswith("1) C04, +0.3 m in Z (sd 0.1)")
+    assert found["de"].headline.endswith("1) C04, +0,3 m in Z (Standardabweichung 0,1)")
     assert "Passpunkt G01" in found["de"].to_html().decode()
 
 
-def assumed_of_files():
-    """Yield what readers of files say that lacks, with numbers in the place of what is put in."""
-    for path in sorted((PACKAGE / "formats").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            for value in values_of(node):
-                yield from sentences(value)
-
-
-def values_of(node):
-    """Return what a node adds to a list of what lacks."""
-    names = ("lacks", "lacking")
-    if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "append":
-        place = node.func.value
-        return node.args if getattr(place, "id", getattr(place, "attr", "")) in names else []
-    if isinstance(node, ast.keyword) and node.arg == "lacks":
-        return [node.value]
-    if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") in names:
-        return [node.value]
-    return []
-
-
-def sentences(node):
-    if isinstance(node, ast.JoinedStr):
-        yield "".join(filled(each) for each in node.values)
-    elif isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
-        yield node.value
-    elif isinstance(node, ast.List | ast.Tuple | ast.IfExp):
-        for each in ast.iter_child_nodes(node):
-            yield from sentences(each)
-
-
-def filled(part):
-    if isinstance(part, ast.Constant):
-        return part.value
-    if isinstance(part.value, ast.Call) and getattr(part.value.func, "id", "") == "counted":
-        return f"7 {part.value.args[1].value}s"
-    return "7"
-
-
-def test_what_is_assumed_of_files_is_told_in_the_language():
-    said = list(assumed_of_files())
-    assert len(said) > 10
-    for each in said:
-        assert ENGLISH.recognised("read", each) is not None, each
-        assert translation.read(ENGLISH, each) == each
-    assumed = "no standard deviations of image coordinates: 0.5 px is assumed (--sd images=...)"
-    assert translation.read(GERMAN, assumed) == (
-        "Standardabweichungen der Bildkoordinaten fehlen: Angenommen ist 0,5 px (--sd images=...)"
-    )
+def test_assumptions_of_readers_are_in_the_language():
+    assumed = Phrase("read.images", {"number": 0.5, "unit": "px", "option": option_sd("images")})
+    for texts, number in ((ENGLISH, "0.5 px"), (GERMAN, "0,5 px")):
+        assert number in texts.text(assumed)
 
 
 STANDARDS = "ASPRS Positional Accuracy Standards, Edition 2"
@@ -367,7 +280,7 @@ def test_no_english_word_is_left_on_a_german_page():
         page = page.replace(own, " ")
     known = letters(" ".join(table_of("de").values()))
     english = letters(" ".join(table_of("en").values()))
-    english |= letters(verdicts() + source(datums) + source(patterns))
+    english |= letters(source(datums))
     # What the survey calls its camera, its lever arm and its files is its own.
     own = {"drone", "flight", "photogram", "program"}
     assert not (letters(page) & english) - known - own

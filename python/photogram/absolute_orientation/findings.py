@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from photogram.show.page import significant
 from photogram.statistics.findings import Findings, Tested
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import Orientation
@@ -22,14 +23,11 @@ def orientation_findings(result: Orientation) -> Findings:
         control = Tested("control", result.tested, name, "t", second=max(result.degrees_of_freedom - 1, 1))
     if_usable = []
     if not result.weighted and result.degrees_of_freedom:
-        if_usable.append(
-            "Give standard deviations where they are known: the residuals are tested as a whole then."
-        )
+        if_usable.append(Phrase("advice.give-sd"))
     if result.degrees_of_freedom == 0:
-        if_usable.append("Seven known coordinates are just enough: one more makes errors visible.")
+        if_usable.append(Phrase("advice.one-more"))
     if_usable += [
-        f"Another orientation fits as well, with the scale {significant(each.scale, 6)}: only you know which"
-        " is meant."
+        Phrase("advice.alternative", {"scale": significant(each.scale, 6)})
         for each in result.alternatives[:1]
     ]
     return Findings(
@@ -37,9 +35,9 @@ def orientation_findings(result: Orientation) -> Findings:
         observations=[control],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=result.test,
-        untested="no standard deviations are given" if not result.weighted else "no degrees of freedom",
+        untested=Phrase("untested.sd" if not result.weighted else "untested.freedom"),
         scaled=result.unit_variance != "unity",
         hints=[str(message) for message in result.grave],
-        take_out="`--reject ID` leaves the control of a station out; compare what it does to the others.",
+        take_out=Phrase("advice.leave-station-out"),
         if_usable=if_usable,
     )

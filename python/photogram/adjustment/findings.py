@@ -8,9 +8,11 @@ import numpy as np
 
 from photogram.adjustment.resection import Resection
 from photogram.arguments.types import Floats
+from photogram.results.observation_kinds import parts_of
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
+from photogram.words import Phrase
 
 UNKNOWNS = ("X", "Y", "Z", "omega", "phi", "kappa")
 
@@ -20,32 +22,38 @@ def resection_findings(result: Resection) -> Findings:
     """Return the tests of a resection: standard deviations are given, so the unit weight is known."""
     ids = result.point_ids
 
-    def kind(what: str, w: Floats, redundancy: Floats, name: Callable[[tuple[int, ...]], str]) -> Tested:
+    def kind(
+        what: Phrase, w: Floats, redundancy: Floats, name: Callable[[tuple[int, ...]], Phrase]
+    ) -> Tested:
         return Tested(what, np.where(redundancy > TESTABLE, w, np.nan), name, "w")
 
     return Findings(
         status=result.status,
         observations=[
             kind(
-                "image coordinates",
+                Phrase("test.image_coordinates"),
                 result.standardized,
                 result.redundancy,
-                lambda index: f"{'xy'[index[1]]} of point {ids[index[0]]}",
+                lambda index: parts_of(
+                    "xy"[index[1]], Phrase("named.object_point", {"point": str(ids[index[0]])})
+                ),
             ),
             kind(
-                "components of control",
+                Phrase("test.components_of_control"),
                 result.point_standardized,
                 result.point_redundancy,
-                lambda index: f"{UNKNOWNS[index[1]]} of control point {ids[index[0]]}",
+                lambda index: parts_of(
+                    [UNKNOWNS[index[1]]], Phrase("named.control", {"point": str(ids[index[0]])})
+                ),
             ),
             kind(
-                "components of the station",
+                Phrase("test.components_of_station"),
                 result.pose_standardized,
                 result.pose_redundancy,
-                lambda index: f"{UNKNOWNS[index[0]]} of the station",
+                lambda index: parts_of([UNKNOWNS[index[0]]], Phrase("named.station")),
             ),
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=result.global_test,
-        untested="no degrees of freedom",
+        untested=Phrase("untested.freedom"),
     )

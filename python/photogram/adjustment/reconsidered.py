@@ -27,6 +27,7 @@ from photogram.network.geometry import Cartesian
 from photogram.network.motion import timed_photos
 from photogram.network.subset import kept_images
 from photogram.results.result import Result
+from photogram.words import Phrase
 
 FITS = 10.0
 """Standard deviations, by the median of the images that take part, within which an image returns: the tests
@@ -114,7 +115,7 @@ def _fitting(block: Block, aside: Bools, result: Result) -> Bools:
     return np.asarray(missed <= FITS * max(float(usual), 1.0))
 
 
-def _named(started: FirstValues) -> tuple[str, ...]:
+def _named(started: FirstValues) -> tuple[Phrase, ...]:
     """Name what is still out: photos with the reason, and images."""
     block = started.block
     images = zip(
@@ -123,9 +124,9 @@ def _named(started: FirstValues) -> tuple[str, ...]:
         strict=True,
     )
     return (
-        *(f"photo {photo} ({why})" for photo, why in started.missing.items()),
+        *(Phrase("named.missing", {"missing": photo, "why": why}) for photo, why in started.missing.items()),
         *(
-            f"image of point {block.point_ids[point]} on photo {block.photo_ids[photo]}"
+            Phrase("named.image", {"point": block.point_ids[point], "photo": block.photo_ids[photo]})
             for photo, point in images
         ),
     )

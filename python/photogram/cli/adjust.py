@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from photogram.results.statement.statement import Statement
     from photogram.show.page import Section as Chapter
     from photogram.show.sections import Section
+    from photogram.words import Phrase
 
 
 @with_job
@@ -276,7 +277,7 @@ def _snooped(
     from photogram.diagnosis.after_adjustment import diagnosed, errors_explained
     from photogram.results.fitting import with_features
 
-    aside: tuple[str, ...] = ()
+    aside: tuple[Phrase | str, ...] = ()
     if started is not None and (started.set_aside.any() or started.missing):
         first = run(started)
         block, aside = first.block, first.set_aside

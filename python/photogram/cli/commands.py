@@ -160,11 +160,15 @@ def _version(asked: bool) -> None:
 
 
 def _photogram(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Photogrammetric least-squares adjustment with the covariance of every result."""
+    from photogram.words import on_command_line  # the help has no messages
+
+    context.with_resource(on_command_line())
 
 
 def __getattr__(name: str) -> object:

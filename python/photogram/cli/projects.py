@@ -281,7 +281,7 @@ def described(project: Project) -> list[Section]:
             ("Cameras", cameras),
             ("Trajectories", motions(project)),
             ("Units and axes", conventions),
-            ("Lacking", list(project.lacks)),
+            ("Lacking", list(map(str, project.lacks))),
             ("Remarks", remarks),
         )
         if each[1]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from photogram import Result
     from photogram.formats import Project
     from photogram.results.statement.statement import Statement
+    from photogram.words import Phrase
 
 
 def _text(name: str, what: str, metavar: str = "TEXT") -> Any:
@@ -133,7 +134,7 @@ def stated(
     command: str = "statement",
     crs: str | None = None,
     strict: bool = False,
-    assumed: Sequence[str] = (),
+    assumed: Sequence[Phrase | str] = (),
 ) -> Statement:
     """Return the statement of a result, with the files it was made of; dated today where no date is given."""
     from datetime import date

@@ -15,6 +15,7 @@ from photogram.memory import available_memory
 from photogram.messages import listed
 from photogram.network.core_arrays import CoreOptions, core_network
 from photogram.results.network_trial import CONTROL, IMAGE, KINDS, NamedSuspects, NetworkTrial
+from photogram.words import Phrase
 
 ROUGH, EXACT = 1e-7, 1e-12
 """A step that lowers the sum of squares by less than this share ends a round; where R of all rows is used."""
@@ -99,9 +100,9 @@ class _Named(NamedSuspects):
         """Return the photo whose camera it is."""
         return np.array([subject])
 
-    def other_name(self, kind: int, subject: int) -> str:
-        """Return what the camera of a photo is called."""
-        return f"{KINDS[kind]} of {self.photo_name(subject)}"
+    def other_name(self, kind: int, subject: int) -> Phrase:
+        """Return the name of the camera of a photo."""
+        return Phrase(f"named.photo_{KINDS[kind]}", {"photo": str(self.given.photo_ids[subject])})
 
     def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
         """Return a parameter of a camera."""

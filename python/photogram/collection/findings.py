@@ -15,11 +15,8 @@ from photogram.results.fixed_tests import SUSPECTED, Held, held_tests
 from photogram.results.patterns import CameraImages, patterns
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
+from photogram.words import Phrase
 
-NO_DATUM = (
-    "Nothing gives the network a datum: shapes and relative precision can be used, absolute positions and the"
-    " scale mean nothing."
-)
 FIRST_OF_TRANSLATION = 3
 STEP = 1e-6
 """Of a parameter, in its own size or one."""
@@ -36,10 +33,9 @@ def collection_findings(result: AdjustedCollection) -> Findings:
     together = CameraImages("the cameras", np.ones(len(result.photo_parameters), dtype=bool), 0)
     return replace(
         network_findings(result, collection_held(result), patterns(result, [together])),
-        check="`photogram.diagnose` of the collection",
-        take_out="`--snoop` (`photogram.snoop`) takes gross errors out one after the other; `--loss huber`"
-        " or `cauchy` lowers their weights.",
-        if_usable=[NO_DATUM] if result.datum else [],
+        check=Phrase("how.check.collection"),
+        take_out=Phrase("advice.snoop-collection"),
+        if_usable=[Phrase("advice.no-datum")] if result.datum else [],
     )
 
 
@@ -53,24 +49,25 @@ def _suspected(result: AdjustedCollection, of_images: Floats) -> list[Held]:
     collection, used = result.collection, result.used_images
     rows: list[tuple[float, Held]] = []
 
-    def add(name: str, own: Indices, which: int, partials: Indices) -> None:
+    def add(name: Phrase, own: Indices, which: int, partials: Indices) -> None:
         images = np.flatnonzero(used & (own == which))
         if len(images):
             worst = float(of_images[images].mean())
-            rows.append((worst, Held(f"{name}, which is held", images, partials)))
+            rows.append((worst, Held(name, images, partials)))
 
     for photo in _worst(collection.image_photos, of_images, (collection.photo_sd == 0).any(axis=1)):
         held = np.flatnonzero(collection.photo_sd[photo] == 0)
         for what, part in (
             ("rotation", held[held < FIRST_OF_TRANSLATION]),
             ("translation", held[(held >= FIRST_OF_TRANSLATION) & (held < len(POSE))]),
-            ("camera", held[held >= len(POSE)]),
+            ("photo_camera", held[held >= len(POSE)]),
         ):
             if len(part):
-                add(f"{what} of photo {photo}", collection.image_photos, photo, part)
+                add(Phrase(f"named.{what}", {"photo": str(photo)}), collection.image_photos, photo, part)
     width = collection.photo_parameters.shape[1]
     for point in _worst(collection.image_points, of_images, (collection.point_sd == 0).all(axis=1)):
-        add(f"control point {point}", collection.image_points, point, width + np.arange(POINTS))
+        name = Phrase("named.control", {"point": str(point)})
+        add(name, collection.image_points, point, width + np.arange(POINTS))
     rows.sort(key=lambda row: -row[0])
     return [each for _, each in rows[: 3 * SUSPECTED]]
 

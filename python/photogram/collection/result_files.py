@@ -30,6 +30,7 @@ from photogram.results.result_files import (
 )
 from photogram.show.methods import files_of
 from photogram.statistics.findings import Removed
+from photogram.words import Phrase
 
 KIND = "collection"
 _AXES = ("x", "y", "z")
@@ -59,7 +60,7 @@ def collection_files(result: AdjustedCollection) -> dict[str, Content]:
 
 def read_collection_result(folder: Path, document: Mapping[str, Any]) -> AdjustedCollection:
     """Return the result of a collection that a folder keeps; InputError of files that do not hold one."""
-    saved = read_saved(folder, (CoreOptions, Iteration, Message, Removed), document)
+    saved = read_saved(folder, (CoreOptions, Iteration, Message, Phrase, Removed), document)
     given = saved.members("collection", Collection)
     images = saved.sheets["images"]
     for kind in ("photo", "point"):

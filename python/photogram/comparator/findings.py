@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.comparator.joint import JointFit
 from photogram.statistics.findings import Findings, Systematic, Tested
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration
@@ -46,19 +47,16 @@ def comparator_findings(calibration: Calibration) -> Findings:
         status="converged",
         observations=[readings, pointings],
         degrees_of_freedom=screening.freedom,
-        untested="readings have no standard deviation of their own",
-        spoiled=f"outliers change corrected coordinates by {screening.change_um:.1f} um (root mean square),"
-        f" and a coordinate is uncertain by {screening.sigma_um:.3f} um"
+        untested=Phrase("untested.readings"),
+        spoiled=Phrase(
+            "harmful.comparator",
+            {"change": float(screening.change_um), "sd": float(screening.sigma_um)},
+        )
         if screening.harmful
         else "",
         systematic=_grids(calibration.joint) if calibration.joint else [],
-        if_usable=[
-            "Correct measurements with `photogram comparator correct correction.json FILE`.",
-            "Keep the document of `--json`: `photogram comparator compare` finds what changes over years.",
-        ],
-        if_withheld=[
-            "The correction is withheld: measure the readings that are named again, or leave them out."
-        ],
+        if_usable=[Phrase("advice.correct-measurements"), Phrase("advice.keep-calibration")],
+        if_withheld=[Phrase("advice.correction-withheld")],
     )
 
 
@@ -66,8 +64,8 @@ def _grids(joint: JointFit) -> list[Systematic]:
     """Return the tests of the corrections of the plates against their standard deviations."""
     return [
         Systematic(
-            name=f"corrections of plate {plate}",
-            sentence=f"the grid of plate {plate} is off by {own.test.factor:.3g} standard deviations",
+            kind=Phrase("test.plate", {"plate": str(plate)}),
+            sentence=Phrase("pattern.plate", {"plate": str(plate), "factor": float(own.test.factor)}),
             statistic="s^2",
             distribution="chi2/f",
             dof=(own.test.degrees_of_freedom,),

@@ -9,7 +9,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.show.methods import Documented
 from photogram.show.page import Document
 from photogram.show.summary import Brief, Rows
-from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict
+from photogram.statistics.verdict import EXIT_NOT_CONVERGED, Verdict, as_phrase
 
 if TYPE_CHECKING:
     from photogram.results.result import Result
@@ -101,11 +101,11 @@ class Diagnosis(Documented, Brief):
             headline = f"Nothing grave was found; {len(look)} to look at" if look else "Nothing was found"
         return Verdict(
             code=code,
-            headline=headline,
+            message=as_phrase(headline),
             exit=exit_code,
             warning=bool(grave or look),
-            lines=tuple(each.text for each in [*grave[1:], *look]),
-            next=_CORRECT if grave else (*_LOOK, *_ADJUST) if look else _ADJUST,
+            lines=tuple(as_phrase(each.text) for each in [*grave[1:], *look]),
+            next=tuple(map(as_phrase, _CORRECT if grave else (*_LOOK, *_ADJUST) if look else _ADJUST)),
             tests=tests,
             hints=hints,
         )

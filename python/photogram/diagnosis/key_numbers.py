@@ -9,10 +9,11 @@ from photogram.diagnosis.editing import Edited
 from photogram.diagnosis.findings import Finding, Level, Section, Words, note, small_unit
 from photogram.diagnosis.robust import mad_sd
 from photogram.results.findings import HARMFUL
-from photogram.results.fixed_tests import HELD, IS_HELD, OF_CONTROL, OF_PHOTOS
+from photogram.results.fixed_tests import HELD
 from photogram.results.result import Result
 from photogram.show.methods import findings_of
 from photogram.statistics.evidence import WITHHELD, Evidence
+from photogram.words import Phrase
 
 VARIANCE = (0.5, 2.0)
 """Variance of unit weight between which the weights count as realistic."""
@@ -125,15 +126,13 @@ def held_values(result: Result) -> list[Finding]:
     if not tests:
         return []
     least = min(tests, key=lambda each: each.log10_p)
-    if least.accepted or not least.name.startswith(f"{HELD}: "):
+    if least.accepted or least.kind != HELD or isinstance(least.subject, str):
         return []
-    name, value = least.name.removeprefix(f"{HELD}: "), least.value
-    known = name.removesuffix(f", {IS_HELD}")
-    photos = [known.removeprefix(each) for each in OF_PHOTOS if known.startswith(each)]
-    points = [] if photos else [known.removeprefix(OF_CONTROL)]
+    value, of = least.value, least.subject.fields["named"].fields
+    photos, points = ([of[kind]] if kind in of else [] for kind in ("photo", "point"))
     text = (
-        f"{name}, does not fit: were it free, the sum of squares would fall by {value:.4g}, more than"
-        " by any observation; give it a standard deviation"
+        f"{least.subject}, does not fit: were it free, the sum of squares would fall by {value:.4g}, more"
+        " than by any observation; give it a standard deviation"
     )
     return [Finding("held-value", "grave", text, photos, points, {"statistic": value})]
 
@@ -143,6 +142,7 @@ def disagreeing(result: Result) -> list[Finding]:
     evidence = Evidence(findings_of(result))
     levels: tuple[tuple[Level, float], ...] = (("grave", WITHHELD), ("look", evidence.found.level))
     for level, limit in levels:
-        if said := evidence.disagreement(limit):
-            return [Finding("check-points", level, f"check points disagree with the adjustment: {said}")]
+        if points := evidence.disagreement(limit):
+            message = Phrase("verdict.check-points", {"points": points})
+            return [Finding("check-points", level, f"{str(message)[:1].lower()}{str(message)[1:]}")]
     return []

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.messages import counted
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.film import Certificate
@@ -27,17 +27,13 @@ def certificate_findings(certificate: Certificate) -> Findings:
         observations=tested,
         degrees_of_freedom=fits + len(compared),
         global_test=global_test(squares, fits) if fits else None,
-        untested="distances are compared with coordinates to 0.010 mm"
-        if compared
-        else "nothing is redundant",
+        untested=Phrase("untested.distances" if compared else "untested.redundant"),
         spoiled="; ".join(map(str, beyond)),
         remarks=[*_agreement(certificate), *certificate.told()],
         scaled=False,
-        check="look at the report: the figures as printed, names of marks, units",
-        take_out="Leave out the distance, or write what the report has: no figure was changed.",
-        if_withheld=[
-            "Compare the figures with the printed report: what is typed wrong there is only guessed."
-        ],
+        check=Phrase("how.check.certificate"),
+        take_out=Phrase("advice.certificate"),
+        if_withheld=[Phrase("advice.printed-report")],
     )
 
 
@@ -79,19 +75,16 @@ def _compared(certificate: Certificate) -> Tested:
     return Tested("distances beside coordinates", np.array(w), lambda at: compared[at[0]].name, "w")
 
 
-def _agreement(certificate: Certificate) -> list[str]:
+def _agreement(certificate: Certificate) -> list[Phrase]:
     """Say that distances agree with coordinates, or what holds a figure of distances alone."""
     compared = certificate.check()
     if compared and not any(each.beyond for each in compared):
         largest = max(abs(each.difference) for each in compared)
-        return [
-            f"{counted(len(compared), 'distance')} agree with the coordinates: largest difference"
-            f" {1e3 * largest:.1f} um"
-        ]
+        return [Phrase("line.distances", {"n": len(compared), "largest": 1e3 * float(largest)})]
     if certificate.places or not certificate.distances:
         return []
     adjusted = certificate.fiducials().adjusted
     assert adjusted is not None
     if not adjusted.free:
-        return ["too few distances for the figure of the marks: design places are observed with them"]
-    return ["the figure is free: of all places that fit alike those nearest to the design"]
+        return [Phrase("line.few-distances")]
+    return [Phrase("line.free-figure")]

@@ -29,6 +29,7 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
 from photogram.network.observations import Distance
+from photogram.words import Phrase
 
 TITLE = "AICON block"
 IMAGES, CAMERAS, POSES, POINTS, BARS = ".phc", ".ior", ".eor", ".obc", ".scale"
@@ -226,7 +227,7 @@ def _project(path: Path, found: _Found, wishes: Wishes) -> Project:
         image_xy=values[:, :2],
         image_sd=values[:, 2:] if np.isfinite(values[:, 2:]).all() else None,
         observations=found.bars,
-        lacks=[] if held.any() else ["no control: a free network (--datum inner, or --control FILE)"],
+        lacks=[] if held.any() else [Phrase("read.free", {"option": Phrase("option.datum")})],
         messages=found.messages,
         linear_unit="mm",
     )

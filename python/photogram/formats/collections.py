@@ -26,6 +26,7 @@ from photogram.io.packed_numbers import pieces
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.collection.collection import Collection
@@ -126,7 +127,7 @@ def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) 
         image_photos=places[found.image_photos],
         image_points=found.image_points,
         image_xy=np.array(found.image_xy),
-        lacks=["no control, scale or position on the earth: a free network (--control FILE)"],
+        lacks=[Phrase("read.placeless", {"option": Phrase("option.control")})],
         messages=remarks,
     )
 

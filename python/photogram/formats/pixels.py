@@ -25,6 +25,7 @@ from photogram.io.delimited import read_columns
 from photogram.io.files import read_beginning
 from photogram.io.rows import DELIMITERS
 from photogram.messages import Message, quoted
+from photogram.words import Phrase
 
 TITLE = "table of pixels"
 FILE = "images.csv"
@@ -124,7 +125,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         image_points=points.rows[keep],
         image_xy=xy[keep],
         image_sd=None if sd is None else sd[keep],
-        lacks=["no poses and no control: a free network, oriented first (--control FILE)"],
+        lacks=[Phrase("read.oriented", {"option": Phrase("option.control")})],
         messages=messages,
     )
 

@@ -29,6 +29,7 @@ from photogram.network.rigs import Mount
 from photogram.results.features import Definition
 from photogram.show.summary import Brief
 from photogram.targets.board import Board
+from photogram.words import Phrase, option_sd
 
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]
 
@@ -148,7 +149,7 @@ class Project(Brief):
     starts: Floats
     frame: Frame = field(default_factory=Frame)
     options: Options = field(default_factory=Options)
-    lacks: tuple[str, ...] = ()
+    lacks: tuple[Phrase, ...] = ()
     messages: tuple[Message, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
     sd_taken: bool = False
@@ -216,7 +217,7 @@ def assembled(
     passages: Sequence[Passage] = (),
     frame: Frame | None = None,
     options: Options | None = None,
-    lacks: Sequence[str] = (),
+    lacks: Sequence[Phrase] = (),
     messages: Sequence[Message] = (),
     details: Mapping[str, Any] | None = None,
     linear_unit: str = "m",
@@ -269,9 +270,8 @@ def assembled(
     if image_sd is None:
         unit = cameras[0].unit or "px"
         image_sd = ASSUMED_SD[unit]
-        lacking.append(
-            f"no standard deviations of image coordinates: {image_sd:g} {unit} is assumed (--sd images=...)"
-        )
+        fields = {"number": float(image_sd), "unit": unit, "option": option_sd("images")}
+        lacking.append(Phrase("read.images", fields))
     for each in (image_photos, image_points, image_xy, image_sd):
         if isinstance(each, np.ndarray):
             # Nobody writes these any more: the block shares them.

@@ -21,6 +21,7 @@ from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.network.observations import Control
+from photogram.words import Phrase, option_sd
 
 BETTER = 3.0
 """How much better rotations must fit transposed to be taken so."""
@@ -78,9 +79,7 @@ def project_of(
     lacks = []
     held = [name for name, (_, used) in found.control.items() if used.any()]
     if held and "control" not in wishes.sd:
-        lacks.append(
-            f"no standard deviations of control: {len(held)} points are only compared (--sd control=..)"
-        )
+        lacks.append(Phrase("read.control", {"number": len(held), "option": option_sd("control")}))
     check_sd = np.full_like(positions, np.nan)
     for name, (position, used) in found.control.items():
         # What is not held of a control point is not known; a check point is known altogether.

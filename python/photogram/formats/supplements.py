@@ -36,6 +36,7 @@ from photogram.network.wider_models import (
     with_parameters,
 )
 from photogram.results.result import Result
+from photogram.words import OPTIONS_OF_CONTROL, option_sd
 
 if TYPE_CHECKING:
     from photogram.formats.control_lists import ControlList
@@ -81,7 +82,8 @@ def with_sd(project: Project, sd: Mapping[str, tuple[float, ...]]) -> Project:
     if "images" not in sd or project.sd_taken:
         return project
     own = np.broadcast_to(sd["images"], (len(project.block.image_xy), 2))
-    lacks = tuple(each for each in project.lacks if "--sd images" not in each)
+    images = option_sd("images")
+    lacks = tuple(each for each in project.lacks if each.fields.get("option") != images)
     return project.replace(block=project.block.replace(image_sd=own), lacks=lacks)
 
 
@@ -443,7 +445,8 @@ def with_control(
         lacks=tuple(
             each
             for each in moved.lacks
-            if not ("--control FILE" in each and (full or np.isfinite(deviation).any()))
+            if not (full or np.isfinite(deviation).any())
+            or each.fields.get("option") not in OPTIONS_OF_CONTROL
         ),
     )
     planes = [

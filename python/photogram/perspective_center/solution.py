@@ -29,6 +29,7 @@ from photogram.show.summary import Brief
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.limits import externally_studentized, studentized_limit
 from photogram.statistics.reliability import ROUNDING, TESTABLE
+from photogram.words import Phrase
 
 __all__ = ["MOST_CYCLES", "SINGULAR", "Cycle", "PerspectiveCenter", "Weights", "determine"]
 
@@ -173,7 +174,7 @@ class PerspectiveCenter(Judged, Brief):
         names = [[f"{axis} of point {name}" for axis in "XY"] for name in self.grid.ids]
         kind, second = "readings of the grid", max(freedom - 1, 1)
         tests = [Tested(kind, values, lambda at: names[at[0]][at[1]], "t", second=second)]
-        why = "no standard deviations are given"
+        why = Phrase("untested.sd")
         return Findings(status=status, observations=tests, degrees_of_freedom=freedom, untested=why)
 
 

@@ -143,7 +143,7 @@ def _worst(groups: list[Observations], limit: float) -> list[tuple[float, str]]:
         for flat in order.tolist():
             index = tuple(int(k) for k in np.unravel_index(flat, sizes.shape))
             if sizes[index] > limit:
-                found.append((float(each.values[index]), each.name(index)))
+                found.append((float(each.values[index]), str(each.name(index))))
     return sorted(found, key=lambda pair: -abs(pair[0]))[:MAX_NAMES]
 
 

@@ -62,6 +62,7 @@ from photogram.results.tables import TABLES
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.methods import files_of
 from photogram.statistics.findings import Removed
+from photogram.words import Phrase
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
@@ -82,6 +83,7 @@ _CLASSES = (
     Message,
     Mount,
     ObservedKind,
+    Phrase,
     Quantity,
     Redundancies,
     Refraction,

@@ -15,6 +15,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.observations.points import Control
 from photogram.results.network import AdjustedNetwork
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.show.quantity import Axis
@@ -160,13 +161,16 @@ def observed_control(block: Block) -> list[int]:
     return [row for row, name in enumerate(block.point_ids) if name in names] if names else []
 
 
-def _apart(differences: Floats, axes: tuple[Axis, ...], place: tuple[int, ...], sd: Floats) -> str:
-    """Say how far a point is off in the component of the largest difference over its standard deviation."""
+def _apart(
+    differences: Floats, axes: tuple[Axis, ...], place: tuple[int, ...], sd: Floats
+) -> dict[str, float | str | Phrase]:
+    """Return how far a point is off in the component with the largest test value."""
     own = differences[place[0]]
     with np.errstate(all="ignore"):
         k = int(np.nanargmax(np.abs(own) / np.where(sd > 0, sd, 1e-300)))
     axis = axes[k]
-    return f"{own[k] * axis.factor:+.3g} {axis.small} in {axis.name} (sd {sd[k] * axis.factor:.2g})"
+    sizes = {"difference": float(own[k] * axis.factor), "sd": float(sd[k] * axis.factor)}
+    return {**sizes, "unit": axis.small, "axis": Phrase(f"axis.{axis.name}")}
 
 
 def _given(block: Block, rows: Indices, differences: Floats) -> tuple[Floats, Bools]:

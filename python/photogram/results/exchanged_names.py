@@ -22,6 +22,7 @@ from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, meet
 from photogram.statistics.exchanges import are_exchanged
+from photogram.words import Phrase
 
 MOST = 40
 """Images of a photo that are out; with more of them it is the photo."""
@@ -56,18 +57,17 @@ class Exchange:
     dimension: int
 
     @property
-    def sentence(self) -> str:
-        """What was found."""
+    def sentence(self) -> Phrase:
+        """The message on it."""
         one, other = self.points
-        where = " or ".join(f"photo {photo.removeprefix('photo ')}" for photo in self.photos)
-        return f"the names of {one} and {other} on {where} are exchanged"
+        photos = [Phrase("named.photo", {"photo": photo.removeprefix("photo ")}) for photo in self.photos]
+        return Phrase("exchange", {"one": one, "other": other, "photos": photos})
 
     @property
-    def probable(self) -> str:
+    def probable(self) -> Phrase:
         """The same of a network that has not been adjusted without it."""
         one, other = self.points
-        where = " or ".join(self.photos)
-        return f"images of points {one} and {other} on photo {where} have probably each other's names"
+        return Phrase("exchange.probable", {"one": one, "other": other, "photos": list(self.photos)})
 
     @property
     def reason(self) -> str:

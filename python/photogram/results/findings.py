@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from photogram.arguments.arrays import chosen, finite_rows
-from photogram.messages import Undetermined, counted
+from photogram.messages import Undetermined
 from photogram.results.axes import point_axes
 from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_calibrate
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import KINDS, OBSERVATION
+from photogram.results.observation_kinds import kind_words
 from photogram.results.observation_rows import tested_singly
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.reliability_summary import ReliabilitySummary
@@ -22,20 +23,19 @@ from photogram.results.suspects import observations_of_core
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
-
-ROBUST = "a robust loss changes the weights"
-"""Why there is no global test with one."""
-
+from photogram.words import Phrase
 
 HARMFUL = {
-    "its rays do not meet: it ran off": "its rays do not meet before the cameras",
-    "ran into the station of a photo": "its rays lead to the station of one of its photos",
-    "given at the place of a station that sees it": "it is given at the place of a station that sees it",
-    "given beside a station that sees it, and its images do not fit": "it is given beside a station",
+    "its rays do not meet: it ran off": Phrase("harmful.off"),
+    "ran into the station of a photo": Phrase("harmful.station"),
+    "given at the place of a station that sees it": Phrase("harmful.at-station"),
+    "given beside a station that sees it, and its images do not fit": Phrase("harmful.near-station"),
 }
-"""Why a point was left out because of which the others would be wrong, and what that says of its images."""
+"""Reasons of the core for leaving out a point that would distort the others, and messages on its images."""
 
 
+_TESTED = {"control": "test.control"}
+"""Codes of the names of kinds that are no plurals of them."""
 DISTANCES = frozenset({"c", "f", "fx", "fy"})
 """What principal distances are called."""
 UNKNOWN = 1 / 3
@@ -65,12 +65,12 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=None if result.loss else result.global_test,
-        untested=ROBUST if result.loss else "no degrees of freedom",
+        untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=has_redundancy(result),
         systematic=systematic,
         snooped=result.snooped,
         remarks=unseen(result),
-        snoop="--snoop (photogram.snoop)",
+        can_snoop=True,
     )
 
 
@@ -95,43 +95,33 @@ def block_findings(result: Result) -> Findings:
         hints=result.hints,
         exchanged=result.exchanged,
         set_aside=_set_aside(result),
-        snoop=found.snoop if tests_more else "",
-        weigh="--sd control=...",
+        can_snoop=tests_more,
+        weigh=Phrase("how.control"),
         calibrate=how_to_calibrate(result.block),
-        check="`photogram check` (`photogram.diagnose`)",
-        take_out=""
-        if not tests_more
-        else "`--snoop` (`photogram.snoop`) takes gross errors out one after the other, and says which cannot"
-        " be told apart.",
+        check=Phrase("how.check.network"),
+        take_out=Phrase("advice.snoop") if tests_more else None,
         iterate=_iterated(result),
         if_usable=_unproved(result),
     )
 
 
-def _iterated(result: Result) -> str:
-    """Return how to end iterations that ran out; nothing for other ends."""
+def _iterated(result: Result) -> Phrase | None:
+    """Return how to end iterations that ran out; None for other ends."""
     if result.status != "not converged":
-        return ""
-    more = f"Allow more iterations than {len(result.iterations)}: `--iterations N` (`max_iterations=N`)"
+        return None
     weak = any(isinstance(each, Undetermined) for each in result.messages)
-    if not weak or not any(np.isinf(each.deviations).any() for each in result.block.cameras):
-        return f"{more}."
-    return f"{more}, or leave weak parameters of cameras out of `--self-calibrate`."
+    free = any(np.isinf(each.deviations).any() for each in result.block.cameras)
+    code = "advice.iterate-or-fix" if weak and free else "advice.iterate"
+    return Phrase(code, {"n": len(result.iterations)})
 
 
-def _unproved(result: Result) -> list[str]:
-    """Say what nothing proves of a block: its accuracy without check points, points with two rays."""
+def _unproved(result: Result) -> list[Phrase]:
+    """Return what nothing proves of a block: its accuracy without check points, points with two rays."""
     found = []
     if not (result.used_points & (result.point_kinds == "check")).any():
-        found.append(
-            "There are no check points. Leave some control out (no standard deviation), and compare it:"
-            " that is the only independent proof of the accuracy."
-        )
+        found.append(Phrase("advice.check-points"))
     if few := int(np.count_nonzero(result.point_rays == 2)):
-        found.append(
-            f"{few} of {np.count_nonzero(result.used_points)} points have two rays only: an error"
-            " across the base shows, one along it does not."
-        )
+        found.append(Phrase("advice.two-rays", {"n": few, "all": int(np.count_nonzero(result.used_points))}))
     return found
 
 
@@ -151,36 +141,34 @@ def _set_aside(result: Result) -> Removed | None:
     """Return what the first values took out and has not returned; none of the images left is among it."""
     if not result.set_aside:
         return None
-    images = sum(name.startswith("image") for name in result.set_aside)
+    images = sum(getattr(name, "code", "") == "named.image" for name in result.set_aside)
     return Removed(
         [{"name": name} for name in result.set_aside], images / max(images + len(result.image_points), 1)
     )
 
 
-def _left_out(result: Result) -> list[str]:
-    """Say which points were left out because one of their images must be wrong."""
+def _left_out(result: Result) -> list[Phrase]:
+    """Return the points that were left out because one of their images must be wrong."""
     return [
-        f"point {point} is left out, one of its images must be wrong: {HARMFUL[reason]}"
+        Phrase("line.point-left-out", {"point": str(point), "reason": HARMFUL[reason]})
         for point, reason in result.dropped.items()
         if reason in HARMFUL
     ]
 
 
-def _on_checks(result: Result) -> list[str]:
-    """Say which check points are tested with what nobody has given, and why they are not tested."""
+def _on_checks(result: Result) -> list[Phrase]:
+    """Return which check points are tested with assumed standard deviations, and why they are not tested."""
     checks, axes = result.check_points, point_axes(result.block)
     if not len(checks.rows):
         return []
     if checks.agreement is None:
-        return [f"check points are not tested: {checks.untested}"]
+        return [Phrase("line.checks-untested", {"reason": checks.untested})]
     if not checks.assumed.any():
         return []
     own = zip(checks.given_sd[checks.assumed][0].tolist(), axes, strict=True)
-    assumed = " and ".join(dict.fromkeys(f"{value * axis.factor:.2g} {axis.small}" for value, axis in own))
-    return [
-        f"standard deviations of {checks.assumed.sum()} of {counted(len(checks.rows), 'check point')} are not"
-        f" given: those of control are assumed ({assumed}); --sd check=... says how good they are"
-    ]
+    sd = list(dict.fromkeys(f"{value * axis.factor:.2g} {axis.small}" for value, axis in own))
+    fields = {"assumed": int(checks.assumed.sum()), "n": len(checks.rows), "sd": sd}
+    return [Phrase("line.checks-assumed", {**fields, "how": Phrase("how.checks")})]
 
 
 def _patterns(result: Result) -> list[Systematic]:
@@ -200,27 +188,14 @@ def has_redundancy(result: AdjustedNetwork) -> bool:
     return bool(finite_rows(result.redundancy)[chosen(result.used_images)].all())
 
 
-def unseen(result: AdjustedNetwork) -> list[str]:
-    """Say how many image coordinates no other observation checks."""
+def unseen(result: AdjustedNetwork) -> list[Phrase]:
+    """Return how many image coordinates no other observation checks."""
     redundancy = result.redundancy[chosen(result.used_images)]
     hidden = int(np.count_nonzero(redundancy <= TESTABLE))
     if not hidden:
         return []
-    return [
-        f"errors of {hidden} of {redundancy.size} image coordinates would not show in their residuals"
-        f" (redundancy below {TESTABLE:g})"
-    ]
-
-
-PLURALS = {
-    "image": "images",
-    "control": "control points",
-    "position": "positions of photos",
-    "attitude": "attitudes of photos",
-    "camera": "cameras",
-    "unknown": "common unknowns",
-}
-"""What the kinds are called; those of observations beside images have labels."""
+    fields = {"hidden": hidden, "all": redundancy.size, "limit": TESTABLE}
+    return [Phrase("line.unseen", fields)]
 
 
 def groups_tested(
@@ -236,10 +211,13 @@ def groups_tested(
     found = []
     for kind, name in enumerate(KINDS):
         own = np.flatnonzero(suspects.kinds == kind)
-        parts = [(PLURALS.get(name, name), own)]
+        parts = [(Phrase(_TESTED.get(name, f"test.{name}s")), own)]
         if kind == OBSERVATION:
             named = np.array(labels, dtype=object)[suspects.subjects[own]]
-            parts = [(f"observations of the kind {each}", own[named == each]) for each in sorted(set(labels))]
+            parts = [
+                (Phrase("test.observations", {"kind": kind_words(each)}), own[named == each])
+                for each in sorted(set(labels))
+            ]
         for what, groups in parts:
             if not testable[groups].any():
                 continue
@@ -249,5 +227,5 @@ def groups_tested(
     return found
 
 
-def _named(summary: ReliabilitySummary, groups: np.ndarray) -> Callable[[tuple[int, ...]], str]:
+def _named(summary: ReliabilitySummary, groups: np.ndarray) -> Callable[[tuple[int, ...]], Phrase]:
     return lambda place: summary.suspects.name(int(groups[place[0]]))

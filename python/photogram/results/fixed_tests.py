@@ -25,15 +25,10 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.results.scores import score
 from photogram.statistics.findings import Tested
+from photogram.words import Phrase
 
-HELD = "held values"
+HELD = Phrase("test.held")
 """The kind of these tests."""
-OF_PHOTOS, OF_CONTROL, IS_HELD = (
-    ("position of photo ", "attitude of photo "),
-    "control point ",
-    "which is held",
-)
-"""Their names: one of the first two before the name of a photo or point, and the last after a comma."""
 SUSPECTED = 5
 """Fixed stations and points that are tested at the most, those with the worst images."""
 STEP = 1e-6
@@ -46,9 +41,14 @@ LEAST_IMAGES = 3
 class Held:
     """Something that is held: its name, its images, and which of the partials concern it."""
 
-    name: str
+    named: Phrase
     images: Indices
     partials: Indices
+
+    @property
+    def name(self) -> Phrase:
+        """The name, and that it is fixed."""
+        return Phrase("named.held", {"named": self.named})
 
 
 def held_tested(result: Result) -> list[Tested]:
@@ -82,7 +82,7 @@ def held_tests(
         return []
     partials = partials_of()
     factor = factored(result)
-    found: list[tuple[str, float, float]] = []
+    found: list[tuple[Phrase, float, float]] = []
     for each in suspected:
         columns = np.zeros((len(each.partials), *residuals.shape))
         columns[:, each.images] = partials[np.ix_(each.partials, each.images)] / image_sd[each.images]
@@ -107,19 +107,16 @@ def is_suspected(result: AdjustedNetwork) -> bool:
     return bool(np.isfinite(result.redundancy[result.used_images]).all())
 
 
-def held_remark(found: Sequence[Tested], largest: float) -> list[str]:
-    """Say that what is held explains more than anything that was taken out.
+def held_remark(found: Sequence[Tested], largest: float) -> list[Phrase]:
+    """Return that a fixed value explains more than any removed observation.
 
     `found` are its tests, in the adjustment of everything, `largest` is the largest T of what was taken out.
     """
     place = found[0].largest() if found else None
     if place is None or not found[0].values[place] > largest:
         return []
-    return [
-        f"{found[0].name(place)}, explains more than anything that was taken out (T ="
-        f" {found[0].values[place]:.4g}, {largest:.4g}): what is held is no observation and stays; give it a"
-        " standard deviation, and snoop again"
-    ]
+    fields = {"name": found[0].name(place), "value": float(found[0].values[place]), "largest": largest}
+    return [Phrase("line.held", fields)]
 
 
 def _suspected(result: Result, of_images: Floats) -> list[Held]:
@@ -132,7 +129,7 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
     of_points = np.bincount(block.image_points, of_images, points)
     mounted = {each.photo for each in block.mounts} | {each.frame for each in block.mounts}
     rows: list[tuple[float, Held]] = []
-    for what, sd, shift in zip(OF_PHOTOS, (given[:, :3], given[:, 3:]), (0, 3), strict=True):
+    for what, sd, shift in zip(("position", "attitude"), (given[:, :3], given[:, 3:]), (0, 3), strict=True):
         held = np.asarray(sd == 0)
         if shift or block.geographic:  # Partials are by other axes than those of the components.
             held = held & held.all(axis=1, keepdims=True)
@@ -142,13 +139,13 @@ def _suspected(result: Result, of_images: Floats) -> list[Held]:
             if name not in mounted:
                 images = np.flatnonzero(used & (block.image_photos == photo))
                 own_partials = shift + np.flatnonzero(held[photo])
-                each = Held(f"{what}{name}, {IS_HELD}", images, own_partials)
+                each = Held(Phrase(f"named.{what}", {"photo": name}), images, own_partials)
                 rows.append((float(of_photos[photo]), each))
     fixed = (block.point_sd == 0).all(axis=1) & (np.bincount(block.image_points[used], minlength=points) > 0)
     own = np.flatnonzero(fixed)
     for point in own[np.argsort(-of_points[own], kind="stable")][:SUSPECTED].tolist():
         images = np.flatnonzero(used & (block.image_points == point))
-        each = Held(f"{OF_CONTROL}{block.point_ids[point]}, {IS_HELD}", images, np.arange(3))
+        each = Held(Phrase("named.control", {"point": block.point_ids[point]}), images, np.arange(3))
         rows.append((float(of_points[point] / len(images)), each))
     rows.sort(key=lambda row: -row[0])
     return [each for _, each in rows[:SUSPECTED]]
@@ -245,9 +242,9 @@ def lens_partials(result: Result, own: Bools) -> Floats:
     return columns
 
 
-def how_to_calibrate(block: Block) -> str:
-    """Return the option that estimates the cameras of a block, as words; nothing where nothing is left."""
+def how_to_calibrate(block: Block) -> Phrase | None:
+    """Return how the cameras of a block are estimated; None if all of their parameters are."""
     if not block.cameras:
-        return "a camera with distortion in place of the principal distance, and --self-calibrate all"
+        return Phrase("how.camera")
     names = dict.fromkeys(name for camera in block.cameras for name in calibration_words(camera))
-    return f"--self-calibrate {','.join(names)}" if names else ""
+    return Phrase("how.calibrate", {"names": ",".join(names)}) if names else None

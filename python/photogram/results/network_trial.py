@@ -22,6 +22,7 @@ from photogram.statistics.snooping.suspects import (
     Suspects,
     Tests,
 )
+from photogram.words import Phrase
 
 KINDS = ("image", "control", "position", "attitude", "observation", "camera", "unknown")
 """What the suspects of the core are of, by their numbers."""
@@ -339,20 +340,21 @@ class NamedSuspects(ABC):
         """Return the group of a row."""
         return int(np.searchsorted(self.starts, row, "right")) - 1
 
-    def photo_name(self, photo: int) -> str:
-        """Return what a photo is called."""
-        return f"photo {self.given.photo_ids[photo]}"
+    def photo_name(self, photo: int) -> Phrase:
+        """Return the name of a photo."""
+        return Phrase("named.photo", {"photo": str(self.given.photo_ids[photo])})
 
-    def name(self, group: int) -> str:
-        """Return what a group is called."""
+    def name(self, group: int) -> Phrase:
+        """Return the name of a group."""
         kind, subject = int(self.kinds[group]), int(self.subjects[group])
+        points, photos = self.given.point_ids, self.given.photo_ids
         if kind == IMAGE:
-            point = self.given.point_ids[self.image_points[subject]]
-            return f"image of point {point} on {self.photo_name(int(self.image_photos[subject]))}"
+            point, photo = points[self.image_points[subject]], photos[self.image_photos[subject]]
+            return Phrase("named.image", {"point": str(point), "photo": str(photo)})
         if kind == CONTROL:
-            return f"control point {self.given.point_ids[subject]}"
+            return Phrase("named.control", {"point": str(points[subject])})
         if kind in (POSITION, ATTITUDE):
-            return f"{KINDS[kind]} of {self.photo_name(subject)}"
+            return Phrase(f"named.{KINDS[kind]}", {"photo": str(photos[subject])})
         return self.other_name(kind, subject)
 
     def row_name(self, row: int) -> str:
@@ -379,7 +381,7 @@ class NamedSuspects(ABC):
         """Return the photos of what is neither an image, nor control, nor of a station."""
 
     @abstractmethod
-    def other_name(self, kind: int, subject: int) -> str:
+    def other_name(self, kind: int, subject: int) -> Phrase:
         """Return what that is called."""
 
     @abstractmethod

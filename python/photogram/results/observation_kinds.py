@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.statistics.reliability import TESTABLE
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -139,11 +141,26 @@ def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
 
 def tested_kind(kind: ObservedKind) -> Observations:
     """Return the components of a kind with their standardized residuals, where these say something."""
-
-    def named(index: tuple[int, ...]) -> str:
-        return f"{kind.components[index[1]]} of {kind.kind} {kind.names[index[0]]}"
-
     from photogram.statistics.findings import Observations
 
+    def named(index: tuple[int, ...]) -> Phrase:
+        return parts_of([kind.components[index[1]]], named_observation(kind.kind, kind.names[index[0]]))
+
     standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
-    return Observations(f"components of observations of the kind {kind.kind}", standardized, named)
+    own = Phrase("test.components", {"kind": kind_words(kind.kind)})
+    return Observations(own, standardized, named)
+
+
+def named_observation(kind: str, of: str) -> Phrase:
+    """Return the name of an observation: its kind, and the names of its points, photos or unknowns."""
+    return Phrase("named.observation", {"one": kind_words(kind), "of": of})
+
+
+def kind_words(kind: str) -> list[Phrase]:
+    """Return the words of a kind, such as `prior, lever arm`."""
+    return [Phrase(f"one.{each}") for each in kind.split(", ")]
+
+
+def parts_of(components: Iterable[str], name: Phrase) -> Phrase:
+    """Return the name of some components of an observation."""
+    return Phrase("named.parts", {"axes": [Phrase(f"axis.{each}") for each in components], "named": name})

@@ -12,16 +12,19 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.messages import counted, listed
 from photogram.results.network import AdjustedNetwork, Observed
 from photogram.results.network_tables import control, images, part, terms_of
-from photogram.results.observation_kinds import tested_kind
+from photogram.results.observation_kinds import parts_of, tested_kind
 from photogram.show.lines import field, stacked, table_lines
 from photogram.show.quantity import Quantity, chosen, labelled, long
 from photogram.statistics.findings import Observations, Tested, by_t, by_w
 from photogram.statistics.reliability import TESTABLE
+from photogram.words import Phrase
 
 NOTABLE = 3.0
 """Test values above are listed; what decides is the limit of the tests, which stands in the verdict."""
 SUSPECTS = 20
 """Image coordinates with large test values that are listed at most."""
+IMAGE_COORDINATES = Phrase("test.image_coordinates")
+"""The kind of single image coordinates."""
 LISTED = 10_000
 """Photos, points, observations of a kind that a report lists at most; tables and documents have every one."""
 
@@ -31,28 +34,35 @@ def tested_observations(result: AdjustedNetwork) -> list[Observations]:
     terms = terms_of(result)
     photos, points = terms.photos, terms.points
 
-    def image(index: tuple[int, ...]) -> str:
+    def image(index: tuple[int, ...]) -> Phrase:
         point, photo = result.image_points[index[0]], result.given.image_photos[index[0]]
-        return f"{'xy'[index[1]]} of point {points[point]} on photo {photos[photo]}"
+        return parts_of(
+            "xy"[index[1]], Phrase("named.point", {"point": str(points[point]), "photo": str(photos[photo])})
+        )
 
     def kind(
-        what: str, standardized: Floats, redundancy: Floats, named: Callable[[tuple[int, ...]], str]
+        what: Phrase, standardized: Floats, redundancy: Floats, named: Callable[[tuple[int, ...]], Phrase]
     ) -> Observations:
-        return Observations(what, np.where(redundancy > TESTABLE, standardized, np.nan), named)
+        tested = np.where(redundancy > TESTABLE, standardized, np.nan)
+        return Observations(what, tested, named)
 
     return [
-        kind("image coordinates", result.standardized, result.redundancy, image),
+        kind(IMAGE_COORDINATES, result.standardized, result.redundancy, image),
         kind(
-            "components of control",
+            Phrase("test.components_of_control"),
             result.point_standardized,
             result.point_redundancy,
-            lambda index: f"{terms.point_axes[index[1]].name} of control point {points[index[0]]}",
+            lambda index: parts_of(
+                [terms.point_axes[index[1]].name], Phrase("named.control", {"point": str(points[index[0]])})
+            ),
         ),
         kind(
-            "components of stations",
+            Phrase("test.components_of_stations"),
             result.photo_standardized,
             result.photo_redundancy,
-            lambda index: f"{terms.photo_axes[index[1]].name} of photo {photos[index[0]]}",
+            lambda index: parts_of(
+                [terms.photo_axes[index[1]].name], Phrase("named.photo", {"photo": str(photos[index[0]])})
+            ),
         ),
         *map(tested_kind, terms.kinds),
     ]

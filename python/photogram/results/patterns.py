@@ -22,6 +22,7 @@ from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
 from photogram.statistics.patterns import SPEAKING, Fit, frame_pattern, group_patterns, normality, regression
 from photogram.statistics.reliability import TESTABLE
+from photogram.words import Phrase
 
 LEVEL_OF_PATTERNS = 0.001
 """Patterns are looked for in many ways: only what is very unlikely by chance is told."""
@@ -98,14 +99,11 @@ def _of_camera(
     if found is None:
         return None
     x, y = (each * size for each, size in zip(found.largest, scale.tolist(), strict=True))
-    sentence = (
-        f"the lens model of {camera.name} is incomplete: mean residuals over the frame have a root mean"
-        f" square of {found.rms:.2g} standard deviations, the largest {x:+.3g}, {y:+.3g} {unit} near"
-        f" x {found.at[0]:.4g}, y {found.at[1]:.4g}"
-    )
+    place = {"x": float(found.at[0]), "y": float(found.at[1])}
+    fields = {"camera": camera.name, "rms": float(found.rms), "dx": float(x), "dy": float(y), "unit": unit}
     return Systematic(
-        name=f"pattern over the frame of {camera.name}",
-        sentence=sentence,
+        kind=Phrase("test.frame", {"camera": camera.name}),
+        sentence=Phrase("pattern.frame", {**fields, **place}),
         statistic="B",
         distribution="chi2",
         dof=(found.dof,),
@@ -124,8 +122,9 @@ def _of_photos(
         return None
     worst, tested = int(np.nanargmin(probabilities)), int(np.isfinite(probabilities).sum())
     return Systematic(
-        name=f"pattern by photo: {photos[worst]}",
-        sentence=f"the residuals of photo {photos[worst]} follow a shift or a linear form of x and y",
+        kind=Phrase("test.photo"),
+        subject=str(photos[worst]),
+        sentence=Phrase("pattern.photo", {"photo": str(photos[worst])}),
         statistic="c'C^-1c",
         distribution="chi2",
         dof=(6.0,),
@@ -148,13 +147,12 @@ def _distribution(result: AdjustedNetwork, used: Bools | slice) -> Systematic | 
     found = normality(w[seen])
     if found is None:
         return None
-    two, three = (100 * share for share in found.beyond)
+    two, three = (100 * float(share) for share in found.beyond)
     tails = "heavier" if found.excess > 0 else "lighter"
+    fields = {"excess": float(found.excess), "two": two, "three": three}
     return Systematic(
-        name="normality of image residuals",
-        sentence=f"image residuals have {tails} tails than normal (excess kurtosis {found.excess:.2g};"
-        f" {two:.2g} percent beyond 2 and {three:.2g} beyond 3 standard deviations, expected 4.6 and 0.27):"
-        " robust estimation, or weights by class",
+        kind=Phrase("test.normality"),
+        sentence=Phrase(f"pattern.{tails}-tails", fields),
         statistic="A^2",
         distribution="Anderson-Darling",
         dof=(),
@@ -174,11 +172,7 @@ def _of_stations(result: AdjustedNetwork, names: Sequence[str]) -> list[Systemat
     order = np.linspace(-1.0, 1.0, len(w))
     design = np.column_stack([np.ones(len(w)), order, order**2])
     return [
-        _regressed(
-            f"drift of stations in {name}",
-            f"observed minus adjusted {name} of the stations drifts along the photos",
-            regression(w[:, axis], design),
-        )
+        _regressed("drift", regression(w[:, axis], design), axis=Phrase(f"axis.{name}"))
         for axis, name in enumerate(names)
     ]
 
@@ -196,19 +190,15 @@ def _of_heights(result: AdjustedNetwork) -> Systematic | None:
     plan = plan / extent
     x, y = plan.T
     design = np.column_stack([np.ones(len(w)), x, y, x * x, x * y, y * y])
-    return _regressed(
-        "bending of control heights",
-        "the heights of the control bend against the block: residuals follow a quadratic form of X and Y",
-        regression(w, design, tested),
-    )
+    return _regressed("bending", regression(w, design, tested))
 
 
-def _regressed(name: str, sentence: str, found: Fit | None) -> Systematic | None:
+def _regressed(code: str, found: Fit | None, **fields: Phrase) -> Systematic | None:
     if found is None:
         return None
     return Systematic(
-        name=name,
-        sentence=f"{sentence}, by {found.rms:.2g} standard deviations in the mean",
+        kind=Phrase(f"test.{code}", fields),
+        sentence=Phrase(f"pattern.{code}", {**fields, "rms": float(found.rms)}),
         statistic="F",
         distribution="F",
         dof=found.dof,

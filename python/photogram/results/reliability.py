@@ -273,7 +273,7 @@ class Reliability:
             kind, index, component, effect, in_sd = own
             size = float(self.detectable[row] / self.sd[row])
             best = max(best, size * in_sd)
-            name, row_name = self.suspects.name(group), self.suspects.row_name(row)
+            name, row_name = str(self.suspects.name(group)), self.suspects.row_name(row)
             found.append(Moved(name, row_name, (kind, index, component), size * effect, size * in_sd))
         return sorted(found, key=lambda moved: -moved.in_sd)
 
@@ -324,7 +324,7 @@ class Reliability:
     def _pair(self, first: int, second: int, rho: float) -> Inseparable:
         factor = math.inf if rho > 1 - 1e-9 else SEPARATED / self._delta * math.sqrt(2 / (1 - rho))
         name = self.suspects.name
-        return Inseparable(name(first), name(second), (first, second), rho, max(factor, 1.0))
+        return Inseparable(str(name(first)), str(name(second)), (first, second), rho, max(factor, 1.0))
 
     def row_groups(self) -> Indices:
         """Return (M,) the group of each row."""
@@ -336,7 +336,7 @@ class Reliability:
 
         suspects, groups = self.suspects, self.row_groups()
         rows = range(len(groups))
-        names = [suspects.name(group) for group in range(len(suspects))]
+        names = [str(suspects.name(group)) for group in range(len(suspects))]
         return pd.DataFrame(
             {
                 "kind": [suspects.kind(int(group)) for group in groups],
@@ -379,7 +379,9 @@ class Reliability:
         lines += map("".join, zip(padded(kinds, 12), padded(worst, 44), figures, strict=True))
         count = int(self.untestable.sum())
         if count:
-            first = ", ".join(map(self.suspects.name, np.flatnonzero(self.untestable)[:3].tolist()))
+            first = ", ".join(
+                str(self.suspects.name(each)) for each in np.flatnonzero(self.untestable)[:3].tolist()
+            )
             lines.append(f"{count} groups are checked by no other observation, such as {first}")
         return lines
 

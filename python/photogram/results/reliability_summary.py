@@ -263,7 +263,7 @@ def _weakest(found: Reliability, *, heights: bool) -> list[WeakObservation]:
     return [
         WeakObservation(
             kind=suspects.kind_names[int(suspects.kinds[group])],
-            name=suspects.name(group),
+            name=str(suspects.name(group)),
             redundancy=float(tests.least[group]),
             detectable_sd=float(detectable[group]),
             external_sd=float(external[group]),

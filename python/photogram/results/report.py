@@ -134,7 +134,7 @@ def problems_of(result: AdjustedNetwork) -> list[str]:
 
     The tests of outliers are those of the verdict.
     """
-    messages = [*map(Message, result.verdict.outliers), *result.messages]
+    messages = [*(Message(str(each)) for each in result.verdict.outliers), *result.messages]
     return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
 
 

@@ -42,6 +42,7 @@ from photogram.results.trajectories import (
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
 from photogram.show.methods import statement_of
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -169,8 +170,8 @@ class Result(OnFilm, AdjustedNetwork):
     dropped: Mapping[str, str]
     datum: ResultDatum
     hints: tuple[str, ...] = ()
-    exchanged: tuple[str, ...] = ()
-    set_aside: tuple[str, ...] = ()
+    exchanged: tuple[Phrase | str, ...] = ()
+    set_aside: tuple[Phrase | str, ...] = ()
     features: Features | None = None
 
     WHOLE: ClassVar[bool] = True

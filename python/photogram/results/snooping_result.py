@@ -22,6 +22,7 @@ from photogram.statistics.snooping.log import Removal, Rival
 from photogram.statistics.snooping.snooping import Outcome
 from photogram.statistics.snooping.suspects import Standing, Suspects
 from photogram.statistics.snooping.taking_out import Settings
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -166,12 +167,16 @@ class Snooped(Brief, Paged):
 def recorded(found: Snooped) -> Snooped:
     """Return the same with the removed observations as part of its result."""
     record = Removed(
-        [_member(entry) for entry in found.removed],
+        [{**_member(entry), "subject": entry.subject} for entry in found.removed],
         images=found.share_removed("image"),
         control=found.share_removed("control"),
         rivals=found.rivals,
         exchanged=[each.sentence for each in found.exchanged],
-        kept=[f"suspect, but kept: {entry.name} ({entry.kept})" for entry in found.log if entry.kept],
+        kept=[
+            Phrase("line.kept", {"name": entry.subject, "reason": entry.kept})
+            for entry in found.log
+            if entry.kept
+        ],
     )
     return replace(found, result=replace(found.result, snooped=record))
 

@@ -21,7 +21,9 @@ from photogram.results.network_trial import (
     NamedSuspects,
     NetworkTrial,
 )
+from photogram.results.observation_kinds import named_observation
 from photogram.statistics.snooping.suspects import Suspects
+from photogram.words import Phrase
 
 ANGLES = ("omega", "phi", "kappa")
 
@@ -134,13 +136,14 @@ class _Named(NamedSuspects):
         every = {id(each): each for each in self.block.trajectories}.values()
         return {id(one): each for each in every for all_ in each.coefficients for one in all_}
 
-    def other_name(self, kind: int, subject: int) -> str:
-        """Return what an observation beside images, a camera or a common unknown is called."""
+    def other_name(self, kind: int, subject: int) -> Phrase:
+        """Return the name of an observation that is no image, of a camera or of a common unknown."""
         if kind == OBSERVATION:
-            return self.observations[subject].name
+            observation = self.observations[subject]
+            return named_observation(observation.KIND, " - ".join(observation.of))
         if KINDS[kind] == "camera":
-            return f"parameters of {self.block.camera_names[subject]}"
-        return f"unknown {self.block.unknowns[subject].name}"
+            return Phrase("named.camera", {"camera": self.block.camera_names[subject]})
+        return Phrase("named.unknown", {"unknown": self.block.unknowns[subject].name})
 
     def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:
         """Return the name and unit of a component; parameters and common unknowns have numbers."""

@@ -60,7 +60,8 @@ def _titled(title: str, lines: Sequence[str]) -> str:
     return "\n".join([title, "-" * len(title), *lines]) if lines else ""
 
 
-def _sentence(line: str) -> str:
+def _sentence(message: object) -> str:
+    line = str(message)
     return textwrap.fill(f"{line[:1].upper()}{line[1:]}".removesuffix(".") + ".", WIDTH)
 
 

@@ -21,13 +21,13 @@ MARKS: dict[Tone, str] = {
 
 def judged(verdict: Verdict, on: str = "") -> Judgement:
     """Return a verdict as it stands on a page."""
-    tested = any(test.name == "global" for test in verdict.tests)
+    tested = verdict.is_tested_as_a_whole
     if verdict.exit or verdict.warning:
         tone: Tone = "bad" if verdict.exit else "look"
     else:
         tone = "good" if tested else ""
     mark = "Look first" if tone == "look" and not tested else MARKS[tone]
-    return Judgement(mark, verdict.headline, verdict.lines, tone, on)
+    return Judgement(mark, verdict.headline, tuple(map(str, verdict.lines)), tone, on)
 
 
 def verdict_table(verdict: Verdict) -> Table:

@@ -15,6 +15,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.show import quantity
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -287,7 +288,7 @@ class Document:
     what: str
     title: str
     judgements: Sequence[Judgement]
-    advice: Sequence[str]
+    advice: Sequence[Phrase | str]
     highlights: Sequence[Fact]
     sections: Sequence[Section]
     members: Mapping[str, object] = field(default_factory=dict)

@@ -20,6 +20,7 @@ from photogram.show.html import inlined
 from photogram.show.page import Column, Document, Drawing, Picture, Section, Table
 from photogram.show.sketch.letters import width
 from photogram.show.sketch.svg import LETTERS
+from photogram.words import Phrase
 
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts that the library contains; for other letters it searches the fonts of the machine."""
@@ -59,6 +60,8 @@ def _record(part: Any) -> Any:
         return inlined(part)
     if isinstance(part, quantity.Table):
         return written(part)
+    if isinstance(part, Phrase):
+        return str(part)
     record: dict[str, Any] = {each.name: getattr(part, each.name) for each in fields(part)}
     if isinstance(part, Section):
         record["parts"] = part.visible

@@ -28,12 +28,12 @@ def composed(head: str, sections: Iterable[Section]) -> str:
 
 def verdict_sections(verdict: Verdict) -> list[Section]:
     """Return what stands on top of every report: the verdict, and what to do next."""
-    return [("Verdict", _judged(verdict)), ("What to do next", list(verdict.next))]
+    return [("Verdict", _judged(verdict)), ("What to do next", list(map(str, verdict.next)))]
 
 
 def _judged(verdict: Verdict) -> list[str]:
     """Return the verdict in a sentence, remarks, and the tests."""
-    lines = [f"{verdict.headline}.", *(f"{line[:1].upper()}{line[1:]}." for line in verdict.lines)]
+    lines = [f"{verdict.headline}.", *(f"{line[:1].upper()}{line[1:]}." for line in map(str, verdict.lines))]
     if verdict.tests:
         lines += [f"{'test':<54}{'value':>14}{'limits':>20}{'p':>10}{'level':>10}{'tests':>8}"]
         lines += [line for test in verdict.tests for line in _test_lines(test)]
@@ -54,7 +54,8 @@ def _test_lines(test: Test) -> list[str]:
         f"{f'{test.statistic} = {test.value:.4g}':>14}{limits:>20}{p:>10}{test.level:>10.2g}{test.tests:>8}"
         f"{'' if test.accepted else '  rejected'}"
     )
-    return [f"{test.name:<54}{figures}"] if len(test.name) < 54 else [test.name, f"{'':<54}{figures}"]
+    name = test.name
+    return [f"{name:<54}{figures}"] if len(name) < 54 else [name, f"{'':<54}{figures}"]
 
 
 def problems(

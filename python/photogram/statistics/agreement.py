@@ -9,7 +9,8 @@ F(m, f) where s^2 is estimated with f degrees of freedom and s^2 Q is most of C.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from photogram.arguments.types import Floats
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Agreement, Tested
 from photogram.statistics.limits import global_test
+from photogram.words import Phrase
 
 SINGULAR = 1e-12
 """Variance, in those of the components, below which a direction has none: known without error, and held."""
@@ -32,7 +34,7 @@ def agreement(
     scale: float = 1.0,
     second: float = math.inf,
     name: Callable[[tuple[int, ...]], str] = str,
-    apart: Callable[[tuple[int, ...], Floats], str] = "{} {}".format,
+    apart: Callable[[tuple[int, ...], Floats], Mapping[str, Any]] = lambda *_: {},
     level: float = LEVEL,
 ) -> Agreement:
     """Test known values against an adjustment.
@@ -49,7 +51,8 @@ def agreement(
     scale, second
         The variance by which covariances are scaled, and the degrees of freedom with which it was estimated.
     name, apart
-        Name the point at a place, and say how far it is off, given its (k,) standard deviations, C included.
+        Name the point at a place, and give the fields of its difference, by its (k,) standard deviations, C
+        included.
     level
         Of the test of all together, both sides.
     """
@@ -73,9 +76,9 @@ def agreement(
         omega, rank = quadratic(differences.ravel()[flat], whole[np.ix_(flat, flat)])
         together = global_test(omega, rank, level, second)
     if math.isinf(second):
-        points = Tested("check points", found, name, "T", dimension)
+        points = Tested(Phrase("test.checks"), found, name, "T", dimension)
     else:
-        points = Tested("check points", found / dimension, name, "F", dimension, second)
+        points = Tested(Phrase("test.checks"), found / dimension, name, "F", dimension, second)
     return Agreement(points, together, sd, apart)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import listed
+from photogram.lazy_dataclasses import asdict, dataclass, replace
 from photogram.statistics.distributions import (
     bonferroni,
     critical_chi_square,
@@ -17,11 +17,9 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Findings, Observations, Systematic, Tested, by_f, by_t
+from photogram.statistics.findings import Findings, Observations, Systematic, Tested, Text, by_f, by_t
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
-
-NAMED = 5
-"""Observations that a sentence names at most."""
+from photogram.words import Phrase
 
 FEW = 5
 """With fewer degrees of freedom only gross disagreement can be seen."""
@@ -38,16 +36,8 @@ WITHHELD = 0.001
 MEDIAN = 0.6744897501960817
 """Of the absolute value of a standard normal variable."""
 
-STATISTICS = {
-    "w": "w (Baarda; the unit weight is known)",
-    "t": "t (externally studentized, Pope; the unit weight is estimated)",
-    "T": "T (chi-square; the unit weight is known)",
-    "F": "F (the unit weight is estimated)",
-}
-"""What the test values of observations are called."""
-
-GROUPS = "groups of observations (x and y of an image, all of a control point)"
-"""What is tested where all test values are T or F."""
+GLOBAL = Phrase("test.global")
+"""The kind of the test of all residuals together."""
 
 Beyond = tuple[float, Tested, tuple[int, ...]]
 """Logarithm of the probability, kind, and place of an observation whose test rejects."""
@@ -59,8 +49,8 @@ class Test:
 
     Attributes
     ----------
-    name
-        What is tested.
+    kind, subject
+        What is tested, and the one of its kind; the latter empty if it is one thing.
     statistic
         What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals.
     distribution, dof
@@ -81,7 +71,8 @@ class Test:
         Whether p is no less than the level.
     """
 
-    name: str
+    kind: Text
+    subject: Text
     statistic: str
     distribution: str
     dof: tuple[float, ...]
@@ -93,6 +84,17 @@ class Test:
     tests: int
     accepted: bool
 
+    @property
+    def name(self) -> str:
+        """What is tested, in English."""
+        return f"{self.kind}: {self.subject}" if self.subject else str(self.kind)
+
+    def document(self) -> dict[str, Any]:
+        """Return the test as JSON documents have it."""
+        own = asdict(self)
+        del own["kind"], own["subject"]
+        return {"name": self.name, **own}
+
 
 class Evidence:
     """What the conditions ask of the findings."""
@@ -100,6 +102,7 @@ class Evidence:
     def __init__(self, found: Findings) -> None:
         self.found = found
         self.test = found.global_test
+        self.codes: list[str] = []  # of the rules that fit, in their order
 
     @cached_property
     def number(self) -> int:
@@ -150,18 +153,23 @@ class Evidence:
         """Tests beyond their limit as the standard deviations are given."""
         return self.beyond()
 
-    def outliers(self) -> list[str]:
-        """Return a sentence for each kind of observations with tests that reject: how many, the worst."""
-        sentences = []
+    def outliers(self) -> list[Phrase]:
+        """Return for each kind of observations with tests that reject how many these are, and the worst."""
+        found = []
         for each in self.found.observations:
             if beyond := each.beyond(self.level):
                 _, place = min(beyond)
-                test, value = _test_at(each, place, self.level, self.number), each.values[place]
-                sentences.append(
-                    f"{len(beyond)} of {self._count(each)} {each.kind} have {each.statistic} beyond"
-                    f" {test.limits[1]:.2f}: the largest, {value:.1f}, is that of {each.name(place)}"
-                )
-        return sentences
+                fields = {
+                    "n": len(beyond),
+                    "all": self._count(each),
+                    "kind": each.kind,
+                    "statistic": each.statistic,
+                    "limit": _test_at(each, place, self.level, self.number).limits[1],
+                    "value": float(each.values[place]),
+                    "name": each.name(place),
+                }
+                found.append(Phrase("line.outliers", fields))
+        return found
 
     @cached_property
     def gross(self) -> list[Beyond]:
@@ -188,23 +196,18 @@ class Evidence:
         alike = NOTABLE_FACTOR <= robust <= self.factor <= NOTABLE_FACTOR * robust
         return self.factor if alike else max(robust, 1.0)
 
-    def disagreement(self, level: float) -> str:
-        """Say which check points disagree at a level, or that all together do; nothing where none does."""
+    def disagreement(self, level: float) -> list[Phrase]:
+        """Return check points that disagree at a level, or all together; empty if none does."""
         checks = self.found.checks
         if checks is None:
-            return ""
+            return []
         beyond = checks.points.beyond(bonferroni(level, self._count(checks.points)))
         if beyond:
-            named = [f"{number}) {checks.said(place)}" for number, (_, place) in enumerate(sorted(beyond), 1)]
-            return listed(named, NAMED)
+            return [checks.difference(place) for _, place in sorted(beyond)]
         test = checks.together
         if test is None or not test.probability_above < level / 2 or test.factor <= NOTABLE_FACTOR:
-            return ""
-        low, high = test.interval
-        return (
-            f"all together, their differences are {test.factor:.3g} (95 percent: {low:.3g} to {high:.3g})"
-            " times larger than predicted"
-        )
+            return []
+        return [Phrase("part.checks", {"factor": factor_of(test)})]
 
     @cached_property
     def pattern(self) -> bool:
@@ -245,69 +248,46 @@ class Evidence:
         """By how much residuals are larger than expected; NaN where that is not known."""
         return self.test.factor if self.test is not None else math.nan
 
-    def interval(self) -> str:
+    def interval(self) -> Phrase:
         """Return the factor with its interval."""
         assert self.test is not None
-        low, high = self.test.interval
-        return f"{self.factor:.3g} (95 percent: {low:.3g} to {high:.3g})"
+        return factor_of(self.test)
 
-    def named(self, tests: list[Beyond]) -> str:
-        """Name the first of the tests, with their values."""
-        names = [
-            f"{number}) {each.name(place)} ({each.statistic} = {each.values[place]:.4g})"
-            for number, (_, each, place) in enumerate(tests, 1)
+    def named(self, tests: list[Beyond]) -> list[Phrase]:
+        """Name tests, with their values."""
+        return [
+            part_of(each.name(place), each.statistic, float(each.values[place])) for _, each, place in tests
         ]
-        return listed(names, NAMED)
 
-    def accepted(self) -> tuple[str, str]:
-        """Return code and headline where nothing is wrong."""
-        if self.test is None:
-            single = (
-                "test of an observation"
-                if any(e.significant for e in self.found.systematic)
-                else "single test"
-            )
-            return "not-tested", f"Not tested as a whole ({self.found.untested}); no {single} rejects"
-        low, high = self.test.limits
-        how = "agree with the given standard deviations"
-        if self.test.rejected_high or self.test.rejected_low:
-            how = f"are {self.factor:.3g} times as large as expected: the test shows it, but it harms nobody"
-        return (
-            "accepted",
-            f"Accepted: the residuals {how}"
-            f" (unit variance {self.test.variance:.4g}, expected {low:.3g} to {high:.3g})",
-        )
-
-    def remarks(self) -> list[str]:
-        """Return what is said of every adjustment: size of the factor, few degrees of freedom, no test."""
-        lines = self._by_what()
+    def remarks(self) -> list[Text]:
+        """Return lines on every adjustment: size of the factor, few degrees of freedom, no test."""
+        lines: list[Text] = self._statistics()
         test = self.test
         rejected = test is not None and (test.rejected_low or (test.rejected_high and not self.gross))
         if rejected and not (self.high or self.low):
-            lines.append(
-                f"the global test rejects, but residuals are only {self.factor:.3g} times as expected"
-            )
+            lines.append(Phrase("line.small-factor", {"factor": self.factor}))
         lines += [each.sentence for each in self.found.systematic if each.significant and not each.large]
         if self.found.hints:
-            lines.append("nothing was corrected: put right what the data mean, and adjust again")
+            lines.append(Phrase("line.hints"))
         f = self.found.degrees_of_freedom
         if 0 < f < FEW:
-            lines.append(f"with {f:g} degrees of freedom only gross disagreement can be seen")
+            lines.append(Phrase("line.few", {"freedom": f}))
         return lines
 
-    def _by_what(self) -> list[str]:
-        """Say which test decides on single observations."""
+    def _statistics(self) -> list[Text]:
+        """Return the tests that decide on single observations."""
         if not self.found.computed:
-            return ["single observations are not tested: redundancy numbers were not computed"]
+            return [Phrase("line.no-redundancy")]
         if not self.number or self.found.degrees_of_freedom < 1:
             return []
-        found = {each.statistic for each in self.found.observations if self._count(each)}
-        what = " and ".join(meaning for statistic, meaning in STATISTICS.items() if statistic in found)
-        return [
-            f"{'single observations' if found & {'w', 't'} else GROUPS} are judged by {what}:"
-            f" level {self.found.level:g} for all"
-            f" {self.number} tests together"
-        ]
+        tested = {each.statistic for each in self.found.observations if self._count(each)}
+        fields = {
+            "observations": Phrase("judged.single" if tested & {"w", "t"} else "judged.groups"),
+            "statistics": [Phrase(f"judged.{statistic}") for statistic in "wtTF" if statistic in tested],
+            "level": self.found.level,
+            "n": self.number,
+        }
+        return [Phrase("line.tests", fields)]
 
     def tests(self) -> list[Test]:
         """Return the global test, the largest of every kind of observations, and those of patterns."""
@@ -316,10 +296,23 @@ class Evidence:
         if (checks := self.found.checks) is not None:
             number = self._count(checks.points)
             if checks.together is not None:
-                whole.append(replace(_whole(checks.together), name="check points together", statistic="T/m"))
+                whole.append(
+                    replace(_whole(checks.together), kind=Phrase("test.checks_together"), statistic="T/m")
+                )
             largest.append(_largest(checks.points, bonferroni(self.found.level, number), number))
         patterns = [_of_pattern(each) for each in self.found.systematic]
         return [*whole, *(each for each in largest if each is not None), *patterns]
+
+
+def part_of(name: Text, statistic: str, value: float) -> Phrase:
+    """Return a test in a sentence."""
+    return Phrase("part.test", {"name": name, "statistic": statistic, "value": value})
+
+
+def factor_of(test: GlobalTest) -> Phrase:
+    """Return the factor of a test with its interval."""
+    low, high = test.interval
+    return Phrase("part.factor", {"factor": test.factor, "low": low, "high": high})
 
 
 def _as_fall(tested: Tested, place: tuple[int, ...]) -> float:
@@ -362,7 +355,8 @@ def _distribution(
 
 def _whole(test: GlobalTest) -> Test:
     return Test(
-        name="global",
+        kind=GLOBAL,
+        subject="",
         statistic="s^2",
         distribution="chi2/f" if math.isinf(test.reference_dof) else "F",
         dof=(test.degrees_of_freedom,)
@@ -380,7 +374,8 @@ def _whole(test: GlobalTest) -> Test:
 
 def _of_pattern(pattern: Systematic) -> Test:
     return Test(
-        name=pattern.name,
+        kind=pattern.kind,
+        subject=pattern.subject,
         statistic=pattern.statistic,
         distribution=pattern.distribution,
         dof=pattern.dof,
@@ -411,7 +406,8 @@ def _test_at(tested: Tested, place: tuple[int, ...], level: float, number: int) 
     least = float(one.log_probability()[0])
     distribution, dof, limit = _distribution(tested.statistic, level, dimension, second)
     return Test(
-        name=f"{tested.kind}: {tested.name(place)}",
+        kind=tested.kind,
+        subject=tested.name(place),
         statistic=tested.statistic,
         distribution=distribution,
         dof=dof,

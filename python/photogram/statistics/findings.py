@@ -17,15 +17,19 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
 from photogram.statistics.limits import GlobalTest, externally_studentized
+from photogram.words import Phrase
+
+Text = str | Phrase
+"""A message or a name: a code with fields, or a text of a user or of a program that has no code for it."""
 
 
 @dataclass(frozen=True)
 class Observations:
     """Observations of one kind and their test values."""
 
-    kind: str  # What they are, in the plural
+    kind: Text  # What they are, in the plural
     values: Floats  # Test values in any shape, of either sign; NaN where nothing is tested
-    name: Callable[[tuple[int, ...]], str]  # Names the observation at an index of `values`
+    name: Callable[[tuple[int, ...]], Text]  # Names the observation at an index of `values`
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +53,9 @@ class Tested:
         Whether these are no observations but held values, which nothing takes out.
     """
 
-    kind: str
+    kind: Text
     values: Floats
-    name: Callable[[tuple[int, ...]], str]
+    name: Callable[[tuple[int, ...]], Text]
     statistic: str
     dimension: ArrayLike = 1.0
     second: ArrayLike = math.inf
@@ -153,17 +157,18 @@ class Agreement:
     sd
         (n, k) standard deviations of the differences: roots of C_ii.
     apart
-        Says how far the point at a place is off, given its (k,) standard deviations.
+        Fields of how far the point at a place is off, given its (k,) standard deviations.
     """
 
     points: Tested
     together: GlobalTest | None
     sd: Floats
-    apart: Callable[[tuple[int, ...], Floats], str]
+    apart: Callable[[tuple[int, ...], Floats], Mapping[str, Any]]
 
-    def said(self, place: tuple[int, ...]) -> str:
-        """Name the point at a place, and say how far it is off."""
-        return f"{self.points.name(place)}, {self.apart(place, self.sd[place[0]])}"
+    def difference(self, place: tuple[int, ...]) -> Phrase:
+        """Return the name of the point at a place, and how far it is off."""
+        fields = self.apart(place, self.sd[place[0]])
+        return Phrase("part.check", {"name": self.points.name(place), **fields})
 
 
 @dataclass(frozen=True)
@@ -172,8 +177,10 @@ class Systematic:
 
     Attributes
     ----------
-    name, sentence
-        Of the test, and what it says: what, how large, what it would do.
+    kind, subject
+        What is tested, and of what; the latter empty if it is one thing.
+    sentence
+        What the test says: what, how large, what it would do.
     statistic, distribution, dof, value
         Of the test.
     probability, level
@@ -184,8 +191,8 @@ class Systematic:
         By how much the weighted sum of squares would fall without it, where that was asked for.
     """
 
-    name: str
-    sentence: str
+    kind: Text
+    sentence: Text
     statistic: str
     distribution: str
     dof: tuple[float, ...]
@@ -194,6 +201,7 @@ class Systematic:
     level: float
     large: bool
     fall: float = 0.0
+    subject: Text = ""
 
     @property
     def significant(self) -> bool:
@@ -205,7 +213,7 @@ class Systematic:
 class GroupFactor:
     """The estimated variance component of a group of observations."""
 
-    group: str  # Its name
+    group: Text  # Its name
     factor: float  # By which its standard deviations are too small: the root of the component
     interval: tuple[float, float]  # 95 percent, of the factor
     significant: bool  # Whether it differs from 1, and by enough to change weights
@@ -222,19 +230,19 @@ class Removed:
     images, control
         Shares of the images and of the control that were taken out.
     rivals
-        What cannot be told apart from them, as sentences.
+        What cannot be told apart from them.
     exchanged
-        Names that are exchanged among them, as sentences.
+        Names that are exchanged among them.
     kept
-        Suspects that were not taken out, with the reason, as sentences.
+        Suspects that were not taken out, with the reason.
     """
 
     removed: Sequence[Mapping[str, Any]]
     images: float = 0.0
     control: float = 0.0
-    rivals: Sequence[str] = ()
-    exchanged: Sequence[str] = ()
-    kept: Sequence[str] = ()
+    rivals: Sequence[Text] = ()
+    exchanged: Sequence[Text] = ()
+    kept: Sequence[Text] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,42 +252,35 @@ class Findings:
     status: str  # `converged`, or what else came of the iteration
     observations: Sequence[Tested]  # Tests of single observations or groups of every kind
     degrees_of_freedom: float  # f
-    global_test: GlobalTest | None = None  # Of all residuals; None where it says nothing
-    untested: str = "no a-priori unit weight"  # Why there is no global test
-    undetermined: Sequence[str] = ()  # Unknowns that the observations do not determine, or hardly
-    # Accepted hypotheses of what is wrong with the data, as sentences ("probably ...")
-    hints: Sequence[str] = ()
-    exchanged: Sequence[str] = ()  # Names that are probably exchanged, as sentences
-    # Why gross errors make the result unusable, where the program has found that itself; a sentence
-    spoiled: str = ""
-    doubtful: Sequence[str] = ()  # Stars: exposures whose identification is doubtful or rejected
-    # How known values that took no part agree with the result; None where there are none, or untested
+    global_test: GlobalTest | None = None  # Of all residuals; None if there is none
+    untested: Text = Phrase("untested.weight")  # Why there is no global test
+    undetermined: Sequence[Text] = ()  # Unknowns that the observations do not determine, or hardly
+    hints: Sequence[Text] = ()  # Accepted hypotheses on mistakes in the data
+    exchanged: Sequence[Text] = ()  # Names that are probably exchanged
+    spoiled: Text = ""  # Why gross errors make the result unusable, if the program has found that itself
+    doubtful: Sequence[Text] = ()  # Stars: exposures whose identification is doubtful or rejected
+    # How known values that took no part agree with the result; None if there are none, or untested
     checks: Agreement | None = None
-    # What differs between occasions that should have the same values, as sentences
-    changed: Sequence[str] = ()
-    systematic: Sequence[Systematic] = ()  # What further computations have found, where they were made
+    changed: Sequence[Text] = ()  # Differences between occasions that should have the same values
+    systematic: Sequence[Systematic] = ()  # Tests of patterns
     components: Sequence[GroupFactor] = ()
     snooped: Removed | None = None
     # What a start has taken out and does not fit the adjusted network either; None for nothing
     set_aside: Removed | None = None
-    # Whether all photos are held where they are given, so that errors of these are in all residuals
+    # Whether all photos are fixed, so that their errors are in all residuals
     intersected: bool = False
     scaled: bool = True  # Whether covariances are scaled by the unit variance of the residuals
-    # Whether observations could be tested, that is, whether their redundancy numbers were computed
-    computed: bool = True
-    remarks: Sequence[str] = ()  # Sentences that stand below the headline
-    # How gross errors are taken out, held control gets a standard deviation and cameras are estimated,
-    # with this program; nothing where it cannot
-    snoop: str = ""
-    weigh: str = ""
-    calibrate: str = ""
-    # How the program looks for mistakes of the input, as part of a sentence
-    check: str = "look at units, names and signs"
-    take_out: str = ""  # How gross errors are taken out, in a sentence of what to do next
-    # How an adjustment that has not converged gets more iterations or fewer unknowns, in such a
-    # sentence
-    iterate: str = ""
-    # What else is to be done next where nothing forbids the use, and where something does: sentences
-    if_usable: Sequence[str] = ()
-    if_withheld: Sequence[str] = ()
+    computed: bool = True  # Whether redundancy numbers were computed, which the tests need
+    remarks: Sequence[Text] = ()  # Further lines below the headline
+    # Advice with which the program removes gross errors, weights fixed control, estimates cameras, searches
+    # for mistakes of the input and continues iterations; None if it cannot
+    can_snoop: bool = False
+    weigh: Phrase | None = None
+    calibrate: Phrase | None = None
+    check: Phrase = Phrase("how.check")
+    take_out: Phrase | None = None
+    iterate: Phrase | None = None
+    # Further advice if nothing forbids the use, and if a rule does
+    if_usable: Sequence[Text] = ()
+    if_withheld: Sequence[Text] = ()
     level: float = LEVEL  # Of the global test, and of all single tests together

@@ -28,11 +28,11 @@ from numpy.typing import ArrayLike
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import counted
 from photogram.statistics.distributions import LEVEL, bonferroni, critical_student, log_chi_square, log_fisher
 from photogram.statistics.findings import Systematic
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import Phrase
 
 YEAR = 365.2425
 """Days."""
@@ -140,18 +140,18 @@ class History:
         return [each.sentence for each in sorted(changes, key=lambda each: each.log10_p)]
 
     @property
-    def changed(self) -> list[str]:
-        """What a verdict says: the changes, or that there are some where no single one is certain."""
-        failed = None if self.sentences else self.constancy.problem()
-        return [f"no single change explains it, but {failed}"] if failed else self.sentences
+    def has_changed(self) -> bool:
+        """Whether a change is certain, or the test of constancy fails."""
+        return bool(self.sentences) or self.constancy.problem() is not None
 
     def systematic(self, whose: str) -> Systematic:
         """Return the test of constancy as it stands in a verdict."""
         test = self.constancy
         known = math.isinf(test.reference_dof)
         return Systematic(
-            name=f"{whose}: all values are the same on all occasions",
-            sentence=f"{whose}: values differ between occasions by more than their covariances allow",
+            kind=whose,
+            subject=Phrase("test.constancy"),
+            sentence=Phrase("pattern.constancy", {"whose": whose}),
             statistic="s^2",
             distribution="chi2/f" if known else "F",
             dof=(test.degrees_of_freedom,) if known else (test.degrees_of_freedom, test.reference_dof),
@@ -180,19 +180,26 @@ def dates_of(days: Sequence[date], names: Sequence[str]) -> Dates:
     return Dates([day.year + (day - date(day.year, 1, 1)).days / YEAR for day in days], called)
 
 
-def changed_of(histories: Mapping[str, History]) -> list[str]:
-    """Return what a verdict says of what changed, each thing by its name."""
-    return [f"{whose}: {text}" for whose, own in histories.items() for text in own.changed]
+def changed_of(histories: Mapping[str, History]) -> list[Phrase | str]:
+    """Return messages on the changes, or that no single one is certain, each thing by its name."""
+    found: list[Phrase | str] = []
+    for whose, own in histories.items():
+        found += [f"{whose}: {text}" for text in own.sentences]
+        failed = None if own.sentences else own.constancy.problem()
+        if failed:
+            found.append(Phrase("part.unexplained-change", {"whose": whose, "failed": failed}))
+    return found
 
 
-def unchanged_of(histories: Mapping[str, History]) -> list[str]:
-    """Return the sentences on things of which nothing changed."""
-    return [
-        f"{whose}: nothing changed between {own.occasions[0]} and {own.occasions[-1]}"
-        f" ({counted(len(own.occasions), 'calibration')}, {len(own.series)} quantities)"
-        for whose, own in histories.items()
-        if not own.changed
-    ]
+def unchanged_of(histories: Mapping[str, History]) -> list[Phrase]:
+    """Return messages on things without changes."""
+    found = []
+    for whose, own in histories.items():
+        if not own.has_changed:
+            fields = {"whose": whose, "first": own.occasions[0], "last": own.occasions[-1]}
+            counts = {"n": len(own.occasions), "quantities": len(own.series)}
+            found.append(Phrase("line.unchanged", {**fields, **counts}))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,21 +1,21 @@
 """The verdict on an adjustment: whether its result can be used, and if not, what is wrong.
 
-One table of conditions, in order: the first that fits gives the headline and the exit code, all others that
-fit follow as lines. No figure is hidden: every test stands in the verdict with its distribution, probability,
+One ordered list of rules (:data:`RULES`): the first that fits gives the headline, the exit code and the
+advice, all others that fit follow as lines. Every test is in the verdict with its distribution, probability,
 level and number of tests.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
 
-from photogram.lazy_dataclasses import asdict, dataclass
-from photogram.messages import counted, listed
-from photogram.statistics.evidence import NAMED, WITHHELD, Evidence, Test
-from photogram.statistics.findings import Findings
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
+from photogram.statistics.findings import Findings, Text
 from photogram.statistics.limits import NOTABLE_FACTOR
-from photogram.statistics.next_steps import next_steps
+from photogram.words import Phrase
 
 EXIT_NOT_CONVERGED, EXIT_NOT_USABLE = 3, 4
 """How a command ends: figures that are no results; results that must not be used as they are."""
@@ -33,6 +33,9 @@ _GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)
 LARGEST_FACTOR = 3.0
 """Standard deviations wrong by more than this are no matter of weights."""
 
+_LISTED = ("lines", "next", "outliers", "rivals", "hints")
+"""Members of a verdict that list messages."""
+
 
 @dataclass(frozen=True, repr=False)
 class Verdict:
@@ -41,39 +44,49 @@ class Verdict:
     Attributes
     ----------
     code
-        Name of the condition that fits first: the table is in `docs/tests.md`.
-    headline
-        A sentence.
+        Name of the rule that fits first: the table is in `docs/command-line.md`.
+    message
+        Its message: a code with fields.
     exit
         Exit code of the command: 0, 3 or 4.
     warning
         Whether a user should look although the exit code is 0; `--strict` makes it 4.
     lines
-        What else is to be said.
+        Messages of the other rules, and remarks.
     next
-        What to do next, in sentences.
+        Messages on the next steps.
     tests
         The global test, the largest test value of every kind of observation, tests of patterns.
     outliers
-        Sentences on the kinds of observations whose tests reject: how many, and the worst.
+        A message for each kind of observations whose tests reject: how many, and the worst.
     removed, rivals, hints
-        What snooping took out, what cannot be told apart from it, and accepted hypotheses.
+        Observations that snooping removed, those that cannot be told apart from them, accepted hypotheses.
     """
 
     code: str
-    headline: str
+    message: Phrase
     exit: int
     warning: bool
-    lines: tuple[str, ...]
-    next: tuple[str, ...]
+    lines: tuple[Phrase, ...]
+    next: tuple[Phrase, ...]
     tests: tuple[Test, ...]
-    outliers: tuple[str, ...] = ()
+    outliers: tuple[Phrase, ...] = ()
     removed: tuple[Any, ...] = ()
-    rivals: tuple[str, ...] = ()
-    hints: tuple[str, ...] = ()
+    rivals: tuple[Text, ...] = ()
+    hints: tuple[Text, ...] = ()
 
     def __repr__(self) -> str:
         return f"Verdict {self.code}: {self.headline} (exit code {self.exit}, {len(self.tests)} tests)"
+
+    @property
+    def headline(self) -> str:
+        """The message of the rule that fits first, as a sentence."""
+        return str(self.message)
+
+    @property
+    def is_tested_as_a_whole(self) -> bool:
+        """Whether there is a test of all residuals together."""
+        return any(test.kind == GLOBAL for test in self.tests)
 
     @property
     def usable(self) -> bool:
@@ -85,52 +98,85 @@ class Verdict:
         return EXIT_NOT_USABLE if strict and self.warning and self.exit == 0 else self.exit
 
     def document(self) -> dict[str, Any]:
-        """Return the verdict as it stands in JSON documents."""
-        return asdict(self)
+        """Return the verdict as JSON documents have it: sentences, and `messages` with codes and fields."""
+        listed: dict[str, tuple[Text, ...]] = {name: getattr(self, name) for name in _LISTED}
+        return {
+            "code": self.code,
+            "headline": self.headline,
+            "exit": self.exit,
+            "warning": self.warning,
+            **{name: [str(each) for each in own] for name, own in listed.items()},
+            "tests": [test.document() for test in self.tests],
+            "removed": self.removed,
+            "messages": [
+                {"member": name, **each.document()}
+                for name, own in {"headline": (self.message,), **listed}.items()
+                for each in own
+                if isinstance(each, Phrase)
+            ],
+        }
 
 
 @dataclass(frozen=True)
-class _Line:
-    """A sentence of a condition; `praise` goes before it where nothing forbids the use.
+class Rule:
+    """A rule of verdicts.
 
-    `exchanged` are the sentences on exchanged names that it contains.
+    Attributes
+    ----------
+    code
+        Name of the rule.
+    message
+        The message on the evidence; None if the rule does not fit.
+    exit
+        Exit code, if `grave` holds of the evidence.
+    advice
+        Codes of the next steps, if it gives the headline.
+    warning
+        Whether a user should look although the exit code is 0.
+    grave
+        When the rule forbids the use.
+    also
+        Whether the message has the variant `.also` for verdicts that forbid the use.
     """
 
     code: str
-    text: str
-    exit: int = 0
+    message: Callable[[Evidence], Phrase | None]
+    exit: int
+    advice: tuple[str, ...]
     warning: bool = False
-    praise: str = ""
-    exchanged: Sequence[str] = ()
-
-    def said(self, usable: bool) -> str:
-        text = f"{self.praise} {self.text}" if usable and self.praise else self.text
-        return f"{text[:1].upper()}{text[1:]}"
+    grave: Callable[[Evidence], bool] = lambda _: True
+    also: bool = False
 
 
 def verdict(found: Findings) -> Verdict:
     """Judge an adjustment by all that was found about it."""
     evidence = Evidence(found)
-    fitting = [line for condition in _CONDITIONS if (line := condition(evidence)) is not None]
-    # What forbids the use comes first: no green headline above a line that says so.
-    fitting.sort(key=lambda line: line.exit == 0)
-    first, *others = fitting or [_Line(*evidence.accepted())]
-    usable = first.exit == 0
+    fitting: list[tuple[Rule, Phrase, int]] = []
+    for rule in RULES:
+        if (message := rule.message(evidence)) is not None:
+            evidence.codes.append(rule.code)
+            fitting.append((rule, message, rule.exit if rule.grave(evidence) else 0))
+    # Rules that forbid the use are first: no green headline above a line that says so.
+    fitting.sort(key=lambda each: each[2] == 0)
+    usable = not fitting[0][2]
+    messages = [
+        replace(message, code=f"verdict.{rule.code}.also") if rule.also and not usable else message
+        for rule, message, _ in fitting
+    ]
+    lines: list[Text] = [*messages[1:], *evidence.remarks(), *found.remarks]
+    if found.snooped:
+        lines += found.snooped.kept
+    fields = [value for message in messages for value in message.fields.values() if isinstance(value, list)]
+    named = [each for value in fields for each in value]
+    lines += [each for each in found.exchanged if each not in named]
+    rule = fitting[0][0]
     return Verdict(
-        code=first.code,
-        headline=first.said(usable),
-        exit=first.exit,
-        warning=first.warning or any(line.warning or line.exit for line in others),
-        lines=(
-            *(line.said(usable) for line in others),
-            *evidence.remarks(),
-            *found.remarks,
-            *(found.snooped.kept if found.snooped else ()),
-            *_exchanged(found, fitting),
-        ),
-        next=next_steps(
-            first.code, found, usable=usable, take_out=_can_be_taken_out(evidence), lens=evidence.lens_first
-        ),
+        code=rule.code,
+        message=messages[0],
+        exit=fitting[0][2],
+        warning=any(each.warning for each, *_ in fitting) or any(code for *_, code in fitting[1:]),
+        lines=tuple(map(as_phrase, lines)),
+        next=_next_steps(rule, evidence, usable=usable),
         tests=tuple(evidence.tests()),
         outliers=tuple(evidence.outliers()),
         removed=tuple(found.snooped.removed) if found.snooped else (),
@@ -139,14 +185,9 @@ def verdict(found: Findings) -> Verdict:
     )
 
 
-def _can_be_taken_out(e: Evidence) -> bool:
-    """Return whether what looks gross is an observation, and nothing was taken out yet."""
-    return e.found.snooped is None and not (e.gross and e.gross[0][1].held)
-
-
-def _exchanged(found: Findings, lines: list[_Line]) -> list[str]:
-    """Return names that are probably exchanged, unless a line has them."""
-    return [each for each in found.exchanged if not any(each in line.exchanged for line in lines)]
+def as_phrase(text: Text) -> Phrase:
+    """Return a message; a text without a code as one."""
+    return text if isinstance(text, Phrase) else Phrase("part.text", {"text": text})
 
 
 def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
@@ -154,217 +195,287 @@ def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
     return max((each.exit_code(strict=strict) for each in verdicts), key=_GRAVITY.index, default=0)
 
 
-def _not_converged(e: Evidence) -> _Line | None:
+def _next_steps(rule: Rule, e: Evidence, *, usable: bool) -> tuple[Phrase, ...]:
+    """Return the advice of a rule, and that of the program."""
+    found = e.found
+    # Fixed values are no observations, and a second snooping finds nothing more.
+    snooping = found.snooped is None and not (e.gross and e.gross[0][1].held)
+    calibrate = found.calibrate and replace(
+        found.calibrate, code=found.calibrate.code.replace("how", "advice")
+    )
+    of_program: Mapping[str, Phrase | None] = {
+        "scaled": Phrase("advice.scaled") if found.scaled else None,
+        "take-out": found.take_out if snooping else None,
+        "calibrate": calibrate,
+        "lens": calibrate if e.lens_first else None,
+        "iterate": found.iterate,
+    }
+    steps: list[Text] = []
+    for name in rule.advice:
+        if name in of_program:
+            steps += filter(None, [of_program[name]])
+        else:
+            steps.append(Phrase(f"advice.{name}", {"check": found.check} if name in _WITH_CHECK else {}))
+    steps += found.if_usable if usable else found.if_withheld
+    return tuple(map(as_phrase, steps)) or ((Phrase("advice.nothing"),) if usable else ())
+
+
+def _listing(code: str, name: str, attribute: str) -> Callable[[Evidence], Phrase | None]:
+    """Return what makes a message that lists findings, if there are any."""
+
+    def message(e: Evidence) -> Phrase | None:
+        listed = list(getattr(e.found, attribute))
+        return Phrase(f"verdict.{code}", {name: listed}) if listed else None
+
+    return message
+
+
+def _not_converged(e: Evidence) -> Phrase | None:
     if e.found.status == "converged":
         return None
-    text = "; ".join([f"Not converged ({e.found.status}): the figures are no results", *e.found.exchanged])
-    return _Line("not-converged", text, EXIT_NOT_CONVERGED, exchanged=e.found.exchanged)
+    return Phrase("verdict.not-converged", {"status": e.found.status, "exchanged": list(e.found.exchanged)})
 
 
-def _rank_defect(e: Evidence) -> _Line | None:
-    if not e.found.undetermined:
-        return None
-    names = listed(list(e.found.undetermined))
-    return _Line(
-        "undetermined",
-        f"Unknowns that the observations do not determine, or hardly: {names}",
-        EXIT_NOT_CONVERGED,
-    )
-
-
-def _hint(e: Evidence) -> _Line | None:
-    if not e.found.hints:
-        return None
-    first, *others = e.found.hints
-    text = "; ".join([f"{first[:1].upper()}{first[1:]}", *others])
-    return _Line("hint", text, EXIT_NOT_USABLE)
-
-
-def _identification(e: Evidence) -> _Line | None:
-    if not e.found.doubtful:
-        return None
-    named = listed(list(e.found.doubtful))
-    return _Line("identification", f"The identification of stars is doubtful: {named}", EXIT_NOT_USABLE)
-
-
-def _changed(e: Evidence) -> _Line | None:
-    if not e.found.changed:
-        return None
-    return _Line("changed", f"Changed: {listed(list(e.found.changed), NAMED)}", EXIT_NOT_USABLE)
-
-
-def _gross_errors(e: Evidence) -> _Line | None:
+def _gross_errors(e: Evidence) -> Phrase | None:
     if e.found.spoiled:
-        named = f": {e.named(e.single)}" if e.single else ""
-        return _Line("gross-errors", f"Gross errors: {e.found.spoiled}{named}", EXIT_NOT_USABLE)
+        code = "verdict.gross-errors.harmful"
+        fields: dict[str, Any] = {"reason": e.found.spoiled}
+        return (
+            Phrase(f"{code}.named", {**fields, "tests": e.named(e.single)})
+            if e.single
+            else Phrase(code, fields)
+        )
     if not e.rejected or e.found.snooped or not e.gross or e.lens:
         return None
     # A few gross errors make s larger than the median says; a wrong model spoils all residuals alike.
     if e.pattern and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust:
         return None
-    text = f"Gross errors likely: {'; '.join([*e.found.exchanged, e.named(e.gross)])}"
+    suspects = [*e.found.exchanged, Phrase("part.tests", {"tests": e.named(e.gross)})]
+    return Phrase("verdict.gross-errors", {"suspects": suspects, "remedy": _remedy(e)})
+
+
+def _remedy(e: Evidence) -> Phrase | str:
+    """Return how to remove the observations that look gross."""
     _, first, place = e.gross[0]
     if first.held:
-        text += "; what is held without error is no observation: give it a standard deviation"
-        text += f" ({e.found.weigh})" if e.found.weigh and "control point" in first.name(place) else ""
-    elif e.found.snoop and e.found.status == "converged":
-        text += f"; {e.found.snoop} takes them out"
-    return _Line("gross-errors", text, EXIT_NOT_USABLE, exchanged=e.found.exchanged)
+        name = first.name(place)
+        if e.found.weigh and isinstance(name, Phrase) and name.fields["named"].code == CONTROL:
+            return Phrase("part.fixed.control", {"how": e.found.weigh})
+        return Phrase("part.fixed")
+    return Phrase("part.snoop") if e.found.can_snoop and e.found.status == "converged" else ""
 
 
-def _snooped(e: Evidence) -> _Line | None:
+def _too_much_removed(e: Evidence) -> Phrase | None:
     found = e.found.snooped
-    if found is None or not found.removed:
+    if found is None or not found.removed or (found.images <= MOST_IMAGES and found.control <= MOST_CONTROL):
         return None
-    count = len(found.removed)
-    if found.images > MOST_IMAGES or found.control > MOST_CONTROL:
-        return _Line(
-            "too-much-removed",
-            f"Too much had to be removed ({count} observations: {100 * found.images:.3g} percent of the"
-            f" images, {100 * found.control:.3g} of the control): model or identification is wrong"
-            + "".join(f"; {each}" for each in found.exchanged),
-            EXIT_NOT_USABLE,
-            exchanged=found.exchanged,
-        )
-    if e.high:
-        return None
-    names = listed([str(each.get("name", "")) for each in found.removed], NAMED)
-    removed = counted(count, "observation")
-    text = "; ".join([f"after removal of {removed}: {names}", *found.exchanged])
-    return _Line("usable-after-removal", text, praise="Usable", exchanged=found.exchanged)
+    shares = {"images": 100 * found.images, "control": 100 * found.control}
+    fields = {"n": len(found.removed), **shares, "exchanged": list(found.exchanged)}
+    return Phrase("verdict.too-much-removed", fields)
 
 
-def _set_aside(e: Evidence) -> _Line | None:
+def _removed(e: Evidence) -> Phrase | None:
+    found = e.found.snooped
+    if found is None or not found.removed or e.high or "too-much-removed" in e.codes:
+        return None
+    names = [each.get("subject") or each.get("name", "") for each in found.removed]
+    fields = {"n": len(names), "names": names, "exchanged": list(found.exchanged)}
+    return Phrase("verdict.usable-after-removal", fields)
+
+
+def _set_aside(much: bool, e: Evidence) -> Phrase | None:
+    """Return the observations that a start has set aside: of too many images, or of few."""
     found = e.found.set_aside
-    if found is None:
+    if found is None or (found.images > MOST_IMAGES) is not much:
         return None
-    names = listed([str(each["name"]) for each in found.removed], NAMED)
-    text = f"{names}; --keep-all (keep_all=True) takes all images in"
-    if found.images > MOST_IMAGES:
-        share = f"{100 * found.images:.3g} percent of the images fit neither the start nor the adjusted block"
-        return _Line(
-            "too-much-set-aside", f"{share}: model or identification is wrong: {text}", EXIT_NOT_USABLE
-        )
-    start = f"without {len(found.removed)} that fit neither the start nor the adjusted block"
-    return _Line("set-aside", f"{start}: {text}", warning=True, praise="" if e.high else "Usable, but")
+    fields = {"n": len(found.removed), "names": [each["name"] for each in found.removed]}
+    fields["keep"] = Phrase("part.keep-all")
+    if much:
+        return Phrase("verdict.too-much-set-aside", {**fields, "images": 100 * found.images})
+    return Phrase("verdict.set-aside.also" if e.high else "verdict.set-aside", fields)
 
 
-def _checks(e: Evidence) -> _Line | None:
-    if said := e.disagreement(WITHHELD):
-        return _Line("check-points", f"Check points disagree with the adjustment: {said}", EXIT_NOT_USABLE)
-    if said := e.disagreement(e.found.level):
-        return _Line("look-at-check-points", f"Look at the check points: {said}", warning=True)
-    return None
+def _checks(e: Evidence) -> Phrase | None:
+    points = e.disagreement(WITHHELD)
+    return Phrase("verdict.check-points", {"points": points}) if points else None
 
 
-def _intersected(e: Evidence) -> _Line | None:
+def _suspect_checks(e: Evidence) -> Phrase | None:
+    points = [] if "check-points" in e.codes else e.disagreement(e.found.level)
+    return Phrase("verdict.look-at-check-points", {"points": points}) if points else None
+
+
+def _intersected(e: Evidence) -> Phrase | None:
     if not e.high or e.gross or not e.found.intersected:
         return None
-    text = (
-        "Intersection only: photos stay where they are given, and residuals, which have the errors of that,"
-        f" are {e.interval()} times larger than images and control explain; none stands out from the others."
-        " The adjustment of the photos judges"
-    )
-    return _Line("intersection", text, EXIT_NOT_USABLE if e.factor > LARGEST_FACTOR else 0, warning=True)
+    return Phrase("verdict.intersection", {"factor": e.interval()})
 
 
-def _common_factor(e: Evidence) -> _Line | None:
-    if not e.high or e.gross or e.pattern or e.found.intersected:
+def _common_factor(far: bool, e: Evidence) -> Phrase | None:
+    """Return the common factor of all standard deviations: one that no weights explain, or a smaller one."""
+    if not e.high or e.gross or e.pattern or e.found.intersected or _is_far(e) is not far:
         return None
     if any(each.significant for each in e.found.components):
         return None
     if e.robust is not None and e.robust < e.factor / NOTABLE_FACTOR:
         return None
-    text = f"Weights too optimistic: standard deviations are too small by about {e.interval()}"
-    if e.factor <= LARGEST_FACTOR:
-        scaled = "; covariances are scaled by the unit variance" if e.found.scaled else ""
-        return _Line("weights", f"{text}{scaled}", warning=True)
-    return _Line("weights", text, EXIT_NOT_USABLE)
+    scaled = ".scaled" if e.found.scaled and not far else ""
+    return Phrase(f"verdict.weights{scaled}", {"factor": e.interval()})
 
 
-def _components(e: Evidence) -> _Line | None:
-    wrong = [each for each in e.found.components if each.significant]
-    if not wrong:
-        return None
-    named = [
-        f"of {each.group} by about {each.factor:.3g} ({each.interval[0]:.3g} to {each.interval[1]:.3g})"
-        for each in wrong
+def _is_far(e: Evidence) -> bool:
+    """Return whether standard deviations are wrong by so much that no weights explain it."""
+    return e.factor > LARGEST_FACTOR
+
+
+def _components(e: Evidence) -> Phrase | None:
+    groups = [
+        Phrase(
+            "part.group",
+            {"group": each.group, "factor": each.factor, "low": each.interval[0], "high": each.interval[1]},
+        )
+        for each in e.found.components
+        if each.significant
     ]
-    far = any(not 1 / LARGEST_FACTOR <= each.factor <= LARGEST_FACTOR for each in wrong)
-    text = f"Standard deviations are wrong: those {listed(named)}"
-    return _Line("weights-of-groups", text, EXIT_NOT_USABLE if far else 0, warning=True)
+    return Phrase("verdict.weights-of-groups", {"groups": groups}) if groups else None
 
 
-def _model(e: Evidence) -> _Line | None:
+def _has_far_groups(e: Evidence) -> bool:
+    return any(
+        each.significant and not 1 / LARGEST_FACTOR <= each.factor <= LARGEST_FACTOR
+        for each in e.found.components
+    )
+
+
+def _model(e: Evidence) -> Phrase | None:
     wrong = [each.sentence for each in e.found.systematic if each.significant and each.large]
     if not wrong:
         return None
-    text = f"The model is likely wrong: {'; '.join(wrong)}"
+    remedy: Phrase | str = ""
     if e.lens_first and e.found.calibrate and not e.found.spoiled:
-        text += f". {e.found.calibrate} estimates it"
-        text += "; observations are not to be taken out before" if e.lens else ""
-    return _Line("model", text, EXIT_NOT_USABLE)
+        remedy = Phrase("part.calibrate.first" if e.lens else "part.calibrate", {"how": e.found.calibrate})
+    return Phrase("verdict.model", {"patterns": wrong, "remedy": remedy})
 
 
-def _uncontrolled(e: Evidence) -> _Line | None:
+def _uncontrolled(e: Evidence) -> Phrase | None:
     if e.found.degrees_of_freedom >= 1 and (e.number or not e.found.computed):
         return None
-    reason = (
-        "as many unknowns as observations" if e.found.degrees_of_freedom < 1 else "no observation has a test"
-    )
-    return _Line("uncontrolled", f"Nothing is checked: {reason}", warning=True)
+    return Phrase(f"verdict.uncontrolled{'.unknowns' if e.found.degrees_of_freedom < 1 else ''}")
 
 
-def _unexplained(e: Evidence) -> _Line | None:
-    explained = (_gross_errors, _snooped, _intersected, _common_factor, _components, _model)
-    if not e.high or any(condition(e) is not None for condition in explained):
+def _unexplained(e: Evidence) -> Phrase | None:
+    if not e.high or _EXPLAINING & set(e.codes):
         return None
-    largest = [test for test in e.tests() if test.name != "global"]
-    named = "; ".join(f"{test.name} ({test.statistic} = {test.value:.4g})" for test in largest)
-    return _Line(
-        "unexplained",
-        f"Residuals are {e.interval()} times larger than the standard deviations allow; no single cause"
-        f" found. Largest tests: {named or 'none'}",
-        EXIT_NOT_USABLE if e.factor > LARGEST_FACTOR else 0,
-        warning=True,
-    )
+    tests = [part_of(test.name, test.statistic, test.value) for test in e.tests() if test.kind != GLOBAL]
+    fields = {"factor": e.interval(), "tests": tests or [Phrase("part.none")]}
+    return Phrase("verdict.unexplained", fields)
 
 
-def _look_at(e: Evidence) -> _Line | None:
-    if e.high or not e.single or _gross_errors(e) is not None:
+def _look_at(e: Evidence) -> Phrase | None:
+    if e.high or not e.single or "gross-errors" in e.codes:
         return None
-    whole = "Accepted, but" if e.test is not None else f"Not tested as a whole ({e.found.untested}), but"
-    return _Line("look-at", f"look at: {e.named(e.single)}", warning=True, praise=whole)
+    fields = {"tests": e.named(e.single)}
+    if e.test is None:
+        return Phrase("verdict.look-at.untested", {**fields, "reason": e.found.untested})
+    return Phrase("verdict.look-at", fields)
 
 
-def _too_low(e: Evidence) -> _Line | None:
-    if not e.low:
+def _too_low(e: Evidence) -> Phrase | None:
+    return Phrase("verdict.weights-pessimistic", {"factor": 1 / e.factor}) if e.low else None
+
+
+def _accepted(e: Evidence) -> Phrase | None:
+    if e.codes or e.test is None:
         return None
-    return _Line(
-        "weights-pessimistic",
-        "Weights too pessimistic: the residuals are smaller than the given standard deviations allow."
-        f" These are too large by about {1 / e.factor:.3g}, or residuals are not independent"
-        " (repeated or smoothed values)",
-    )
+    low, high = e.test.limits
+    fields = {"variance": e.test.variance, "low": low, "high": high}
+    if e.test.rejected_high or e.test.rejected_low:
+        return Phrase("verdict.accepted.harmless", {**fields, "factor": e.factor})
+    return Phrase("verdict.accepted", fields)
 
 
-_CONDITIONS: tuple[Callable[[Evidence], _Line | None], ...] = (
-    _not_converged,
-    _rank_defect,
-    _hint,
-    _identification,
-    _changed,
-    _gross_errors,
-    _snooped,
-    _model,
-    _set_aside,
-    _checks,
-    _intersected,
-    _common_factor,
-    _components,
-    _uncontrolled,
-    _unexplained,
-    _look_at,
-    _too_low,
+def _not_tested(e: Evidence) -> Phrase | None:
+    if e.codes:
+        return None
+    pattern = any(each.significant for each in e.found.systematic)
+    return Phrase(f"verdict.not-tested{'.pattern' if pattern else ''}", {"reason": e.found.untested})
+
+
+CONTROL = "named.control"
+"""Code of the name of a control point."""
+
+_WITH_CHECK = frozenset(
+    {
+        "first-values",
+        "determine",
+        "common-of-images",
+        "common-of-observations",
+        "wrong-checks",
+        "largest-tests",
+    }
 )
-"""The first that fits gives the headline."""
+"""Advice that names how the program searches for mistakes of the input."""
+
+_EXPLAINING = frozenset(
+    {
+        "gross-errors",
+        "too-much-removed",
+        "usable-after-removal",
+        "intersection",
+        "weights",
+        "weights-of-groups",
+        "model",
+    }
+)
+"""Rules that explain residuals that are too large."""
+
+RULES = (
+    Rule("not-converged", _not_converged, EXIT_NOT_CONVERGED, ("no-results", "iterate", "first-values")),
+    Rule(
+        "undetermined",
+        _listing("undetermined", "names", "undetermined"),
+        EXIT_NOT_CONVERGED,
+        ("determine",),
+    ),
+    Rule("hint", _listing("hint", "hints", "hints"), EXIT_NOT_USABLE, ("correct",)),
+    Rule("identification", _listing("identification", "names", "doubtful"), EXIT_NOT_USABLE, ("exposures",)),
+    Rule(
+        "changed",
+        _listing("changed", "names", "changed"),
+        EXIT_NOT_USABLE,
+        ("before-and-after", "cause-of-change"),
+    ),
+    Rule("gross-errors", _gross_errors, EXIT_NOT_USABLE, ("look-at-gross-errors", "lens", "take-out")),
+    Rule("too-much-removed", _too_much_removed, EXIT_NOT_USABLE, ("common-of-observations",)),
+    Rule("usable-after-removal", _removed, 0, ("measure-again", "after-selection"), also=True),
+    Rule("model", _model, EXIT_NOT_USABLE, ("calibrate", "frame")),
+    Rule("too-much-set-aside", partial(_set_aside, True), EXIT_NOT_USABLE, ("common-of-images",)),
+    Rule("set-aside", partial(_set_aside, False), 0, ("look-at-images",), warning=True, also=True),
+    Rule("check-points", _checks, EXIT_NOT_USABLE, ("wrong-checks", "cause-first")),
+    Rule("look-at-check-points", _suspect_checks, 0, ("look-at-checks",), warning=True),
+    Rule("intersection", _intersected, EXIT_NOT_USABLE, ("adjust-photos",), warning=True, grave=_is_far),
+    Rule("weights", partial(_common_factor, True), EXIT_NOT_USABLE, ("scaled", "larger-sd")),
+    Rule("weights", partial(_common_factor, False), 0, ("scaled", "larger-sd"), warning=True),
+    Rule(
+        "weights-of-groups",
+        _components,
+        EXIT_NOT_USABLE,
+        ("sd-of-groups",),
+        warning=True,
+        grave=_has_far_groups,
+    ),
+    Rule("uncontrolled", _uncontrolled, 0, ("measure-more",), warning=True),
+    Rule(
+        "unexplained",
+        _unexplained,
+        EXIT_NOT_USABLE,
+        ("largest-tests", "take-out"),
+        warning=True,
+        grave=_is_far,
+    ),
+    Rule("look-at", _look_at, 0, ("look-at",), warning=True, also=True),
+    Rule("weights-pessimistic", _too_low, 0, ("scaled", "smaller-sd")),
+    Rule("accepted", _accepted, 0, ()),
+    Rule("not-tested", _not_tested, 0, ("compare",)),
+)
+"""The first that fits gives the headline; rules that forbid the use are before all others."""

@@ -12,6 +12,7 @@ from photogram.statistics.reliability import TESTABLE
 from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.outliers import studentized
 from photogram.stellar.result import SIGNIFICANT, Result
+from photogram.words import Phrase
 
 Named = Callable[[tuple[int, ...]], str]
 
@@ -36,27 +37,21 @@ def plate_findings(result: Result) -> Findings:
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=result.test,
-        untested="the mean error of unit weight is not given"
-        if not problem.options.mean_error
-        else "no degrees of freedom",
+        untested=Phrase("untested.freedom" if problem.options.mean_error else "untested.mean-error"),
         scaled=not problem.options.mean_error,
         spoiled=result.spoiled,
         if_usable=[
             *_not_significant(result),
-            "camera.json holds the calibrated camera: blocks take it with its covariance"
-            " (`photogram.camera_from`).",
+            Phrase("advice.camera-of-plate"),
         ],
-        if_withheld=["camera.json is withheld: no block may take this camera."],
+        if_withheld=[Phrase("advice.camera-withheld")],
     )
 
 
-def _not_significant(result: Result) -> list[str]:
+def _not_significant(result: Result) -> list[Phrase]:
     """Name terms of the distortion that a calibration does better without."""
     weak = [name for name, ratio in result.significance().items() if ratio < SIGNIFICANT]
-    if not weak:
-        return []
-    named = ", ".join(weak)
-    return [f"Distortion terms that are not significant: {named}. A calibration without them is simpler."]
+    return [Phrase("advice.weak-terms", {"names": weak})] if weak else []
 
 
 def night_findings(result: CalibratedNight) -> Findings:
@@ -86,14 +81,14 @@ def night_findings(result: CalibratedNight) -> Findings:
         ],
         degrees_of_freedom=freedom,
         global_test=result.test,
-        untested="no degrees of freedom",
+        untested=Phrase("untested.freedom"),
         doubtful=[
-            *(f"exposure {name} (by chance {odds:.1g})" for name, odds in result.doubtful.items()),
-            *(["more exposures are left out than take part"] if result.mostly_left_out else []),
+            *(
+                Phrase("part.exposure", {"name": str(name), "odds": float(odds)})
+                for name, odds in result.doubtful.items()
+            ),
+            *([Phrase("part.mostly-left-out")] if result.mostly_left_out else []),
         ],
-        if_usable=[
-            "camera.json holds the calibrated camera; so do camera.yaml and camera-ros.yaml of lenses they"
-            " know."
-        ],
-        if_withheld=["The files of the camera are withheld: no block may take this camera."],
+        if_usable=[Phrase("advice.camera-of-night")],
+        if_withheld=[Phrase("advice.cameras-withheld")],
     )

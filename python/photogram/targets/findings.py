@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import counted, listed
 from photogram.network.knots import KNOTTED
 from photogram.results.findings import block_findings
 from photogram.show.methods import findings_of
@@ -23,13 +23,12 @@ from photogram.targets.cross_validation import EXPLAINED, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.picture_parts import PARTS, parts_of
 from photogram.targets.vision import rays
+from photogram.words import Phrase
 
 TILTED, FEWEST = 15.0, 3
 """Degrees from which a view tells focal length and distance apart, and how many such views are enough."""
 FARTHER = 1.3
 """How many times as far as the nearest the farthest view should be."""
-NAMED = 6
-"""Parts of the picture that a sentence names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,39 +45,28 @@ class Showing:
     tilts: Floats  # (n,) of the board against the picture, degrees
 
     @property
-    def sentence(self) -> str:
-        """What was seen of the board, in a line."""
-        near, far = (_rounded(each) for each in (self.distances.min(), self.distances.max()))
-        flat, steep = (f"{each:.0f}" for each in (self.tilts.min(), self.tilts.max()))
-        said = [f"{counted(len(self.distances), 'view')}, {near} to {far} {self.unit} away"]
-        said.append(f"tilted by {flat} to {steep} degrees")
+    def line(self) -> Phrase:
+        """What was seen of the board."""
+        fields: dict[str, Any] = {"camera": self.camera, "n": len(self.distances), "unit": self.unit}
+        fields |= {"near": _rounded(self.distances.min()), "far": _rounded(self.distances.max())}
+        fields |= {"flat": float(self.tilts.min()), "steep": float(self.tilts.max()), "corners": ""}
         if self.empty is not None:
-            reached = self.parts - len(self.empty)
-            nowhere = f", none in {listed(list(self.empty), NAMED)}" if self.empty else ""
-            said.append(f"corners in {reached} of {self.parts} parts of the picture{nowhere}")
-        return f"{self.camera}: {'; '.join(said)}"
+            parts = {"reached": self.parts - len(self.empty), "all": self.parts, "empty": list(self.empty)}
+            fields["corners"] = Phrase(f"part.corners{'.but' if self.empty else ''}", parts)
+        return Phrase("line.board", fields)
 
     @property
-    def next(self) -> list[str]:
-        """Views that are missing, in sentences."""
+    def next(self) -> list[Phrase]:
+        """Advice on views that are missing."""
         found = []
         if self.empty:
-            where = listed(list(self.empty), NAMED)
-            found.append(
-                f"Take pictures with {self.camera} that show the board here: {where}. Where no corner was,"
-                " the lens is not measured but continued."
-            )
+            found.append(Phrase("advice.board-parts", {"camera": self.camera, "parts": list(self.empty)}))
         if np.count_nonzero(self.tilts >= TILTED) < FEWEST:
-            found.append(
-                f"Tilt the board by 20 to 45 degrees before {self.camera}, about x and about y: seen from the"
-                " front it cannot tell the focal length from its distance."
-            )
+            found.append(Phrase("advice.tilt", {"camera": self.camera}))
         if self.distances.max() < FARTHER * self.distances.min():
-            found.append(
-                f"Show {self.camera} the board from nearer and from farther too: all views are from"
-                f" {_rounded(np.median(self.distances))} {self.unit}, and what is nearer or farther is not"
-                " tested."
-            )
+            distance = _rounded(np.median(self.distances))
+            fields = {"camera": self.camera, "distance": distance, "unit": self.unit}
+            found.append(Phrase("advice.distances", fields))
         return found
 
 
@@ -128,8 +116,7 @@ FREER = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
 @findings_of.register(UnknownWeight)
 def findings(result: UnknownWeight) -> Findings:
     """Return the tests of a block whose standard deviations of corners are ratios alone."""
-    untested = "nobody has said how well corners are measured: --sd images=0.3"
-    return replace(block_findings(result), untested=untested)
+    return replace(block_findings(result), untested=Phrase("untested.corners"))
 
 
 def judged(calibrated: Calibrated, worth: Worth | None = None) -> Calibrated:
@@ -157,15 +144,15 @@ def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
     return replace(
         found,
         systematic=[*found.systematic, *wrong],
-        remarks=[*(each.sentence for each in shown), *agreeing, *found.remarks],
-        weigh="--shape points",
-        calibrate="",
+        remarks=[*(each.line for each in shown), *agreeing, *found.remarks],
+        weigh=Phrase("how.board"),
+        calibrate=None,
         if_usable=[*unknown, *other, *missing],
         if_withheld=[*unknown, *other, *missing],
     )
 
 
-def _other_model(calibrated: Calibrated) -> list[str]:
+def _other_model(calibrated: Calibrated) -> list[Phrase]:
     """Return what to try where the model is too stiff: lenses with more freedom, and a board with more."""
     corners = calibrated.calibration.corners
     free, wide = 0, False
@@ -173,23 +160,17 @@ def _other_model(calibrated: Calibrated) -> list[str]:
         free = max(free, len(each.estimated) if each.camera.knots is None else FREER[KNOTTED])
         seen = corners.xy[corners.use & (corners.cameras[corners.picture] == number)]
         wide = wide or (bool(len(seen)) and from_axis(each.camera, seen) >= WIDEST)
-    lenses = [f"`{name}`" for name, count in FREER.items() if count > free and (name == KNOTTED or not wide)]
-    tried = []
-    if lenses:
-        named = " or ".join(filter(None, (", ".join(lenses[:-1]), lenses[-1])))
-        tried.append(f"a lens with more freedom, `--model {named[1:]}")
+    lenses = [name for name, count in FREER.items() if count > free and (name == KNOTTED or not wide)]
+    ways = [Phrase("part.free-lens", {"models": lenses})] if lenses else []
     if calibrated.calibration.shape != "points":
-        tried.append("a board whose points are unknowns, `--shape points`")
-    return [f"Try {', or '.join(tried)}: cross-validation says whether it is better."] if tried else []
+        ways.append(Phrase("part.free-board", {"how": Phrase("how.board")}))
+    return [Phrase("advice.try", {"ways": ways})] if ways else []
 
 
-def _deviation_asked(calibrated: Calibrated) -> str:
-    """Ask for the standard deviation of corners, and say which one their residuals have."""
+def _deviation_asked(calibrated: Calibrated) -> Phrase:
+    """Ask for the standard deviation of corners, and give that of their residuals."""
     sd = calibrated.calibration.assumed * deviation_of_corners(calibrated.result)
-    return (
-        f"Say how well corners are measured: their residuals are those of `--sd images={sd:.2g}`. Until then"
-        " what is known of the board is weighed against these, and nothing tests them."
-    )
+    return Phrase("advice.corner-sd", {"sd": float(sd)})
 
 
 def _systematic(cross: CrossValidation) -> Systematic:
@@ -197,7 +178,7 @@ def _systematic(cross: CrossValidation) -> Systematic:
     test = min((each[-1] for each in cross.tests), key=lambda each: each.probability)
     names = ", ".join(cross.cameras)
     return Systematic(
-        name=f"cross-validation of {names}",
+        kind=f"cross-validation of {names}",
         sentence=f"{names}: {cross.verdict}",
         statistic="chi2",
         distribution="chi2",

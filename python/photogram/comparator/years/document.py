@@ -13,6 +13,7 @@ from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity, Table, members, of_each
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.history import changed_of, unchanged_of
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.comparator.years import Comparison
@@ -83,22 +84,18 @@ def comparison_findings(comparison: Comparison) -> Findings:
         return f"{axis} of point {point} of case {case} of {record}"
 
     test = comparison.together.test
-    grid = "Give the next calibration the adjusted grid: `--grid grid-NUMBER.csv`."
+    wrong = test.problem() is not None
     return Findings(
         status="converged",
         observations=[Tested("readings of the grids", values, name, "w")],
         degrees_of_freedom=test.degrees_of_freedom,
         global_test=test,
-        spoiled="" if test.problem() is None else "readings do not agree with the grids and with each other",
+        spoiled=Phrase("harmful.grids") if wrong else "",
         changed=changed_of(comparison.histories),
         systematic=[own.systematic(whose) for whose, own in comparison.histories.items()],
         remarks=unchanged_of(comparison.histories),
-        if_usable=[grid],
-        if_withheld=[
-            "The grids are withheld: readings do not agree with them and with each other."
-            if test.problem()
-            else f"What changed is the comparator, not the grids. {grid}"
-        ],
+        if_usable=[Phrase("advice.adjusted-grid")],
+        if_withheld=[Phrase("advice.grids-withheld" if wrong else "advice.comparator-changed")],
     )
 
 

@@ -13,6 +13,7 @@ from photogram.show.page import Document, Fact
 from photogram.show.quantity import Axis, Quantity, Table
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.history import changed_of, unchanged_of
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.film.years import CameraComparison
@@ -54,13 +55,11 @@ def comparison_findings(comparison: CameraComparison) -> Findings:
         status="converged",
         observations=[Tested("values beside those of the others", values, lambda at: places[at[0]], "w")],
         degrees_of_freedom=sum(own.constancy.degrees_of_freedom for own in histories.values()),
-        untested="each camera has a test of constancy of its own",
+        untested=Phrase("untested.constancy"),
         changed=changed_of(histories),
         systematic=[own.systematic(whose) for whose, own in histories.items()],
         remarks=[*unchanged_of(histories), *comparison.remarks],
-        if_withheld=[
-            "Take each photo with the certificate of its time: what lies between must be found out."
-        ],
+        if_withheld=[Phrase("advice.certificate-of-time")],
     )
 
 

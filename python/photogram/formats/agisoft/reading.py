@@ -21,6 +21,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
 from photogram.network.observations import Control, Observation, Position
+from photogram.words import Phrase, option_sd
 
 LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6
@@ -79,7 +80,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         image_xy=xy,
         observations=[*full, *observations],
         frame=frame,
-        lacks=["no tie points: export BlocksExchange for these", *lacks],
+        lacks=[Phrase("read.ties"), *lacks],
         messages=messages,
     )
 
@@ -301,7 +302,7 @@ def _enabled(element: Element) -> bool:
 
 def _gnss(
     positions: _Positions, shots: list[Element], names: list[str], default: Floats
-) -> tuple[list[Observation], list[str]]:
+) -> tuple[list[Observation], list[Phrase]]:
     given = {
         row: own
         for row, each in enumerate(shots)
@@ -309,7 +310,7 @@ def _gnss(
     }
     known = {row: own for row, own in given.items() if (own[1] > 0).all()}
     lost = len(given) - len(known)
-    lacks = [f"no standard deviations of {lost} references of cameras (--sd gnss=..)"] if lost else []
+    lacks = [Phrase("read.references", {"number": lost, "option": option_sd("gnss")})] if lost else []
     if not known:
         return [], lacks
     xyz, sd = map(np.array, zip(*known.values(), strict=True))

@@ -15,6 +15,7 @@ from photogram.formats.xml_stream import Element
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.observations import Control, Observation, Position
+from photogram.words import Phrase, option_sd
 
 LOCAL = "local"
 
@@ -52,7 +53,7 @@ class Systems:
         self, systems: Mapping[str, str], srs: str, photos: list[PhotoRecord], messages: list[Message]
     ) -> None:
         self.systems, self.main, self.messages = systems, srs, messages
-        self.lacks: list[str] = []
+        self.lacks: list[Phrase] = []
         definition = self.definition(srs or (photos[0].srs if photos else ""))
         self.frame = Frame()
         if definition != LOCAL:
@@ -152,8 +153,7 @@ class Systems:
         if not rows:
             return []
         if "gnss" not in wishes.sd:
-            text = f"no standard deviations of {len(rows)} GNSS positions, which are left out (--sd gnss=..)"
-            self.lacks.append(text)
+            self.lacks.append(Phrase("read.gnss", {"number": len(rows), "option": option_sd("gnss")}))
             return []
         sd = np.broadcast_to(wishes.sd["gnss"], 3)
         found: list[Observation] = []

@@ -22,6 +22,7 @@ from photogram.io.places import Place, at_place
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera as HouseCamera
 from photogram.network.unknowns import Sensor
+from photogram.words import Phrase
 
 TITLE = "COLMAP model"
 LONGEST, SHORT = 1e-2, 1e-6
@@ -84,9 +85,7 @@ def _project(model: Model, path: Path) -> Project:
         image_points=points,
         image_xy=images.xy[rows],
         mounts=mounts,
-        lacks=["no control, scale or position on the earth: a free network (--control FILE)"]
-        if len(rows)
-        else [],
+        lacks=[Phrase("read.placeless", {"option": Phrase("option.control")})] if len(rows) else [],
         messages=messages,
         details={
             "image numbers": dict(zip(images.names, images.numbers.tolist(), strict=True)),

@@ -22,6 +22,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
+from photogram.words import Phrase, option_sd
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ class Content:
     held: set[int] = field(default_factory=set)
     free: set[str] = field(default_factory=set)
     options: Options = field(default_factory=Options)
-    lacks: list[str] = field(default_factory=list)
+    lacks: list[Phrase] = field(default_factory=list)
     messages: list[Message] = field(default_factory=list)
 
 
@@ -149,7 +150,7 @@ def project_of(content: Content, wishes: Wishes) -> Project:
     lacks = list(content.lacks)
     if (missing := np.isnan(image_sd)).any():
         image_sd = np.where(missing, pixel, image_sd)
-        lacks.append("no standard deviations of image coordinates: 1 pixel is assumed (--sd images=..)")
+        lacks.append(Phrase("read.images", {"number": 1.0, "unit": "pixel", "option": option_sd("images")}))
     held = np.where([number in content.held for number in order], 0.0, np.inf)[:, np.newaxis] * np.ones(3)
     free = dict.fromkeys(content.free, np.inf)
     return assembled(

@@ -22,6 +22,7 @@ from photogram.io.files import read_beginning, read_lines
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
+from photogram.words import Phrase, option_sd
 
 TITLE = "PhotoModeler export"
 _HEAD = (2, 9, 10, 10)
@@ -178,10 +179,8 @@ def _control(lines: _Lines, content: Content, wishes: Wishes) -> None:
         else:
             content.control[number] = position, np.where(sd < 0, np.inf, sd)
     if content.checks:
-        content.lacks.append(
-            f"standard deviations of {len(content.checks)} control points are negative, not computed: the"
-            " points are only compared (--sd control=..)"
-        )
+        fields = {"number": len(content.checks), "option": option_sd("control")}
+        content.lacks.append(Phrase("read.negative", fields))
     if content.control:
         content.messages.append(
             Message(

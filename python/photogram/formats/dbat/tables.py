@@ -13,6 +13,7 @@ from photogram.formats.dbat.content import Content
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import NAMELESS, read_columns, read_rows
 from photogram.io.numbers import whole_number
+from photogram.words import Phrase, option_sd
 
 _KNOWN = {
     "image": "im",
@@ -117,9 +118,8 @@ def take_points(
     if sd is not None:
         deviations = np.broadcast_to(sd, deviations.shape)
     elif np.isnan(deviations).all() and not check:
-        content.lacks.append(
-            f"{table.path.name} has no standard deviations: control is held (--sd control=..)"
-        )
+        fields = {"file": table.path.name, "option": option_sd("control")}
+        content.lacks.append(Phrase("read.held", fields))
     for row, number in enumerate(numbers):
         if wanted(number):
             if check:

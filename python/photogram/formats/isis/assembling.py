@@ -26,6 +26,7 @@ from photogram.messages import Message, counted, listed
 from photogram.network.geometry import Cartesian, Spheroid
 from photogram.network.motion import about
 from photogram.network.moving_photos import Timed
+from photogram.words import Phrase, option_sd
 
 
 def read(path: Path, wishes: Wishes) -> Project:
@@ -178,7 +179,7 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
         observations=known.controls,
         timed=timed,
         spheroid=spheroid,
-        lacks=[f"no standard deviations of image coordinates: {PITCHES:g} px is assumed (--sd images=...)"],
+        lacks=[Phrase("read.images", {"number": PITCHES, "unit": "px", "option": option_sd("images")})],
         messages=[*messages, *known.messages, *map(Message, said)],
         details={DETAILS: contents, "further inputs": [each.path for each in contents.different]},
     )

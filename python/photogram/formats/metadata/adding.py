@@ -24,6 +24,7 @@ from photogram.messages import Message, counted, listed
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 from photogram.network.unknowns import LeverArm, Shift
+from photogram.words import Phrase, option_sd
 
 SIMILAR = 10.0
 """How much better a model must fit positions in its own frame after a similarity to be carried onto them."""
@@ -101,7 +102,7 @@ def _with_positions(
         messages += _told(metadata, known, antenna)
     lacks = list(project.lacks)
     if lacking:
-        lacks.append(f"no standard deviations of {counted(lacking, 'position')} of photos (--sd gnss=...)")
+        lacks.append(Phrase("read.positions", {"n": lacking, "option": option_sd("gnss")}))
     inputs = tuple(project.details.get("further inputs", ())) + metadata.tables
     pictures = tuple(project.details.get("photo pictures", ())) + metadata.pictures
     read = {"further inputs": inputs, "photo pictures": pictures}

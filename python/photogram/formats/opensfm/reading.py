@@ -19,6 +19,7 @@ from photogram.io.places import Place, at_place
 from photogram.messages import Message, quoted
 from photogram.network.cameras import Camera
 from photogram.network.observations import Observation, Position
+from photogram.words import Phrase
 
 TITLE = "OpenSfM reconstruction"
 MODEL, TRACKS = "reconstruction.json", "tracks.csv"
@@ -80,7 +81,7 @@ def read(path: Path, wishes: Wishes) -> Project:
         image_xy=middles + scales[:, np.newaxis] * xy,
         observations=_gps(shots, wishes, messages),
         frame=_frame(model),
-        lacks=[] if there else [f"no {TRACKS} beside it: no image measurements (--images)"],
+        lacks=[] if there else [Phrase("read.tracks", {"file": TRACKS, "option": Phrase("option.images")})],
         messages=[*messages, *_beside(folder)],
         details={"colours": colours},
     ).replace(tracks=frozenset(points))

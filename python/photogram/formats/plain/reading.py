@@ -55,9 +55,8 @@ from photogram.network.observations import Control, Observation, of_records
 from photogram.network.rigs import Mount
 from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
+from photogram.words import Phrase, option_sd
 
-LEVELS = "no standard deviation of an image of level 0: 1 px is assumed (--sd images=...)"
-"""What is told of images whose table has levels alone."""
 DIFFER = 1e-6
 """What the positions of a point in two tables may differ by."""
 _USES = ("control", "check", "off")
@@ -129,7 +128,9 @@ def read_tables(tables: Tables, wishes: Wishes) -> Project:
     project = assembled(
         path=settings.path,
         title="plain project",
-        lacks=[LEVELS] if assumed and sd is not None else [],
+        lacks=[Phrase("read.levels", {"number": 1.0, "option": option_sd("images")})]
+        if assumed and sd is not None
+        else [],
         name=settings.name,
         cameras=cameras.cameras,
         sizes=cameras.sizes,

@@ -30,6 +30,7 @@ from photogram.targets.output.rig import Rig
 from photogram.targets.reading import read
 from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
+from photogram.words import Phrase, option_sd
 
 MIDDLE = 0.5
 """Of the first pixel, from the upper-left corner: projects count from there."""
@@ -51,7 +52,7 @@ def project_of(calibration: Start, path: Path | None = None) -> Project:
     cameras = [shifted(each) for each in middle.cameras]
     block, lacks = middle.replace(cameras=cameras, image_xy=middle.image_xy + MIDDLE), []
     if calibration.sd0 is None:
-        lacks.append("no standard deviations of corners: 1 px is assumed (--sd images=...)")
+        lacks.append(Phrase("read.corners", {"number": 1.0, "option": option_sd("images")}))
     return Project(
         block=block,
         path=path or Path("corners"),

@@ -13,7 +13,7 @@ from photogram.plots.accessor import sketch_of
 from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
-from photogram.results.observation_rows import tested_singly
+from photogram.results.observation_rows import IMAGE_COORDINATES, tested_singly
 from photogram.results.page.tables import photos_section, points_section
 from photogram.results.report import ORDERINGS, problems_of
 from photogram.show.cells import page_table, unit_written
@@ -261,8 +261,8 @@ def _worst_table(result: AdjustedNetwork, worst: Sequence[Worst]) -> Table:
         residuals, sd, redundancy, axes = numbers[tested.kind]
         axis = axes[place[1]]
         beyond = limit is not None and size > limit
-        names: list[Cell | str | None] = [tested.name(place), None, None]
-        if tested.kind == "image coordinates":
+        names: list[Cell | str | None] = [str(tested.name(place)), None, None]
+        if tested.kind == IMAGE_COORDINATES:
             photo, point = result.given.image_photos[place[0]], result.image_points[place[0]]
             names = [
                 f"image {axis.name}",

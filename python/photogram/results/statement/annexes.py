@@ -33,6 +33,7 @@ from photogram.show.page import (
     Table,
     decimals_of,
 )
+from photogram.statistics.evidence import Test
 
 SOURCES = 12
 """Sources of a budget at a finer level than kinds that the page lists, those that contribute most."""
@@ -126,7 +127,7 @@ def budgets_annex(found: Statement) -> Section:
 def _budget(found: Statement, own: Budget) -> list[Table]:
     texts, cells = found.texts, Written(found.texts)
     single = Table.of(
-        texts("table.single", quantity=translation.quantity(texts, own.quantity)),
+        texts("table.single", quantity=own.subject),
         own.largest,
         [
             (
@@ -154,8 +155,7 @@ def _sources(found: Statement, own: Budget) -> Table:
     def named(each: Source) -> str:
         if each.level == "kind":
             return translation.kind(texts, each.name)
-        of = translation.parameter(texts, each.name) if each.level == "parameter" else each.name
-        return f"– {texts(f'level.{each.level}', name=of)}"
+        return f"– {texts(f'level.{each.level}', name=each.subject)}"
 
     def freedom(each: Source) -> float:
         return estimated.get(each.name, math.inf)
@@ -258,7 +258,7 @@ def adjustment_annex(found: Statement) -> Section:
     if found.removed:
         parts.append(_removed(found))
     parts += [*_markers(found), _overlap(found)]
-    intro = translation.verdict(texts, result.verdict)
+    intro = texts.text(result.verdict.message)
     return Section("annex-e", texts("annex.e"), parts, intro, annex=True)
 
 
@@ -269,7 +269,7 @@ def _removed(found: Statement) -> Table:
         texts("table.removed"),
         found.removed[:LISTED],
         [
-            (cells.column("observation", text=True), lambda each: translation.named(texts, each.name)),
+            (cells.column("observation", text=True), lambda each: texts.text(each.subject)),
             (cells.column("reason", text=True), lambda each: texts(f"removed.{each.reason}")),
         ],
         texts("table.removed.note", shown=LISTED, all=count) if count > LISTED else "",
@@ -283,7 +283,7 @@ def _tests(found: Statement) -> Table:
         texts("table.tests"),
         found.result.verdict.tests,
         [
-            (cells.column("test", text=True), lambda each: translation.test(texts, each.name)),
+            (cells.column("test", text=True), lambda each: _test(found, each)),
             (cells.column("statistic", text=True), lambda each: signs_of(each.statistic)),
             (cells.column("value"), lambda each: cells.figures(each.value, 4)),
             (cells.column("low"), lambda each: cells.figures(each.limits[0], 4)),
@@ -300,6 +300,11 @@ def _tests(found: Statement) -> Table:
         ],
         texts("table.tests.note"),
     )
+
+
+def _test(found: Statement, test: Test) -> str:
+    kind, subject = (found.texts.text(each) for each in (test.kind, test.subject))
+    return f"{kind[:1].upper()}{kind[1:]}{f': {subject}' if subject else ''}"
 
 
 def _overlap(found: Statement) -> Drawing:

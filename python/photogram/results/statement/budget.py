@@ -23,12 +23,12 @@ from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, grouped
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, KINDS, OBSERVATION, POSITION
 from photogram.results.result import Result
-from photogram.results.statement import translation
-from photogram.results.statement.quantities import Wanted
+from photogram.results.statement.quantities import Wanted, component_of
 from photogram.results.statement.texts import Texts
 from photogram.results.suspects import block_suspects, observations_of_core
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
+from photogram.words import Phrase
 
 LARGEST = 5
 """Single observations that are listed."""
@@ -44,8 +44,8 @@ class Source:
     ----------
     level
         `kind`, `strip`, `camera`, `photo`, `point` or `parameter`.
-    name
-        What it is called.
+    subject
+        Its name; of parameters as a message.
     number
         How many rows.
     contribution, share
@@ -53,10 +53,15 @@ class Source:
     """
 
     level: str
-    name: str
+    subject: Phrase | str
     number: int
     contribution: float
     share: float
+
+    @property
+    def name(self) -> str:
+        """Its name in English."""
+        return str(self.subject)
 
     @property
     def u(self) -> float:
@@ -119,8 +124,8 @@ class Budget:
 
     Attributes
     ----------
-    quantity, unit
-        As asked for, and the unit of its value.
+    quantity, subject, unit
+        As asked for, the same as a message, and the unit of its value.
     value, sd
         The adjusted value and its standard deviation u.
     cofactor
@@ -138,6 +143,7 @@ class Budget:
     """
 
     quantity: str
+    subject: Phrase
     unit: str
     value: float
     sd: float
@@ -210,6 +216,7 @@ def _budget(
     freedom = freedoms.of(squares, variance)
     return Budget(
         quantity=wanted.name,
+        subject=wanted.subject,
         unit=wanted.unit,
         value=value,
         sd=math.sqrt(variance),
@@ -230,8 +237,7 @@ def budget_line(texts: Texts, found: Budget) -> str:
     numbers = (texts.number(each * factor, decimals) for each in (found.value, found.sd, found.expanded))
     value, u, expanded = (f"{each} {unit}".rstrip() for each in numbers)
     k, p = texts.number(found.k, 2), texts.percent(found.coverage)
-    named = translation.quantity(texts, found.quantity)
-    return texts("budget.line", quantity=named, value=value, u=u, expanded=expanded, k=k, p=p)
+    return texts("budget.line", quantity=found.subject, value=value, u=u, expanded=expanded, k=k, p=p)
 
 
 class _Freedoms:
@@ -317,7 +323,7 @@ class Rows:
             number[own] = each[self.suspects.subjects[own]]
         return list(found), number
 
-    def sources(self, squares: Floats) -> Iterable[tuple[str, str, int, float]]:
+    def sources(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
         """Return level, name, number of rows and contribution of every source, of (M,) squares."""
         sums, sizes = np.add.reduceat(squares, self._starts[:-1]), self._sizes
         yield from _sums("kind", self._kinds, self._of_kind, sums, sizes)
@@ -332,14 +338,16 @@ class Rows:
         yield from _sums("point", self.block.point_ids, points, sums[control], sizes[control])
         yield from self._parameters(squares)
 
-    def _parameters(self, squares: Floats) -> Iterable[tuple[str, str, int, float]]:
+    def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
         """Return weighted parameters of cameras and components of common unknowns."""
         several = len(self.block.camera_names) > 1
         for group in np.flatnonzero(self.suspects.kinds > OBSERVATION).tolist():
             for row in self.suspects.rows(group).tolist():
                 kind, *of, component = self.named(row)
-                name = component if kind == "camera" and not several else " ".join([*of, component])
-                yield "parameter", name, 1, float(squares[row])
+                axis = Phrase(f"axis.{component}")
+                alone = kind == "camera" and not several
+                own = axis if alone else component_of(" ".join(of), axis)
+                yield "parameter", own, 1, float(squares[row])
 
     def named(self, row: int) -> tuple[str, ...]:
         """Return the kind of a row, of what it is, and its component."""
@@ -394,7 +402,7 @@ def kind_of(label: str) -> str:
 
 def _sums(
     level: str, names: Sequence[str], of: Indices, sums: Floats, sizes: Indices, most: int | None = None
-) -> Iterable[tuple[str, str, int, float]]:
+) -> Iterable[tuple[str, Phrase | str, int, float]]:
     """Return the sums over groups that have rows, in their order; or the largest, and all others as one."""
     if of.min(initial=0) < 0:
         inside = of >= 0

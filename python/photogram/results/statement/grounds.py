@@ -18,6 +18,7 @@ from photogram.results.statement.leave_one_out import LeftOut
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import Standards
 from photogram.results.statement.texts import Texts
+from photogram.words import Phrase
 
 Said = list[tuple[str, str]]
 """Keys of the table of words, and texts."""
@@ -29,20 +30,25 @@ class RemovedObservation:
 
     Attributes
     ----------
-    name
-        Its name, such as `image of point C04 on photo 301`.
+    subject
+        Its name as a message, such as `image of point C04 on photo 301`.
     reason
         `snooping`: data snooping removed it. `first values`: it does not fit the initial values. `earlier`:
         it was removed before.
     """
 
-    name: str
+    subject: Phrase | str
     reason: str
 
+    @property
+    def name(self) -> str:
+        """Its name in English."""
+        return str(self.subject)
 
-def removed_observations(result: Result, earlier: Sequence[str]) -> tuple[RemovedObservation, ...]:
+
+def removed_observations(result: Result, earlier: Sequence[Phrase | str]) -> tuple[RemovedObservation, ...]:
     """Return all observations that were removed, with those that the caller has removed `earlier`."""
-    snooped = () if result.snooped is None else [str(each["name"]) for each in result.snooped.removed]
+    snooped = () if result.snooped is None else [each["subject"] for each in result.snooped.removed]
     of_reason = {"snooping": snooped, "first values": result.set_aside, "earlier": earlier}
     return tuple(RemovedObservation(name, reason) for reason, names in of_reason.items() for name in names)
 
@@ -86,11 +92,11 @@ class Grounds:
     removed: tuple[RemovedObservation, ...]
 
 
-def assumptions(found: Grounds, assumed: Sequence[str]) -> Said:
-    """Return what was assumed: as files were read, in sentences, and of a block without what was removed."""
+def assumptions(found: Grounds, assumed: Sequence[Phrase | str]) -> Said:
+    """Return what was assumed: as files were read, and of a block without what was removed."""
     asked, texts, layout, lengths = found.asked, found.texts, found.layout, found.standards.lengths
     said = [*_weights(found)]
-    said += [texts.said("assume.read", said=translation.read(texts, each)) for each in assumed]
+    said += [texts.said("assume.read", said=each) for each in assumed]
     said += [*_adjustment(found)]
     if len(found.compared):
         said += _survey(found)

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.statement import translation
 from photogram.results.statement.asprs import wording
 from photogram.results.statement.budget import budget_line
 from photogram.results.statement.comparison import Compared
@@ -21,6 +20,7 @@ from photogram.results.statement.standards import Asprs, Lengths, Standards
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.statistics.distributions import critical_normal
+from photogram.words import Phrase
 
 NOT_USABLE = 4
 """Exit code of a statement that must not be handed over as it is."""
@@ -84,7 +84,7 @@ class _Against:
         return self.warning or self.low or bool(self.control) or self.lengths
 
 
-def judged(found: Grounds, *, assumed: Sequence[str] = (), strict: bool = False) -> Judged:
+def judged(found: Grounds, *, assumed: Sequence[Phrase | str] = (), strict: bool = False) -> Judged:
     """Return what the statement says of all that was found."""
     texts, of_all, standards = found.texts, found.of_all, found.standards
     against = _against(found)
@@ -96,7 +96,7 @@ def judged(found: Grounds, *, assumed: Sequence[str] = (), strict: bool = False)
         for each in against.control[:NAMED]
     ]
     named = texts.listed([each.point for each in against.control], NAMED)
-    n, verdict = 0 if of_all is None else of_all.n, translation.verdict(texts, found.result.verdict)
+    n, verdict = 0 if of_all is None else of_all.n, texts.text(found.result.verdict.message)
     return Judged(
         exit=NOT_USABLE if bad else 0,
         tone="bad" if bad else "look" if remarks or doubtful else "good",

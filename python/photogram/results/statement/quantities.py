@@ -17,6 +17,7 @@ from photogram.network.rays import local_axes
 from photogram.results.cameras import units
 from photogram.results.result import Result, adjusted
 from photogram.results.selection import Item
+from photogram.words import Phrase
 
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
 """What coordinates may be called, beside the names that they have in the block."""
@@ -33,6 +34,7 @@ class Wanted:
     """A quantity f(x)."""
 
     name: str  # As it was asked for: `point C08 z`
+    subject: Phrase  # The same as a message
     items: tuple[Item, ...]  # What it is a function of: see :class:`photogram.results.Covariances`
     function: Callable[..., Any]  # Takes an array for each item; complex ones too
     unit: str  # Of its value; empty for plain numbers
@@ -69,7 +71,13 @@ def wanted(result: Result, asked: Any) -> Wanted:
             raise InputError(f"{kind} {name} has no {component!r}: it has {', '.join(names)}")
         own = names.index(component) if component in names else lower.index(component.lower())
     _check(result, kind, [name])
-    return Wanted(asked, ((kind, name),), lambda x: x[own], _unit(result, kind, name, own))
+    subject = Phrase(f"quantity.{kind}", {"of": component_of(name, Phrase(f"axis.{component}"))})
+    return Wanted(asked, subject, ((kind, name),), lambda x: x[own], _unit(result, kind, name, own))
+
+
+def component_of(name: str, axis: Phrase) -> Phrase:
+    """Return the name of a component of a point, photo, camera or unknown."""
+    return Phrase("named.component", {"name": name, "axis": axis})
 
 
 def chosen(result: Result, checks: Sequence[str]) -> list[Wanted]:
@@ -139,7 +147,8 @@ def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
         return (((x - y) ** 2).sum()) ** 0.5
 
     items = tuple(("point", each) for each in ends)
-    return Wanted(name, items, between, result.block.linear_unit)
+    subject = Phrase("quantity.distance", {"of": " ".join(ends)})
+    return Wanted(name, subject, items, between, result.block.linear_unit)
 
 
 def _geocentric(x: Any, a: float, b: float) -> Any:
@@ -167,8 +176,11 @@ def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
         parts.append(values)
     if not items:
         raise InputError("a gradient of nothing is no quantity")
-    name = "linear function of " + ", ".join(f"{kind} {own}" for kind, own in items)
-    return Wanted(name, tuple(items), lambda *x: sum(g @ v for g, v in zip(parts, x, strict=True)), "")
+    parts_of = [Phrase(f"quantity.{kind}", {"of": own}) for kind, own in items]
+    subject = Phrase("quantity.linear", {"quantities": parts_of})
+    return Wanted(
+        str(subject), subject, tuple(items), lambda *x: sum(g @ v for g, v in zip(parts, x, strict=True)), ""
+    )
 
 
 def _check(result: Result, kind: str, names: Sequence[str]) -> None:

@@ -13,7 +13,6 @@ from photogram.arguments.annotations import check_arguments
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import nearest
-from photogram.network.block import Block
 from photogram.results.result import Result
 from photogram.results.statement.budget import budgets
 from photogram.results.statement.comparison import Compared, compared, control_places
@@ -31,6 +30,7 @@ from photogram.results.statement.texts import Texts
 from photogram.show.methods import document_of, page_of, statement_of
 from photogram.show.run import InputFile
 from photogram.show.summary import Brief, Rows
+from photogram.words import Phrase
 
 __all__ = ["Statement", "statement"]
 
@@ -178,8 +178,8 @@ def statement(
     result: Result,
     *,
     strict: bool = False,
-    assumed: Sequence[str] = (),
-    removed: Sequence[str] = (),
+    assumed: Sequence[Phrase | str] = (),
+    removed: Sequence[Phrase | str] = (),
     system: System | None = None,
     inputs: Sequence[InputFile] = (),
     command: str = "",
@@ -228,7 +228,7 @@ def statement(
         raise AdjustmentError(
             "there is no statement without covariances: adjust with covariance=True, not in parts"
         )
-    texts = Texts(options.language, options.text, result.block.linear_unit, _names(result.block))
+    texts = Texts(options.language, options.text, result.block.linear_unit)
     covariances = result.covariances()
     found = compared(result, options, covariances)
     rest = found.without(list(options.without)) if options.without else None
@@ -264,16 +264,6 @@ def statement(
         inputs=tuple(inputs),
         command=command,
     )
-
-
-def _names(block: Block) -> dict[str, set[str]]:
-    """Return the names of a block by the fields of sentences that contain them."""
-    return {
-        "point": set(block.point_ids),
-        "photo": set(block.photo_ids),
-        "camera": {*block.camera_names, "the camera"},
-        "unknown": {each.name for each in block.unknowns},
-    }
 
 
 def _layout(result: Result, found: Compared) -> Layout | None:

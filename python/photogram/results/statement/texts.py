@@ -1,78 +1,33 @@
-"""The words of a statement: a table of sentences for each language, and a firm's own in their place."""
+"""The words of a statement: sentences and numbers in a language, and a firm's own sentences."""
 
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from datetime import date
-from functools import cache
-from importlib.resources import files
 from string import Formatter
 from typing import Any
 
 from photogram.errors import InputError
-from photogram.messages import MOST_NAMES, nearest
+from photogram.messages import nearest
 from photogram.show.page import fixed, probability_written
+from photogram.words import Phrase, Words, table_of
 
 LANGUAGES = ("en", "de")
 NOTHING = "–"
 """What stands for a number that there is not."""
 
 
-@cache
-def table_of(language: str) -> Mapping[str, str]:
-    """Return the table of a language: sentences, and words of other modules, by key."""
-    found: dict[str, str] = {}
-    for name in (f"{language}.toml", f"{language}.words.toml"):
-        source = files("photogram.results.statement").joinpath("text", name)
-        found |= tomllib.loads(source.read_text(encoding="utf-8"))
-    return found
-
-
 def fields_of(sentence: str) -> set[str]:
-    """Return the names of the fields of a sentence; refuse braces with more than a name, or not closed."""
+    """Return the names of the fields of a sentence; refuse braces that are not closed."""
     try:
         parts = list(Formatter().parse(sentence))
     except ValueError as error:
         raise InputError(f"{sentence!r}: {error}") from None
-    if any(form or conversion for _, name, form, conversion in parts if name is not None):
-        raise InputError(f"{sentence!r}: a field is a name in braces, such as {{n}}")
     return {name for _, name, _, _ in parts if name is not None}
 
 
-_Parts = Sequence[tuple[str, str | None]]
-
-
-@cache
-def _patterns(family: str) -> list[tuple[str, _Parts]]:
-    """Return the English sentences of a family by key, as texts with fields, in the order of the table."""
-    return [
-        (key, [(text, name) for text, name, *_ in Formatter().parse(sentence)])
-        for key, sentence in table_of("en").items()
-        if key.startswith(f"{family}.")
-    ]
-
-
-def _ways(parts: _Parts, said: str) -> Iterator[dict[str, str]]:
-    """Yield the fields of a sentence for every division of a text, those with a long first field first."""
-    if not parts:
-        if not said:
-            yield {}
-        return
-    (text, name), rest = parts[0], parts[1:]
-    if not said.startswith(text):
-        return
-    said = said[len(text) :]
-    if name is None:
-        yield from _ways(rest, said)
-        return
-    for end in range(len(said), 0, -1):
-        for fields in _ways(rest, said[end:]):
-            yield {name: said[:end], **fields}
-
-
-class Texts:
+class Texts(Words):
     """Sentences in a language, with numbers as the language writes them.
 
     Parameters
@@ -83,9 +38,6 @@ class Texts:
         Sentences by key that stand for those of the language.
     unit
         The linear unit of the block.
-    names
-        Names of points, photos, cameras and unknowns by the field that contains them: texts of other modules
-        are divided at these names only. A field without names contains any text.
 
     Raises
     ------
@@ -98,11 +50,10 @@ class Texts:
         language: str = "en",
         own: Mapping[str, str] | None = None,
         unit: str = "m",
-        names: Mapping[str, Collection[str]] | None = None,
     ) -> None:
         if language not in LANGUAGES:
             raise InputError(f"there is no language {language!r}: {', '.join(LANGUAGES)}")
-        self.language, self.unit, self._names = language, unit, names or {}
+        self.language, self.unit = language, unit
         english = table_of("en")
         for key, sentence in (own or {}).items():
             if key not in english:
@@ -111,37 +62,20 @@ class Texts:
                 raise InputError(f"{key} is no sentence: {sentence!r}")
             if strange := fields_of(sentence) - fields_of(english[key]):
                 raise InputError(f"{key} has no field {sorted(strange)[0]!r}")
-        local = table_of(language)
-        self.missing = sorted(set(english) - set(local))
+            if any(form or conversion for *_, form, conversion in Formatter().parse(sentence)):
+                raise InputError(f"{sentence!r}: a field is a name in braces, such as {{n}}")
+        super().__init__(language, own)
+        self.missing = sorted(set(english) - set(table_of(language)))
         """Keys that are said in English for want of a sentence in the language."""
-        self._table, self._own = {**english, **local, **(own or {})}, own or {}
-
-    def __call__(self, key: str, **values: Any) -> str:
-        """Return a sentence with its fields, in the singular where one of them is a count of one."""
-        sentence = self._table[self._form(key, values)]
-        return sentence.format(**{name: self._field(value) for name, value in values.items()})
 
     def said(self, key: str, **values: Any) -> tuple[str, str]:
         """Return a key with its sentence."""
         return key, self(key, **values)
 
-    def _form(self, key: str, values: Mapping[str, Any]) -> str:
-        """Return the key of the sentence in the form that its counts take."""
-        ones = [name for name, value in values.items() if isinstance(value, int) and value == 1]
-        # One of what a sentence counts first leaves no other count in it.
-        for name in sorted(ones, key=lambda name: name != "n"):
-            form = f"{key}.one" if name == "n" else f"{key}.one.{name}"
-            # A firm that has put a sentence of its own means it for every count.
-            if form in self._own or (form in self._table and key not in self._own):
-                return form
-        return key
-
-    def _field(self, value: Any) -> str:
-        if isinstance(value, str):
-            return value
-        if isinstance(value, int):
-            return self.number(float(value), 0)
-        return self.significant(value)
+    def _number(self, value: float, form: str) -> str:
+        if form:
+            return self.numeral(format(value, form))
+        return self.number(float(value), 0) if isinstance(value, int) else self.significant(value)
 
     def number(self, value: float, decimals: int) -> str:
         """Return a number with so many decimals."""
@@ -201,34 +135,6 @@ class Texts:
             return given
         return self._table["date"].format(year=day.year, month=f"{day.month:02}", day=f"{day.day:02}")
 
-    def has(self, key: str) -> bool:
-        """Return whether there is a sentence."""
-        return key in self._table
-
     def word(self, family: str, name: str) -> str:
         """Return what a word of another module is called in the language; one without a key as it is."""
-        key = f"{family}.{name}"
-        return self(key) if key in self._table else name
-
-    def listed(self, names: Sequence[str], most: int = MOST_NAMES) -> str:
-        """Name all of a few, and some of many."""
-        shown = ", ".join(names[:most])
-        return shown if len(names) <= most else self("word.more", names=shown, count=len(names) - most)
-
-    def is_name(self, text: str) -> bool:
-        """Return whether a text is the name of a point, photo, camera or unknown."""
-        return any(text in names for names in self._names.values())
-
-    def recognised(
-        self, family: str, said: str, accepts: Callable[[Mapping[str, str]], bool] = bool
-    ) -> tuple[str, dict[str, str]] | None:
-        """Return the key of a family whose English sentence this is, and its fields; None without one.
-
-        `accepts` judges fields; names are those of the block.
-        """
-        for key, parts in _patterns(family):
-            for fields in _ways(parts, said):
-                known = (value in self._names.get(name, (value,)) for name, value in fields.items())
-                if all(known) and (not fields or accepts(fields)):
-                    return key, fields
-        return None
+        return self.text(Phrase(f"{family}.{name}"))

@@ -1,13 +1,8 @@
-"""Words of other modules in the language of a statement, by the same table as its sentences.
-
-Kinds, axes and codes have a key each. What other modules hand over as English text (tests, observations, what
-was assumed of files) is known again by the English sentence of a key, whose fields then stand in the sentence
-of the language; what none fits stays as it is.
-"""
+"""Kinds, components, datum, frame, refraction, fixed values and features in the language of a statement."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,16 +12,9 @@ from photogram.results.datum import ResultDatum
 from photogram.results.features import Feature
 from photogram.results.result import Result
 from photogram.results.statement.texts import Texts
-from photogram.statistics.verdict import Verdict
 
 SHOWN, LISTED = 4, 20
 """Points of a feature, and things that are held, that are told by name."""
-PLAIN = ("check points", "pattern by photo")
-"""Tests that are named by a point or photo alone."""
-LETTERS = ("x", "y", "z", "X", "Y", "Z", "omega", "phi", "kappa")
-"""Components that are called alike in all languages."""
-LINEAR = "linear function of "
-"""Before the parts of a quantity that is given by its gradient."""
 
 
 def kind(texts: Texts, name: str) -> str:
@@ -48,64 +36,6 @@ def observation(texts: Texts, of: Sequence[str]) -> str:
     """Return what a single observation is called: its kind, of what it is, its component."""
     one, *what, component = of
     return " ".join([_one(texts, one), *what, axis(texts, component)])
-
-
-def parameter(texts: Texts, name: str) -> str:
-    """Return what a weighted parameter is called: of what it is, if that has a name, and its component."""
-    if texts.has(f"axis.{name}"):
-        return axis(texts, name)
-    words = name.split(" ")
-    # `rotation x` precedes `x`, unless only the latter leaves a name of the block.
-    ways = [(" ".join(words[:cut]), " ".join(words[cut:])) for cut in range(1, len(words))]
-    for of, component in sorted(ways, key=lambda way: not texts.is_name(way[0])):
-        if component in LETTERS or texts.has(f"axis.{component}"):
-            return f"{of} {axis(texts, component)}"
-    return name
-
-
-def quantity(texts: Texts, name: str) -> str:
-    """Return what a quantity is called whose uncertainty is taken apart: `point C08 z`."""
-    if name.startswith(LINEAR):
-        parts = name.removeprefix(LINEAR).split(", ")
-        return texts("quantity.linear", quantities=", ".join(quantity(texts, each) for each in parts))
-    what, _, of = name.partition(" ")
-    key = f"quantity.{what}"
-    if not texts.has(key):
-        return name
-    return texts(key, of=of if what == "distance" else parameter(texts, of))
-
-
-def test(texts: Texts, name: str) -> str:
-    """Return what a test of a verdict is called."""
-    parts = name.split(": ")
-    ways = [(": ".join(parts[:cut]), ": ".join(parts[cut:])) for cut in range(1, len(parts) + 1)]
-    head, rest = next((way for way in ways if _recognised(texts, "test", way[0])), ways[0])
-    own = rest if head in PLAIN else named(texts, rest)
-    said = _turned(texts, "test", head) + (f": {own}" if own else "")
-    return f"{said[:1].upper()}{said[1:]}"
-
-
-def named(texts: Texts, said: str) -> str:
-    """Return what other modules call an observation, or what else a test is of."""
-    if _recognised(texts, "named", said):
-        return _turned(texts, "named", said)
-    words = said.split(" ")
-    for cut in range(len(words) - 1, 0, -1):
-        one = " ".join(words[:cut])
-        if texts.has(f"one.{one}"):
-            return " ".join([texts(f"one.{one}"), *words[cut:]])
-    return said
-
-
-def read(texts: Texts, said: str) -> str:
-    """Return what was assumed when files were read."""
-    return _turned(texts, "read", said)
-
-
-def verdict(texts: Texts, found: Verdict) -> str:
-    """Return the verdict of the adjustment: in English its own sentence, else what its code means."""
-    key = f"verdict.{found.code}"
-    return texts(key, said=found.headline) if texts.has(key) else found.headline
 
 
 def datum(texts: Texts, found: ResultDatum) -> str:
@@ -179,36 +109,3 @@ def feature(texts: Texts, found: Feature) -> str:
 def _one(texts: Texts, name: str) -> str:
     """Return what one of a kind of observations is called."""
     return ", ".join(texts.word("one", each) for each in name.split(", "))
-
-
-def _recognised(texts: Texts, family: str, said: str) -> tuple[str, dict[str, str]] | None:
-    """Return key and fields of a sentence, preferably those in which every field is known as well."""
-
-    def components(fields: Mapping[str, str]) -> bool:
-        axes = fields["axes"].split(", ") if "axes" in fields else []
-        return all(each in LETTERS or texts.has(f"axis.{each}") for each in axes)
-
-    def whole(fields: Mapping[str, str]) -> bool:
-        own = fields.get("named")
-        return components(fields) and (own is None or _recognised(texts, "named", own) is not None)
-
-    return texts.recognised(family, said, whole) or texts.recognised(family, said, components)
-
-
-def _turned(texts: Texts, family: str, said: str) -> str:
-    found = _recognised(texts, family, said)
-    if found is None:
-        return said
-    key, fields = found
-    turned = {name: _FIELDS[name](texts, own) for name, own in fields.items() if name in _FIELDS}
-    return texts(key, **{**fields, **turned})
-
-
-_FIELDS: Mapping[str, Callable[[Texts, str], str]] = {
-    "kind": kind,
-    "one": _one,
-    "axes": lambda texts, said: ", ".join(axis(texts, each) for each in said.split(", ")),
-    "named": named,
-    "number": lambda texts, said: texts.numeral(said),
-}
-"""Fields of recognised sentences that are words themselves."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.words import Phrase
 
 __all__ = ["Removal", "Rival", "Round"]
 
@@ -39,8 +40,8 @@ class Removal:
         In which round, from 1; 0 before the first, by a robust adjustment.
     group
         Its number among all groups.
-    kind, name
-        What it is of, and what it is called.
+    kind, subject
+        The kind of its observations, and its name as a message.
     rows, components, units
         The rows that went, what they are, and their units.
     dimension
@@ -73,7 +74,7 @@ class Removal:
     round: int
     group: int
     kind: str
-    name: str
+    subject: Phrase
     rows: tuple[int, ...]
     components: tuple[str, ...]
     units: tuple[str, ...]
@@ -93,6 +94,11 @@ class Removal:
     prediction_error: tuple[float, ...] = ()
     returned: int | None = None
     kept: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name in English."""
+        return str(self.subject)
 
     @property
     def is_out(self) -> bool:

@@ -291,7 +291,7 @@ def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
     for photo, said in aside.photos.items():
         removed.append(log_photo(work, photo, 0, before, (said, *consequences[photo])))
     parts = [counted(len(images), "image")] if len(images) else []
-    parts += [work.suspects.photo_name(photo) for photo in aside.photos]
+    parts += [str(work.suspects.photo_name(photo)) for photo in aside.photos]
     why = "runs off" if before is not None else "leads nowhere (before: without what follows)"
     said = f"; {agreeing} of the images agree with it" if agreeing else ""
     work.remarks.append(

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.statistics.reliability import TESTABLE
+from photogram.words import Phrase
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +53,10 @@ class Suspects:
     loads: Callable[[int], Indices]
     removable: Bools
     parts: Callable[[int], Sequence[Sequence[int]] | None]
-    name: Callable[[int], str]
+    name: Callable[[int], Phrase]
     row_name: Callable[[int], str]
     unit: Callable[[int], str]
-    photo_name: Callable[[int], str]
+    photo_name: Callable[[int], Phrase]
 
     def __len__(self) -> int:
         return len(self.kinds)

@@ -23,6 +23,7 @@ from photogram.statistics.snooping.suspects import (
     Tests,
     Trial,
 )
+from photogram.words import Phrase
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class TakingOut:
             own = choice.chosen
             deviations = self.trial.deviations[own.rows]
             rivals = tuple(
-                Rival(self.suspects.name(group), statistic, dimension, odds)
+                Rival(str(self.suspects.name(group)), statistic, dimension, odds)
                 for group, statistic, dimension, odds in own.rivals
             )
             entries.append(
@@ -190,12 +191,15 @@ class TakingOut:
     ) -> Removal:
         """Return the entry of a group, or of some of its rows, in a round; see :class:`Removal`."""
         suspects = self.suspects
-        name, components = suspects.name(group), tuple(map(suspects.row_name, rows.tolist()))
+        subject, components = suspects.name(group), tuple(map(suspects.row_name, rows.tolist()))
+        if len(rows) < len(suspects.rows(group)):
+            axes = [Phrase(f"axis.{each}") for each in components]
+            subject = Phrase("named.parts", {"axes": axes, "named": subject})
         return Removal(
             round=number,
             group=group,
             kind=suspects.kind(group),
-            name=name if len(rows) == len(suspects.rows(group)) else f"{', '.join(components)} of {name}",
+            subject=subject,
             rows=tuple(rows.tolist()),
             components=components,
             units=tuple(map(suspects.unit, rows.tolist())),

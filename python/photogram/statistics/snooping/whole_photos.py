@@ -11,6 +11,7 @@ from photogram.statistics.distributions import log_chi_square
 from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.suspects import LostSupportError, Out, Standing
 from photogram.statistics.snooping.taking_out import TakingOut
+from photogram.words import Phrase
 
 FAR = 5.0
 LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
@@ -111,7 +112,7 @@ def log_photo(
             round=number,
             group=next(group for group in suspects.on_photo(photo).tolist() if group in work.images),
             kind="photo",
-            name=f"all of {suspects.photo_name(photo)}",
+            subject=Phrase("named.whole", suspects.photo_name(photo).fields),
             rows=(),
             components=(),
             units=(),

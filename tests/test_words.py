@@ -1,0 +1,129 @@
+"""Messages are codes with fields: no program reads a sentence."""
+
+import json
+import pickle
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import photogram
+from photogram import words
+from photogram.cli import app
+from photogram.results.statement import texts
+from photogram.statistics.verdict import RULES
+from photogram.words import Phrase, Words, on_command_line, table_of
+
+EXAMPLES = Path(photogram.__file__).parent / "examples"
+FORMATS = ("number.", "date")
+"""Entries of the files of words that are no sentences."""
+COMMANDS = {
+    "adjust": ("adjust", "project", "--statement", "o/statement"),
+    "snoop": ("adjust", "project", "--snoop", "--sd", "images=0.1"),
+    "weights": ("adjust", "project", "--sd", "images=5"),
+    "strict": ("adjust", "project", "--sd", "images=5", "--strict"),
+    "German statement": ("adjust", "survey", "--statement", "o/statement", "--language", "de"),
+    "check": ("check", "project"),
+    "board": ("calibrate", "board/corners.csv"),
+    "comparator": ("comparator", "calibrate", "comparator/comparator-3.txt"),
+}
+
+
+def test_forms_of_fields():
+    own = Words("en", {
+        "a.number": "{n:.3g}", "a.list": "{names:2}", "a.numbered": "{names:#}", "a.or": "{names:|}",
+        "a.parts": "before{parts:+;}", "a.capital": "{name:^}",
+        "a.count": "{n} points", "a.count.one": "{n} point",
+    })  # fmt: skip
+    assert own("a.number", n=2 / 3) == "0.667"
+    assert own("a.list", names=["A", "B", "C"]) == "A, B and 1 more"
+    assert own("a.numbered", names=["A", "B"]) == "1) A, 2) B"
+    assert own("a.or", names=["A", "B"]) == "A or B"
+    assert own("a.parts", parts=[]) == "before"
+    assert own("a.parts", parts=["x", Phrase("named.photo", {"photo": "3"})]) == "before; x; photo 3"
+    assert own("a.capital", name=Phrase("named.photo", {"photo": "3"})) == "Photo 3"
+    assert (own("a.count", n=1), own("a.count", n=2)) == ("1 point", "2 points")
+    assert Words("de")("part.factor", factor=1.5, low=1.25, high=2.0) == "1,5 (95 Prozent: 1,25 bis 2)"
+
+
+def test_names_with_braces_are_no_fields():
+    assert str(Phrase("named.control", {"point": "{n}"})) == "control point {n}"
+
+
+def test_a_phrase_is_a_value():
+    name = Phrase("named.image", {"point": "7", "photo": "3"})
+    assert pickle.loads(pickle.dumps(name)) == name
+    assert {name: 1}[Phrase("named.image", {"photo": "3", "point": "7"})] == 1
+    assert name.document() == {
+        "code": "named.image",
+        "fields": {"point": "7", "photo": "3"},
+        "text": "image of point 7 on photo 3",
+    }
+
+
+def test_advice_names_functions_in_python_and_options_on_the_command_line():
+    advice = [code.removesuffix(".cli") for code in table_of("en") if code.endswith(".cli")]
+    assert len(advice) > 15
+    fields = {"n": 3, "names": ["c"], "kind": "images", "sd": 0.3, "models": ["opencv8"]}
+    for code in advice:
+        with on_command_line():
+            command = str(Phrase(code, fields))
+        python = str(Phrase(code, fields))
+        assert python != command
+        assert "--" not in python
+
+
+def test_rules_have_a_code_an_exit_code_and_advice():
+    steps = {f"advice.{name}" for rule in RULES for name in rule.advice}
+    of_program = {"advice.take-out", "advice.lens"}
+    assert steps - of_program <= table_of("en").keys()
+    assert {rule.exit for rule in RULES} == {0, 3, 4}
+    assert all(f"verdict.{rule.code}" in table_of("en") for rule in RULES)
+
+
+def run(folder, arguments):
+    """Return exit code, names of files and JSON documents of a command."""
+    folder.mkdir()
+    done = CliRunner().invoke(
+        app,
+        [*arguments, "--json", str(folder / "r.json")],
+    )
+    files = sorted(path.name for path in folder.rglob("*"))
+    documents = [json.loads(path.read_bytes()) for path in sorted(folder.rglob("*.json"))]
+    return done.exit_code, files, [without_sentences(each) for each in documents]
+
+
+def without_sentences(member):
+    """Return a document without times, and whether a member is a text in place of the text."""
+    if isinstance(member, dict):
+        return {name: without_sentences(each) for name, each in member.items() if name != "seconds"}
+    if isinstance(member, list):
+        return [without_sentences(each) for each in member]
+    return isinstance(member, str) if isinstance(member, str) else member
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_sentences_decide_nothing(command, tmp_path, monkeypatch):
+    """With codes in place of sentences exit codes, files, numbers and members of documents are equal."""
+    places = [str(EXAMPLES / word) if (EXAMPLES / word).exists() else word for word in COMMANDS[command][1:]]
+    ends = []
+    for number in range(2):
+        monkeypatch.chdir(tmp_path)
+        if number:
+            codes = {
+                language: {
+                    code: sentence if code.startswith(FORMATS) else code
+                    for code, sentence in table_of(language).items()
+                }
+                for language in ("en", "de")
+            }
+            monkeypatch.setattr(words, "table_of", codes.__getitem__)
+            monkeypatch.setattr(texts, "table_of", codes.__getitem__)
+            words.words_of.cache_clear()
+        folder = tmp_path / str(number)
+        own = [str(folder / word) if word.startswith("o/") else word for word in places]
+        try:
+            ends.append(run(folder, [COMMANDS[command][0], *own, "--out", str(folder / "o")]))
+        finally:
+            words.words_of.cache_clear()
+    assert ends[0] == ends[1]
