@@ -109,10 +109,8 @@ def test_a_negative_component_is_said_so_and_held(one_way):
     batch, residual = found.components
     assert batch.factor == 0.01
     assert batch.held
-    assert (
-        "residuals of batch are smaller than any positive variance explains (component -0.0"
-        in found.messages[0]
-    )
+    assert (found.messages[0].code, found.messages[0].fields["name"]) == ("components.low", "batch")
+    assert -0.1 < found.messages[0].fields["component"] < 0
     # Near the boundary, where all is residual.
     assert computed["components"][0] * residual.factor == pytest.approx(13.8063, rel=2e-3)
 
@@ -232,9 +230,12 @@ def test_what_cannot_be_estimated_is_merged_or_held_and_said_so(simulated):
     assert names["control"].members == ("control, plan", "control, height")
     assert "nothing checks it" in names["control"].held
     assert names["control"].factor == 1.0
-    said = " ".join(found.estimate.messages)
-    assert "control, plan, control, height: merged into control" in said
-    assert "control: held: its redundancy is" in said
+    merged, held = found.estimate.messages
+    assert (merged.code, merged.fields) == (
+        "components.merged",
+        {"names": ["control, plan", "control, height"], "name": "control"},
+    )
+    assert (held.code, held.fields["reason"].code) == ("components.held", "held.unchecked")
     every = adjust(found.network).degrees_of_freedom
     assert sum(each.redundancy for each in found.components) == pytest.approx(every, abs=1e-6)
 

@@ -221,7 +221,7 @@ def _without_nothing(found: Estimate) -> Estimate:
     """Leave out the group of all others where there are none."""
     keep = [each.name != OTHERS or each.redundancy > NOTHING for each in found.components]
     components = tuple(each for each, kept in zip(found.components, keep, strict=True) if kept)
-    messages = [each for each in found.messages if keep[-1] or not each.startswith(OTHERS)]
+    messages = [each for each in found.messages if keep[-1] or each.fields.get("name") != OTHERS]
     matrix = found.matrix[np.ix_(keep, keep)]
     return replace(found, components=components, messages=messages, matrix=matrix, factors=found.factors[:-1])
 

@@ -144,7 +144,7 @@ def _document(found: VarianceComponents) -> bytes:
             "helmert_matrix": estimate.matrix,
             "all_equal": equality and dict(zip(of_equality, equality, strict=True)),
             "steps": [dict(zip(of_step, step, strict=True)) for step in estimate.steps],
-            "messages": estimate.messages,
+            "messages": [str(each) for each in estimate.messages],
         }
     )
 
@@ -152,7 +152,7 @@ def _document(found: VarianceComponents) -> bytes:
 @report_of.register(VarianceComponents)
 def _report(found: VarianceComponents) -> str:
     """Return the components as text: what to do first."""
-    held = ("Groups that were merged or held", list(found.estimate.messages))
+    held = ("Groups that were merged or held", [str(each) for each in found.estimate.messages])
     return composed(headline("variance components"), [*component_sections(found), held])
 
 

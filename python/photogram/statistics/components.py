@@ -26,8 +26,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import listed
 from photogram.statistics.distributions import bonferroni, critical_normal
+from photogram.words import Phrase
 
 __all__ = ["Component", "Estimate", "GroupsOf", "Weighted", "balanced", "estimate", "helmert_step"]
 
@@ -168,7 +168,7 @@ class Estimate:
     matrix: Floats
     converged: bool
     steps: list[tuple[Floats, Floats, Floats]]
-    messages: list[str]
+    messages: list[Phrase]
     equality: tuple[float, int, float] | None
     level: float
 
@@ -278,8 +278,8 @@ class _Run:
         self.adjust, self.groups = adjust, groups
         self.tolerance, self.max_steps = tolerance, max_steps
         self.units: list[tuple[str, list[int]]] = [(name, [g]) for g, name in enumerate(groups.names)]
-        self.held = dict(groups.held)
-        self.messages: list[str] = []
+        self.held: dict[int, Phrase | str] = dict(groups.held)
+        self.messages: list[Phrase] = []
         self.factors = np.ones(len(groups.names))
         self.state = adjust(self.factors)
         self.steps: list[tuple[Floats, Floats, Floats]] = []
@@ -297,12 +297,10 @@ class _Run:
             if pool := self._pool(siblings, least):
                 names = [self.groups.names[g] for g in pool]
                 name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
-                self.messages.append(
-                    f"{listed(names)}: merged into {name}, each has too little redundancy for itself"
-                )
+                self.messages.append(Phrase("components.merged", {"names": names, "name": name}))
                 pools |= dict.fromkeys(pool, (name, pool))
         units: list[tuple[str, list[int]]] = []
-        held = {}
+        held: dict[int, Phrase | str] = {}
         for g, own_name in enumerate(self.groups.names):
             name, members = pools.get(g, (own_name, [g]))
             if members[0] != g:
@@ -322,16 +320,16 @@ class _Run:
             pool.append(others.pop(0))
         return sorted(pool) if len(pool) > 1 else []
 
-    def _why(self, members: list[int], least: float) -> str:
-        """Say why a component of some groups cannot be estimated; nothing where it can."""
+    def _why(self, members: list[int], least: float) -> Phrase | None:
+        """Return why a component of some groups cannot be estimated; None if it can."""
         r, n = float(self.state.redundancy[members].sum()), int(self.state.counts[members].sum())
         if r < min(REFUSED, least):
-            return f"its redundancy is {r:.2g}: nothing checks it"
+            return Phrase("held.unchecked", {"redundancy": r})
         if r < least:
-            return f"its redundancy is {r:.2g}, less than {least:g}"
+            return Phrase("held.few", {"redundancy": r, "least": float(least)})
         if r < LEAST_SHARE * n:
-            return f"its redundancy is {r:.2g} for {n} observations, less than a hundredth"
-        return ""
+            return Phrase("held.share", {"redundancy": r, "n": n})
+        return None
 
     @property
     def free(self) -> list[int]:
@@ -373,7 +371,7 @@ class _Run:
                 moved = np.abs(by_helmert - 1)
                 if still and (moved <= 100 * self.tolerance).all():
                     if (unit := self._inseparable()) is not None:
-                        self.held[unit] = "its component cannot be told from those of the others"
+                        self.held[unit] = Phrase("held.inseparable")
                         self._back(unit)
                         return False
                     self.converged = True
@@ -382,7 +380,7 @@ class _Run:
                     factors = by_helmert
             if len(self.steps) >= self.max_steps:
                 self.matrix, _ = self._helmert()
-                self.messages.append(f"the components still change after {self.max_steps} steps")
+                self.messages.append(Phrase("components.not-converged", {"n": self.max_steps}))
                 return True
             self._step(np.clip(factors, 1 / LIMIT_OF_STEP, LIMIT_OF_STEP))
             if self._vanished():
@@ -401,21 +399,18 @@ class _Run:
             place, (name, members) = free.index(unit), self.units[unit]
             factor = self.factors[members[0]]
             component, deviation = factor * by_helmert[place], factor * deviations[place]
-            said[unit] = (
-                f"the residuals of {name} are smaller than any positive variance explains (component"
-                f" {component:.2g} +- {deviation:.2g}): held at the lower bound of {LOWER_BOUND:g} of the"
-                " given variance"
-            )
+            fields = {"component": float(component), "sd": float(deviation), "bound": LOWER_BOUND}
+            said[unit] = Phrase("components.low", {"name": name, **fields})
             self.factors[members] = 1.0
         # With its own variance, and the weights that the others have by now, it may hardly be checked at all.
         self.state = self.adjust(self.factors)
         for unit in low:
             members = self.units[unit][1]
-            self.held[unit] = self._why(members, self.least)
-            if not self.held[unit]:
+            if (why := self._why(members, self.least)) is None:
                 self.messages.append(said[unit])
-                self.held[unit] = f"at the lower bound of {LOWER_BOUND:g}"
+                why = Phrase("held.bound", {"bound": LOWER_BOUND})
                 self.factors[members] = LOWER_BOUND
+            self.held[unit] = why
         self.state = self.adjust(self.factors)
         return True
 
@@ -502,12 +497,12 @@ class _Run:
                     probability=probability,
                     significant=probability < own_level,
                     images=all(images[g] for g in members),
-                    held=self.held.get(unit, ""),
+                    held=str(self.held.get(unit, "")),
                 )
             )
         for unit, why in self.held.items():
-            if not why.startswith("at the lower"):
-                self.messages.append(f"{self.units[unit][0]}: held: {why}")
+            if not (isinstance(why, Phrase) and why.code == "held.bound"):
+                self.messages.append(Phrase("components.held", {"name": self.units[unit][0], "reason": why}))
         return Estimate(
             tuple(components),
             self.factors,
