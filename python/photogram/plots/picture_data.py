@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.methods import Way
 from photogram.statistics.findings import Observations
@@ -158,6 +158,10 @@ class Pictured(Protocol):
     @property
     def tested(self) -> list[Observations]:
         """All observations with their standardized residuals, by kind."""
+
+    @property
+    def outlying(self) -> list[Bools]:
+        """Which components of these are outliers of the verdict."""
 
     @property
     def unit_weight(self) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel, spread
@@ -47,7 +47,7 @@ def tests(result: object) -> Plot:
     if len(values) < 2:
         raise InputError("there are no test values: adjust with covariance=True, and with redundancy")
     weight = drawn.unit_weight
-    return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(values, groups, weight)], 2)
+    return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(groups, drawn.outlying, weight)], 2)
 
 
 def _speaking(group: Observations) -> Observations:
@@ -86,13 +86,18 @@ def _bell(x: Floats, sd: float) -> Floats:
     return np.asarray(np.exp(-0.5 * (x / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi)))
 
 
-def _quantiles(values: Floats, groups: list[Observations], unit_weight: float) -> Panel:
+def _quantiles(groups: list[Observations], outlying: list[Bools], unit_weight: float) -> Panel:
+    values = np.concatenate([each.values.ravel() for each in groups])
+    tested = np.isfinite(values)
+    marked = np.concatenate([each.ravel() for each in outlying])[tested]
+    values = values[tested]
     n = len(values)
     rows = _rows(n)
     probability = (rows + 0.5) / n
     expected = normal_quantiles(probability)
-    every = np.sort(values)
-    ordered = every[rows]
+    order = np.argsort(values)
+    every = values[order]
+    ordered, beyond = every[rows], marked[order][rows]
     # Of the order statistics of independent values, about; those of residuals are nearly so.
     spread = 1.96 * np.sqrt(probability * (1.0 - probability) / n) / _bell(expected, 1.0)
     ends, places = expected[[0, -1]], np.column_stack([expected, ordered])
@@ -104,13 +109,12 @@ def _quantiles(values: Floats, groups: list[Observations], unit_weight: float) -
         label = f"standard deviations × {unit_weight:.3g}"
         marks.append(Line(np.column_stack([ends, unit_weight * ends]), MARKED, 0.9, "--", label=label))
     limit = critical_normal(bonferroni(LEVEL, n))
-    beyond = np.abs(ordered) > limit
     marks.append(Markers(places[~beyond], ".", 4.0, BLUE))
     if beyond.any():
-        label = f"beyond the limit ({int((np.abs(values) > limit).sum()):,})"
+        label = f"outliers of the verdict ({int(marked.sum()):,})"
         marks.append(Markers(places[beyond], "D", 4.0, MARKED, label=label))
     marks += [Level(height, FAINT, 0.7, ":") for height in (limit, -limit)]
-    if worst := _worst(groups, limit):
+    if worst := _worst(groups, outlying):
         sizes = [value for value, _ in worst]
         at = normal_quantiles((np.minimum(np.searchsorted(every, sizes), n - 1) + 0.5) / n)
         names = [name for _, name in worst]
@@ -134,15 +138,15 @@ def _rows(n: int) -> Any:
     return np.r_[:END_VALUES, inner.round().astype(np.int64), n - END_VALUES : n]
 
 
-def _worst(groups: list[Observations], limit: float) -> list[tuple[float, str]]:
-    """Return the values beyond the limit and their names, the largest first."""
+def _worst(groups: list[Observations], outlying: list[Bools]) -> list[tuple[float, str]]:
+    """Return the values of outliers and their names, the largest first."""
     found = []
-    for each in groups:
-        sizes = np.nan_to_num(np.abs(each.values))
+    for each, own in zip(groups, outlying, strict=True):
+        sizes = np.where(own, np.nan_to_num(np.abs(each.values)), 0.0)
         order = np.argsort(-sizes, axis=None)[:MAX_NAMES]
         for flat in order.tolist():
             index = tuple(int(k) for k in np.unravel_index(flat, sizes.shape))
-            if sizes[index] > limit:
+            if sizes[index] > 0:
                 found.append((float(each.values[index]), str(each.name(index))))
     return sorted(found, key=lambda pair: -abs(pair[0]))[:MAX_NAMES]
 

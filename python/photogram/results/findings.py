@@ -47,10 +47,11 @@ def network_findings(
     held: Iterable[Tested],
     systematic: Sequence[Systematic],
     labels: Sequence[str] = (),
+    order: Sequence[int] = (),
 ) -> Findings:
     """Return the tests that every network has: with those of what is held, and of patterns.
 
-    `labels` are those of the observations beside images, in the order of the core.
+    `labels` are those of the observations beside images, in the order of the core, and `order` their rows.
     """
     unit_weight = None if result.KNOWN else result.sum_and_freedom
     return Findings(
@@ -59,7 +60,7 @@ def network_findings(
             *(
                 tested_singly(result)
                 if result.reliability_summary is None  # a loss has changed the weights
-                else groups_tested(result.reliability_summary, labels, unit_weight)
+                else groups_tested(result.reliability_summary, labels, order, unit_weight)
             ),
             *(each if unit_weight is None else by_f(each, *unit_weight) for each in held),
         ],
@@ -82,9 +83,9 @@ def block_findings(result: Result) -> Findings:
     # Data snooping needs the whole block and adjusted photos.
     tests_more = result.WHOLE and not intersected
     labels = [each.label for each in observations_of_core(result.block)]
-    found = network_findings(
-        result, [] if intersected else held_tested(result), [] if intersected else _patterns(result), labels
-    )
+    order = [row for rows, _ in result.block.observation_groups for row in rows]
+    held, systematic = ([], []) if intersected else (held_tested(result), _patterns(result))
+    found = network_findings(result, held, systematic, labels, order)
     return replace(
         found,
         undetermined=left_open(result),
@@ -199,12 +200,16 @@ def unseen(result: AdjustedNetwork) -> list[Phrase]:
 
 
 def groups_tested(
-    summary: ReliabilitySummary, labels: Sequence[str] = (), unit_weight: tuple[float, float] | None = None
+    summary: ReliabilitySummary,
+    labels: Sequence[str] = (),
+    order: Sequence[int] = (),
+    unit_weight: tuple[float, float] | None = None,
 ) -> list[Tested]:
     """Return the tests of all groups, kind by kind.
 
-    `labels` are those of the observations beside images, in the order of the core, `unit_weight` the weighted
-    sum of squares and the degrees of freedom where that is estimated; None where it is known.
+    `labels` are those of the observations beside images, in the order of the core, `order` their rows in the
+    block, `unit_weight` the weighted sum of squares and the degrees of freedom where that is estimated; None
+    where it is known.
     """
     suspects, tests = summary.suspects, summary.tests
     testable = summary.testable
@@ -222,7 +227,11 @@ def groups_tested(
             if not testable[groups].any():
                 continue
             values = np.where(testable[groups], tests.statistic[groups], math.nan)
-            tested = Tested(what, values, _named(summary, groups), "T", tests.rank[groups].astype(np.float64))
+            rows = suspects.subjects[groups]
+            if kind == OBSERVATION:
+                rows = np.argsort(np.argsort(np.array(order)[rows]))
+            rank = tests.rank[groups].astype(np.float64)
+            tested = Tested(what, values, _named(summary, groups), "T", rank, rows=rows)
             found.append(tested if unit_weight is None else by_f(tested, *unit_weight))
     return found
 

@@ -17,6 +17,7 @@ from photogram.show.lines import field, stacked, table_lines
 from photogram.show.quantity import Quantity, chosen, labelled, long
 from photogram.statistics.findings import Observations, Tested, by_t, by_w
 from photogram.statistics.reliability import TESTABLE
+from photogram.statistics.verdict import Verdict
 from photogram.words import Phrase
 
 NOTABLE = 3.0
@@ -66,6 +67,31 @@ def tested_observations(result: AdjustedNetwork) -> list[Observations]:
         ),
         *map(tested_kind, terms.kinds),
     ]
+
+
+_GROUPS = {
+    "test.image_coordinates": "test.images",
+    "test.components_of_control": "test.control",
+    "test.components": "test.observations",
+}
+"""Kinds of groups of observations by kinds of their components."""
+_STATIONS = {"test.positions": slice(3), "test.attitudes": slice(3, None)}
+"""Kinds of groups of stations, and their components."""
+
+
+def outlying(verdict: Verdict, tested: Observations | Tested) -> Bools:
+    """Return which components of observations are outliers of a verdict, or parts of groups that are."""
+    found = np.zeros(np.shape(tested.values), dtype=bool)
+    kind = tested.kind
+    if not isinstance(kind, Phrase):
+        return found
+    groups = {_GROUPS[kind.code]: slice(None)} if kind.code in _GROUPS else _STATIONS
+    for place in verdict.outlying.get(kind, ()):
+        found[place] = True
+    for code, components in groups.items():
+        rows = [place[0] for place in verdict.outlying.get(Phrase(code, kind.fields), ())]
+        found[rows, components] = True
+    return found
 
 
 def tested_singly(result: AdjustedNetwork) -> list[Tested]:

@@ -30,7 +30,7 @@ from photogram.results.features import Features, directions
 from photogram.results.film_pictures import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
-from photogram.results.observation_rows import tested_observations
+from photogram.results.observation_rows import outlying, tested_observations
 from photogram.results.result import Result
 from photogram.statistics.findings import Observations
 
@@ -72,6 +72,11 @@ class PicturedNetwork(Pictured):
     def tested(self) -> list[Observations]:
         """All observations with their standardized residuals."""
         return tested_observations(self.result)
+
+    @property
+    def outlying(self) -> list[Bools]:
+        """Which of them are outliers of the verdict."""
+        return [outlying(self.result.verdict, each) for each in self.tested]
 
     @property
     def unit_weight(self) -> float:

@@ -153,23 +153,47 @@ class Evidence:
         """Tests beyond their limit as the standard deviations are given."""
         return self.beyond()
 
-    def outliers(self) -> list[Phrase]:
-        """Return for each kind of observations with tests that reject how many these are, and the worst."""
-        found = []
-        for each in self.found.observations:
-            if beyond := each.beyond(self.level):
-                _, place = min(beyond)
-                fields = {
-                    "n": len(beyond),
-                    "all": self._count(each),
-                    "kind": each.kind,
-                    "statistic": each.statistic,
-                    "limit": _test_at(each, place, self.level, self.number).limits[1],
-                    "value": float(each.values[place]),
-                    "name": each.name(place),
-                }
-                found.append(Phrase("line.outliers", fields))
+    @property
+    def outlying(self) -> list[Beyond]:
+        """The outliers of the judgement: tests beyond their limits.
+
+        Limits consider a common factor of all standard deviations if it matters or gross errors are named.
+        """
+        return self.gross if self.high or "gross-errors" in self.codes else self.single
+
+    def places(self) -> dict[Text, list[tuple[int, ...]]]:
+        """Return the places of the outliers by kind: rows of observations, and components of single ones."""
+        found: dict[Text, list[tuple[int, ...]]] = {}
+        for _, each, place in self.outlying:
+            own = place if each.rows is None else (int(each.rows[place[0]]),)
+            found.setdefault(each.kind, []).append(own)
         return found
+
+    def outliers(self) -> list[Phrase]:
+        """Return for each kind of observations with outliers how many these are, and the worst."""
+        factor = self.factor_of_limits if self.outlying is self.gross else 1.0
+        counts = {kind: len(places) for kind, places in self.places().items()}
+        worst = {each.kind: (each, place) for _, each, place in reversed(self.outlying)}
+        found = []
+        for kind, count in counts.items():
+            tested, place = worst[kind]
+            limit = _test_at(tested, place, self.level, self.number).limits[1]
+            fields = {
+                "n": count,
+                "all": self._count(tested),
+                "kind": kind,
+                "statistic": tested.statistic,
+                "limit": (limit or math.nan) * {"w": factor, "T": factor**2}.get(tested.statistic, 1.0),
+                "value": float(tested.values[place]),
+                "name": tested.name(place),
+            }
+            found.append(Phrase("line.outliers", fields))
+        return found
+
+    @cached_property
+    def factor_of_limits(self) -> float:
+        """The common factor of all standard deviations beside which gross errors are tested."""
+        return self._common(self.robust) if self.rejected and self.single and self.robust is not None else 1.0
 
     @cached_property
     def gross(self) -> list[Beyond]:
@@ -180,7 +204,7 @@ class Evidence:
         if not self.rejected or not self.single:
             return self.single
         if self.robust is not None:
-            return self.beyond(self._common(self.robust))
+            return self.beyond(self.factor_of_limits)
         test = self.test
         assert test is not None
         omega, f = test.weighted_sum_of_squares, test.degrees_of_freedom

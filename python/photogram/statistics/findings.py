@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.distributions import LEVEL, critical_fisher, log_chi_square, log_fisher
 from photogram.statistics.limits import GlobalTest, externally_studentized
@@ -51,6 +51,8 @@ class Tested:
         Degrees of freedom.
     held
         Whether these are no observations but held values, which nothing takes out.
+    rows
+        (k,) row of each group among images, points, photos or observations; None if these are the indices.
     """
 
     kind: Text
@@ -60,6 +62,7 @@ class Tested:
     dimension: ArrayLike = 1.0
     second: ArrayLike = math.inf
     held: bool = False
+    rows: Indices | None = None
 
     def at(self, place: tuple[int, ...]) -> Tested:
         """Return the test of one observation."""

@@ -7,11 +7,11 @@ level and number of tests.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
 from photogram.statistics.findings import Findings, Text
 from photogram.statistics.limits import NOTABLE_FACTOR
@@ -58,9 +58,12 @@ class Verdict:
     tests
         The global test, the largest test value of every kind of observation, tests of patterns.
     outliers
-        A message for each kind of observations whose tests reject: how many, and the worst.
+        A message for each kind of observations with outliers: how many, and the worst.
     removed, rivals, hints
         Observations that snooping removed, those that cannot be told apart from them, accepted hypotheses.
+    outlying
+        The outliers by kind, which tables and plots mark: the row of an observation, and the number of a
+        single component behind it.
     """
 
     code: str
@@ -74,6 +77,7 @@ class Verdict:
     removed: tuple[Any, ...] = ()
     rivals: tuple[Text, ...] = ()
     hints: tuple[Text, ...] = ()
+    outlying: Mapping[Text, Sequence[tuple[int, ...]]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Verdict {self.code}: {self.headline} (exit code {self.exit}, {len(self.tests)} tests)"
@@ -182,6 +186,7 @@ def verdict(found: Findings) -> Verdict:
         removed=tuple(found.snooped.removed) if found.snooped else (),
         rivals=tuple(found.snooped.rivals) if found.snooped else (),
         hints=tuple(found.hints),
+        outlying=evidence.places(),
     )
 
 

@@ -22,6 +22,7 @@ from photogram.targets.housings import camera_number, housed_with, housing_of
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.suggestions import suggest_views
 from photogram.targets.uncertainty import uncertainty_map
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
@@ -216,7 +217,7 @@ def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossVali
     own = [each.verdict for each in cross if name in each.cameras]
     said = own or ["model not tested by cross-validation"]
     for test in calibrated.verdict.tests:
-        if test.name == f"pattern over the frame of {name}" and not test.accepted:
+        if test.kind == Phrase("test.frame", {"camera": name}) and not test.accepted:
             said.append("residuals have a pattern over the picture: the map is optimistic")
     return "; ".join(said)
 

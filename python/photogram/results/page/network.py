@@ -13,7 +13,7 @@ from photogram.plots.accessor import sketch_of
 from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import iterations, terms_of
-from photogram.results.observation_rows import IMAGE_COORDINATES, tested_singly
+from photogram.results.observation_rows import IMAGE_COORDINATES, outlying, tested_singly
 from photogram.results.page.tables import photos_section, points_section
 from photogram.results.report import ORDERINGS, problems_of
 from photogram.show.cells import page_table, unit_written
@@ -32,6 +32,7 @@ from photogram.show.page import (
     significant,
 )
 from photogram.show.quantity import Axis
+from photogram.statistics.evidence import GLOBAL
 from photogram.statistics.findings import Tested
 
 _NOT_CHECKED = 0.01
@@ -124,7 +125,7 @@ def _unit_weight(result: AdjustedNetwork) -> Fact:
         return Fact(name, "–", note="no degrees of freedom: covariances are scaled by 1")
     note = ""
     for test in result.verdict.tests:
-        if test.name == "global" and test.limits[0] is not None and test.limits[1] is not None:
+        if test.kind == GLOBAL and test.limits[0] is not None and test.limits[1] is not None:
             note = f"{math.sqrt(test.limits[0]):.3f} to {math.sqrt(test.limits[1]):.3f} expected"
     return Fact(name, f"{math.sqrt(variance):.3f}", note=note)
 
@@ -242,25 +243,25 @@ def _worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
         for index in few[flat[few] > 0].tolist():
             place = tuple(int(each) for each in np.unravel_index(index, sizes.shape))
             found.append((float(flat[index]), tested, place))
-    found.sort(key=lambda each: (-each[0], each[1].kind, each[2]))
+    found.sort(key=lambda each: (-each[0], str(each[1].kind), each[2]))
     return found[:count]
 
 
 def _worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
     """Return photos and points of the images among the worst observations."""
-    own = [place[0] for _, tested, place in worst if tested.kind == "image coordinates"]
+    own = [place[0] for _, tested, place in worst if tested.kind == IMAGE_COORDINATES]
     return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
 
 
 def _worst_table(result: AdjustedNetwork, worst: Sequence[Worst]) -> Table:
     """Return the observations whose test values are the largest, of all kinds."""
-    terms, limit = terms_of(result), _limit(result)
-    numbers = dict(zip((each.kind for each in tested_singly(result)), _numbers(result), strict=True))
+    terms, every = terms_of(result), tested_singly(result)
+    marked = {each.kind: outlying(result.verdict, each) for each in every}
+    numbers = dict(zip((each.kind for each in every), _numbers(result), strict=True))
     rows: list[list[Cell | str | float | None]] = []
-    for size, tested, place in worst:
+    for _, tested, place in worst:
         residuals, sd, redundancy, axes = numbers[tested.kind]
         axis = axes[place[1]]
-        beyond = limit is not None and size > limit
         names: list[Cell | str | None] = [str(tested.name(place)), None, None]
         if tested.kind == IMAGE_COORDINATES:
             photo, point = result.given.image_photos[place[0]], result.image_points[place[0]]
@@ -276,7 +277,7 @@ def _worst_table(result: AdjustedNetwork, worst: Sequence[Worst]) -> Table:
                 float(sd[place]) * axis.factor,
                 unit_written(axis.small),
                 float(redundancy[place]),
-                Cell(float(tested.values[place]), tone="look" if beyond else ""),
+                Cell(float(tested.values[place]), tone="look" if marked[tested.kind][place] else ""),
             ]
         )
     columns = (
@@ -289,11 +290,7 @@ def _worst_table(result: AdjustedNetwork, worst: Sequence[Worst]) -> Table:
         Column("Redundancy", decimals=3),
         Column(f"Test value {worst[0][1].statistic}", decimals=2),
     )
-    said = (
-        "The verdict tests groups of observations: the section Tests has their limits."
-        if limit is None
-        else f"Beyond {limit:.2f} the test of a single observation rejects."
-    )
+    said = "Marked observations are the outliers of the verdict: the section Tests has the limits."
     return Table("Worst observations", columns, rows, f"The {len(rows)} of the largest test values. {said}")
 
 
@@ -314,11 +311,6 @@ def _numbers(result: AdjustedNetwork) -> list[tuple[Floats, Floats, Floats, tupl
             for each in terms.kinds
         ),
     ]
-
-
-def _limit(result: AdjustedNetwork) -> float | None:
-    """Return the limit of single observations in the verdict; None if it tests groups."""
-    return next((test.limits[1] for test in result.verdict.tests if test.statistic in ("w", "t")), None)
 
 
 CAPTIONS = {

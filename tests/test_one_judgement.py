@@ -1,0 +1,91 @@
+"""Tables and plots mark the outliers of the verdict, and no other observations."""
+
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import photogram
+from photogram import collection, formats
+from photogram.plots.picture_data import pictured
+from photogram.results import observation_rows as rows_of
+from photogram.show.methods import page_of
+from photogram.words import Phrase
+
+PLOT = import_module("photogram.plots.tests")  # the package has a function with this name
+EXAMPLES = Path(photogram.__file__).parent / "examples"
+SINGLE = {"test.images": "test.image_coordinates", "test.control": "test.components_of_control"}
+"""Kinds of components by kinds of groups."""
+
+
+def disturbed(block, factor):
+    """Return a block with errors of ten standard deviations in ten images and scaled standard deviations."""
+    xy = block.image_xy.copy()
+    xy[5 :: max(len(xy) // 10, 1), 0] += 10 * factor * block.image_sd[5 :: max(len(xy) // 10, 1), 0]
+    return block.replace(image_xy=xy, image_sd=factor * block.image_sd)
+
+
+def of_project(name, change=lambda block: block):
+    return photogram.adjust(change(formats.read(EXAMPLES / name).block))
+
+
+RESULTS = {
+    "project": lambda: of_project("project"),
+    "survey": lambda: of_project("survey"),
+    "rolling shutter": lambda: of_project("rolling"),
+    "gross errors": lambda: of_project("project", lambda block: disturbed(block, 1.0)),
+    "gross errors, small standard deviations": lambda: of_project(
+        "project", lambda block: disturbed(block, 0.3)
+    ),
+    "small standard deviations": lambda: of_project(
+        "project", lambda block: block.replace(image_sd=block.image_sd / 3)
+    ),
+    "robust": lambda: photogram.adjust(
+        disturbed(formats.read(EXAMPLES / "project").block, 1.0), loss="huber"
+    ),
+    "collection": lambda: collection.adjust(collection.simulate(seed=1).collection),
+}
+
+
+@pytest.fixture(scope="module", params=RESULTS)
+def result(request):
+    return RESULTS[request.param]()
+
+
+def test_a_message_counts_the_outliers_of_its_kind(result):
+    verdict = result.verdict
+    assert {line.fields["kind"]: line.fields["n"] for line in verdict.outliers} == {
+        kind: len(places) for kind, places in verdict.outlying.items()
+    }
+    if verdict.code == "gross-errors":
+        tests = verdict.message.fields["suspects"][-1].fields["tests"]
+        assert len(tests) == sum(map(len, verdict.outlying.values()))
+
+
+def test_the_table_of_the_worst_marks_outliers_only(result):
+    every = {each.kind: each for each in rows_of.tested_singly(result)}
+    marked = {kind: rows_of.outlying(result.verdict, each) for kind, each in every.items()}
+    tables = [part for section in page_of(result).sections for part in section.parts]
+    (table,) = [each for each in tables if getattr(each, "caption", "") == "Worst observations"]
+    shown = sum(bool(row[-1].tone) for row in table.rows)
+    sizes = np.concatenate([np.nan_to_num(np.abs(each.values)).ravel() for each in every.values()])
+    flags = np.concatenate([each.ravel() for each in marked.values()])
+    order = np.argsort(-sizes, kind="stable")
+    assert shown == flags[order[: len(table.rows)]].sum()
+    for kind, own in marked.items():
+        groups = next((group for group, single in SINGLE.items() if single == kind.code), None)
+        if groups is not None:
+            rows = {place[0] for place in result.verdict.outlying.get(Phrase(groups), ())}
+            rows |= {place[0] for place in result.verdict.outlying.get(kind, ())}
+            assert set(np.flatnonzero(own.any(axis=1)).tolist()) == rows
+
+
+def test_the_plot_of_tests_marks_outliers_only(result):
+    drawn = pictured(result)
+    masks = [rows_of.outlying(result.verdict, each) for each in rows_of.tested_observations(result)]
+    count = sum(
+        int((own & np.isfinite(each.values)).sum()) for own, each in zip(masks, drawn.tested, strict=True)
+    )
+    labels = [getattr(mark, "label", "") for mark in PLOT.tests_sketch(result).panels[1].marks]
+    assert (f"outliers of the verdict ({count:,})" in labels) == (count > 0)
