@@ -174,7 +174,7 @@ def test_names_are_numbers_where_none_are_given():
 
 
 def test_what_checkers_of_types_accept_works():
-    assert typed_uses.pictures(typed_uses.block_of_lists()) == ["a block", "residuals"]
+    assert typed_uses.pictures(typed_uses.block_of_lists())[:3] == ["a block", "<svg", "network"]
     assert [each.unit for each in typed_uses.cameras()] == ["mm", "mm", "px"]
     assert len(typed_uses.collection().image_xy) == 1
     with pytest.raises(TypeError):

@@ -49,8 +49,9 @@ def pictures(block: Block) -> list[str]:
     axes = Figure().subplots()
     plot: photogram.plots.Plot = result.plot.network(plane="XZ")
     plot.on(axes)
-    plot.save("network.svg")
-    return [axes.get_title(), *result.plot.available()]
+    axes.set_title("a block")
+    content: bytes = plot.render("svg")
+    return [axes.get_title(), content[:4].decode(), *result.plot.available()]
 
 
 def cameras() -> list[Camera]:
