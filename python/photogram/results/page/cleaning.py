@@ -54,7 +54,7 @@ def _parts(found: VarianceComponents) -> list[Part]:
         _table(found),
     ]
     if found.estimate.messages:
-        parts.append(Remarks(list(found.estimate.messages)))
+        parts.append(Remarks([*map(str, found.estimate.messages)]))
     return parts
 
 
