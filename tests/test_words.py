@@ -18,15 +18,16 @@ EXAMPLES = Path(photogram.__file__).parent / "examples"
 FORMATS = ("number.", "date")
 """Entries of the files of words that are no sentences."""
 COMMANDS = {
-    "adjust": ("adjust", "project", "--statement", "o/statement"),
-    "snoop": ("adjust", "project", "--snoop", "--sd", "images=0.1"),
-    "weights": ("adjust", "project", "--sd", "images=5"),
-    "strict": ("adjust", "project", "--sd", "images=5", "--strict"),
-    "German statement": ("adjust", "survey", "--statement", "o/statement", "--language", "de"),
-    "check": ("check", "project"),
-    "board": ("calibrate", "board/corners.csv"),
-    "comparator": ("comparator", "calibrate", "comparator/comparator-3.txt"),
+    "adjust": (0, "adjust", "project", "--json", "o.json"),
+    "snoop": (4, "adjust", "project", "--snoop", "--sd", "images=0.1", "--json", "o.json"),
+    "weights": (0, "adjust", "project", "--sd", "images=5", "--json", "o.json"),
+    "strict": (4, "adjust", "project", "--sd", "images=0.2", "--strict", "--json", "o.json"),
+    "German statement": (0, "statement", "survey", "--language", "de"),
+    "check": (0, "check", "project", "--json", "o.json"),
+    "board": (0, "calibrate", "board"),
+    "comparator": (0, "comparator", "calibrate", "comparator/comparator-3.txt"),
 }
+"""Exit code and arguments."""
 
 
 def test_forms_of_fields():
@@ -84,13 +85,11 @@ def test_rules_have_a_code_an_exit_code_and_advice():
 def run(folder, arguments):
     """Return exit code, names of files and JSON documents of a command."""
     folder.mkdir()
-    done = CliRunner().invoke(
-        app,
-        [*arguments, "--json", str(folder / "r.json")],
-    )
+    done = CliRunner().invoke(app, arguments)
+    documents = sorted(folder.rglob("*.json"))
+    assert documents or done.exit_code == 0, done.output
     files = sorted(path.name for path in folder.rglob("*"))
-    documents = [json.loads(path.read_bytes()) for path in sorted(folder.rglob("*.json"))]
-    return done.exit_code, files, [without_sentences(each) for each in documents]
+    return done.exit_code, files, [without_sentences(json.loads(each.read_bytes())) for each in documents]
 
 
 def without_sentences(member):
@@ -105,15 +104,14 @@ def without_sentences(member):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_sentences_decide_nothing(command, tmp_path, monkeypatch):
     """With codes in place of sentences exit codes, files, numbers and members of documents are equal."""
-    places = [str(EXAMPLES / word) if (EXAMPLES / word).exists() else word for word in COMMANDS[command][1:]]
+    code, name, *rest = COMMANDS[command]
     ends = []
     for number in range(2):
-        monkeypatch.chdir(tmp_path)
         if number:
             codes = {
                 language: {
-                    code: sentence if code.startswith(FORMATS) else code
-                    for code, sentence in table_of(language).items()
+                    key: sentence if key.startswith(FORMATS) else key
+                    for key, sentence in table_of(language).items()
                 }
                 for language in ("en", "de")
             }
@@ -121,9 +119,13 @@ def test_sentences_decide_nothing(command, tmp_path, monkeypatch):
             monkeypatch.setattr(texts, "table_of", codes.__getitem__)
             words.words_of.cache_clear()
         folder = tmp_path / str(number)
-        own = [str(folder / word) if word.startswith("o/") else word for word in places]
+        own = [str(EXAMPLES / word) if (EXAMPLES / word).exists() else word for word in rest]
+        own = [str(folder / word) if word == "o.json" else word for word in own]
+        out = () if command == "check" else ("--out", str(folder / "o"))
         try:
-            ends.append(run(folder, [COMMANDS[command][0], *own, "--out", str(folder / "o")]))
+            ends.append(run(folder, [name, *own, *out]))
         finally:
             words.words_of.cache_clear()
     assert ends[0] == ends[1]
+    assert ends[0][0] == code
+    assert ends[0][1]

@@ -60,8 +60,11 @@ class Source:
 
     @property
     def name(self) -> str:
-        """Its name in English."""
-        return str(self.subject)
+        """Its key: that of a parameter is the name of what has it, and its own."""
+        if isinstance(self.subject, str):
+            return self.subject
+        axis = self.subject.fields.get("axis", self.subject)
+        return f"{self.subject.fields.get('name', '')} {axis.code.partition('.')[2]}".strip()
 
     @property
     def u(self) -> float:
