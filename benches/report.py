@@ -64,7 +64,7 @@ def measured(size: str, points: float, maps: bool, into: Path) -> Iterator[tuple
 
 def pictures(result: Result, into: Path, size: str) -> Iterator[list[str]]:
     """Give name, time and size of each picture as a PNG file, and of the same in the report."""
-    from photogram.results.page.network import drawings
+    from photogram.results.network_document import drawings
     from photogram.show.html import inlined
 
     for name, drawing in drawings(result).items():

@@ -83,7 +83,7 @@ def main(picture: Path | None = None) -> Result:
     """Adjust the block and print what the report says of the camera."""
     result = adjust(measured())
     report = result.report()
-    start = report.index("Calibration of")
+    start = report.index("\nCameras\n") + 1
     print(report[start : report.index("\n\nPhotos\n", start)])
     if picture is not None:
         from photogram.results import plot_distortion

@@ -255,9 +255,10 @@ def test_correlations_with_poses_name_parameter_component_and_photos(example):
     c, z = camera.names.index("c"), len(camera.names) + 2
     expected = abs(joint[c, z]) / np.sqrt(joint[c, c] * joint[z, z])
     assert heights.coefficient == pytest.approx(expected, abs=1e-6)
-    report = result.report()
     first = ", ".join(heights.photos[:3])
-    assert f"c and Z of photo {first} and 5 others: {heights.coefficient:.4f}" in report
+    sentence = f"c and Z of photo {first} and 5 others are correlated by {heights.coefficient:.4f}"
+    (section,) = (section for section in result.document().sections if section.key == "cameras")
+    assert any(sentence in each for part in section.parts for each in getattr(part, "sentences", ()))
     [member] = json.loads(result.to_json())["calibrations"]
     said = [each for each in member["pose_correlations"] if each["component"] == "Z"]
     assert said[0]["photos"] == list(heights.photos)
@@ -269,9 +270,12 @@ def test_correlations_with_poses_name_parameter_component_and_photos(example):
 def test_report_document_and_picture(example, result, tmp_path, capsys):
     shown = example.main(tmp_path / "curve.svg")
     printed = capsys.readouterr().out
-    assert printed.startswith("Calibration of 24 mm lens\n")
+    assert printed.startswith("Cameras\n")
     assert "K3 may be left out" in printed
-    assert "correlated by more than 0.95" in printed
+    assert "K2 and K3 are correlated by" in printed
+    parameters = shown.document().table("parameters-24 mm lens")
+    assert list(parameters.columns[0].values) == [test.name for test in calibrations(shown)[0].parameters]
+    assert shown.document().table("distortion-24 mm lens").shown.size == 9
     report = shown.report()
     assert printed.strip() in report
     picture = (tmp_path / "curve.svg").read_text()
@@ -287,7 +291,7 @@ def test_report_document_and_picture(example, result, tmp_path, capsys):
 def test_without_covariances_there_is_nothing_to_say(example):
     result = adjust(example.measured(), covariance=False)
     assert calibrations(result) == []
-    assert "Calibration of" not in result.report()
+    assert not any("parameters" in table.key for table in result.document().tables(layers=True))
     assert json.loads(result.to_json())["calibrations"] == []
 
 

@@ -19,6 +19,7 @@ from photogram import (
 )
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
+from photogram.results.components import statement
 from photogram.results.group_sums import Probing, factored
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
 
@@ -215,7 +216,8 @@ def test_image_weights_wrong_by_four_are_corrected(simulated):
     images = found["images"]
     assert images.interval[0] < 16 < images.interval[1]
     assert images.worth_changing
-    assert "standard deviations of images are too small by a factor of 4." in found.report()
+    assert statement(found)[0].startswith("standard deviations of images are too small by a factor of 4.")
+    assert found.document().table("components").frame().equals(found.table())
     assert (found.verdict.code, found.verdict.exit) == ("weights-of-groups", 4)
     assert "Standard deviations are wrong: those of images by about 4." in found.verdict.headline
     # Whatever the given weights are, the solution is that of the estimated ones.
@@ -367,7 +369,7 @@ def test_a_variance_that_grows_with_the_radius():
     assert parts["outer"].factor > parts["inner"].factor
     assert parts.estimate.equality[2] < 1e-4
     assert all(each.interval[0] < found.factor(each.value) < each.interval[1] for each in found.bins)
-    assert "variance = given variance x (a^2 + b^2 (radius" in found.report()
+    assert found.document().table("bins").frame().equals(found.table())
 
 
 def contaminated(factor):
@@ -397,7 +399,7 @@ def test_gross_errors_and_weights_are_found_together():
     assert set(bad.tolist()) <= out
     assert len(out) <= len(bad) + 1
     assert found.components["images"].interval[0] < 1 < found.components["images"].interval[1]
-    assert "standard deviations of images: multiplied by 2.88" in found.report()
+    assert "standard deviations of images: multiplied by 2.88" in " ".join(found.changes)
 
 
 def test_weights_that_are_right_stay_when_gross_errors_are_out():

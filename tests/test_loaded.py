@@ -16,7 +16,7 @@ except SystemExit as end:
     assert not end.code, end.code
 """
 HEAVY = ("matplotlib", "jinja2", "pandas", "pyarrow", "pyproj", "geopandas", "scipy", "erfa", "tetra3rs")
-SHOWING = ("rich", "typer", "photogram.results.report", "photogram.show.html", "photogram.show.page")
+SHOWING = ("rich", "typer", "photogram.results.document", "photogram.show.html", "photogram.show.page")
 NUMERICAL = ("numpy", "orjson", "photogram._photocore")
 SELDOM = (
     "difflib",

@@ -136,15 +136,18 @@ def test_what_is_given_of_a_pose_is_given_of_its_trajectory():
 
 
 def test_the_report_names_and_counts(scan):
-    report = scan.report()
+    document, report = scan.document(), scan.report()
     for line in report.splitlines():
         assert "receiverX" not in line
         assert "position 0x" not in line
     assert "coefficients of trajectories are not listed" in report
     assert "position coefficient strip 1 position 3" not in report
-    trajectories = report[report.index("Trajectories: their corrections") :]
-    assert "strip 2             rotation arcsec   spline of degree 3" in trajectories
-    assert "poses at their own times" in report
+    trajectories = {column.head: column.values for column in document.table("trajectories").columns}
+    row = list(zip(trajectories["Trajectory"], trajectories["Of"], strict=True)).index(
+        ("strip 2", "rotation")
+    )
+    assert trajectories["Basis"][row] == "spline of degree 3"
+    assert "poses at their own times" in " ".join(report.split())
     page = scan.to_html().decode()
     assert "poses at their own times" in page
     assert ">strip 1 position 3<" not in page
@@ -176,9 +179,9 @@ def test_many_coefficients_do_not_flood_the_report():
     result = adjust(block.replace(timed=timed, observations=observations))
     assert len(result.unknowns) > 1900
     report = result.report()
-    assert len(report.splitlines()) < 800
+    assert len(report.splitlines()) < 1200
     assert "coefficients of trajectories" in report
-    assert "components, with the largest test values; the table has all" in report
+    assert "components with the largest test values" in report
     assert len(result.to_html()) < 2_000_000
     assert len(result.unknown_table()) == 3 * len(result.unknowns) - 2
 
@@ -388,7 +391,7 @@ def test_two_known_trajectories():
     ]
     result = adjust(block.replace(timed=known))
     assert result.converged
-    assert "Trajectories: their corrections" not in result.report()
+    assert "trajectories" not in {table.key for table in result.document().tables()}
     assert Clock("c").KIND == "clock"
     assert Table is type(block.trajectories[0].table)
 

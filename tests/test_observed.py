@@ -10,7 +10,7 @@ from photogram import Orientation, Result, collection
 from photogram.collection import AdjustedCollection
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Shown, columns_of, report_of
+from photogram.show.methods import Shown, columns_of
 from photogram.words import Phrase
 
 KINDS = {
@@ -95,21 +95,15 @@ def test_tables_and_document_say_of_a_kind_what_its_arrays_say(result, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_report_lists_every_observation_of_a_kind(result, kind):
-    head = {
-        "image": "Image points: observed",
-        "control": "Control as observations" if isinstance(result, Result) else "Weighted and fixed points",
-        "station": "Stations as obs" if isinstance(result, Result) else "Weighted and fixed parameters",
-    }[kind]
-    section = next(part for part in result.report().split("\n\n") if part.startswith(head))
-    shown = section.split()
+def test_the_document_has_every_observation_of_a_kind(result, kind):
+    key = {"image": "images", "control": "control", "station": "stations-"}[kind]
+    tables = [table for table in result.document().tables(layers=True) if table.key.startswith(key)]
     _, redundancy, tests = (
         getattr(result, name)[rows_of(result, kind)] * sign_of(kind, name) for name in KINDS[kind]
     )
-    for value in tests[np.isfinite(tests)]:
-        assert f"{value:.2f}" in shown
-    for value in redundancy[np.isfinite(redundancy) & (redundancy != 0)]:
-        assert f"{value:.3f}" in shown
+    for name, values in {"redundancy": redundancy, "standardized": tests}.items():
+        columns = [column for table in tables for column in table.columns if column.name == name]
+        np.testing.assert_array_equal(np.hstack([column.values for column in columns]), values)
 
 
 def test_standardized_residuals_are_residuals_over_their_standard_deviations(result):
@@ -156,16 +150,17 @@ def test_a_way_that_nobody_has_defined_says_so():
     ):
         with pytest.raises(NotImplementedError, match="Bare has no"):
             way()
-    assert report_of.of(Result) is not report_of.of(object)
 
 
 def test_a_report_lists_no_more_than_can_be_read(monkeypatch):
-    from photogram.results import observation_rows
+    from photogram.results import network_sections
 
-    monkeypatch.setattr(observation_rows, "LISTED", 3)
+    monkeypatch.setattr(network_sections, "IMAGES", 3)
     result = ring()
-    more = np.count_nonzero(result.used_images) - 3
-    assert f"and {more} more; the JSON document and the table of images have all" in result.report()
+    table = result.document().table("images")
+    largest = np.argsort(-np.abs(result.standardized[result.used_images]).max(axis=1))[:3]
+    assert sorted(largest.tolist()) == table.shown.tolist()
+    assert len(table.frame()) == np.count_nonzero(result.used_images)
 
 
 def test_arrays_cannot_be_written(result):

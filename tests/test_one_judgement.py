@@ -9,8 +9,7 @@ import pytest
 import photogram
 from photogram import collection, formats
 from photogram.plots.picture_data import pictured
-from photogram.results import observation_rows as rows_of
-from photogram.show.methods import page_of
+from photogram.results import tested_observations as rows_of
 from photogram.words import Phrase
 
 PLOT = import_module("photogram.plots.tests")  # the package has a function with this name
@@ -66,7 +65,7 @@ def test_a_message_counts_the_outliers_of_its_kind(result):
 def test_the_table_of_the_worst_marks_outliers_only(result):
     every = {each.kind: each for each in rows_of.tested_singly(result)}
     marked = {kind: rows_of.outlying(result.verdict, each) for kind, each in every.items()}
-    tables = [part for section in page_of(result).sections for part in section.parts]
+    tables = [part for section in result.document().sections for part in section.parts]
     (table,) = [each for each in tables if getattr(each, "caption", "") == "Worst observations"]
     shown = sum(bool(row[-1].tone) for row in table.rows)
     sizes = np.concatenate([np.nan_to_num(np.abs(each.values)).ravel() for each in every.values()])

@@ -14,6 +14,8 @@ import pytest
 
 from photogram import Attitudes, Block, Result, Spheroid, adjust, simulate
 from photogram.network import project
+from photogram.show.cells import written
+from photogram.show.forms import titled_lines
 
 ARCSEC = 180 * 3600 / math.pi
 SPACES: dict[str, dict[str, Any]] = {
@@ -156,7 +158,7 @@ def test_section_14_without_covariance(result):
     assert document["photos"][0]["covariance"] == [[None] * 6] * 6
     assert document["observations"][0]["redundancy"] == [None, None]
     assert "nan" not in bare.to_json().decode().lower()
-    assert "Problems" in bare.report()
+    assert bare.document().sections[0].parts
 
 
 # Tables
@@ -237,88 +239,75 @@ def test_adjusted_tables_make_a_block_again(result):
 # The report
 
 
-def sections(report: str) -> dict[str, list[str]]:
-    """Lines by title; titles are underlined."""
-    parts = re.split(r"\n\n(?=[^\n]+\n-+\n)", report)
-    return {part.split("\n")[0]: part.rstrip("\n").split("\n")[2:] for part in parts[1:]}
+def facts(result: Result, key: str) -> dict[str, str]:
+    """Return the figures of a section by their names."""
+    parts = [part for section in result.document().sections if section.key == key for part in section.parts]
+    return {fact.name: fact.value for part in parts for fact in getattr(part, "facts", ())}
 
 
-def test_the_report_begins_with_the_problems(result):
-    report = result.report()
-    assert report.startswith("photogram ")
-    assert "A BLOCK OF TWO STRIPS" in report.split("\n")[0]
-    titles = list(sections(report))
-    assert titles[:5] == ["Verdict", "What to do next", "Problems", "Adjustment", "Residuals"]
-    problems = sections(report)["Problems"]
-    assert any("left out, pass point on one photo: SINGLE" in line for line in problems)
+def test_the_report_begins_with_verdict_and_remarks(result):
+    titles = [title for title, _ in titled_lines(result.document())]
+    assert titles[:4] == ["Verdict", "What to do next", "Key figures", "Remarks"]
+    assert "A BLOCK OF TWO STRIPS" in result.report().split("\n")[0]
+    (remarks,) = result.document().sections[0].parts
+    assert any("left out, pass point on one photo: SINGLE" in line for line in remarks.sentences)
 
 
-def test_the_report_says_when_the_adjustment_failed(result):
+def test_the_remarks_begin_with_an_adjustment_that_failed(result):
     early = adjust(result.block, max_iterations=1)
     assert early.status == "not converged"
-    assert sections(early.report())["Problems"][0].startswith("the adjustment has not converged: do not use")
+    (remarks,) = early.document().sections[0].parts
+    assert remarks.sentences[0].startswith("the adjustment has not converged: do not use")
     clean = simulate(strips=2, photos_per_strip=3, seed=1).block
-    assert sections(adjust(clean).report())["Problems"] == ["none"]
+    assert not adjust(clean).document().sections[0].parts
 
 
 @pytest.mark.giant("7", "degrees of freedom n - u; variance and its square root are printed")
 def test_section_7_the_report_counts_and_weighs(result):
-    lines = "\n".join(sections(result.report())["Adjustment"])
+    figures = facts(result, "size")
     for name, value in {
-        "status": "converged",
-        "degrees of freedom": str(result.degrees_of_freedom),
-        "variance of unit weight": f"{result.variance_of_unit_weight:.6f}",
-        "weighted sum of squares, photos": f"{result.sums_of_squares.camera:.6f}",
-        "weighted sum of squares, control": f"{result.sums_of_squares.ground:.6f}",
-        "weighted sum of squares, images": f"{result.sums_of_squares.plates:.6f}",
-        "weighted sum of squares, total": f"{result.sums_of_squares.total:.6f}",
-        "photos": "8",
-        "object space": "geographic" if result.block.geographic else "rectangular",
-        "rotation angles": "photo-to-ground" if result.block.photo_to_ground else "ground-to-photo",
+        "Degrees of freedom": str(result.degrees_of_freedom),
+        "Variance of unit weight": f"{result.variance_of_unit_weight:.6f}",
+        "Weighted sum of squares, photos": f"{result.sums_of_squares.camera:.6f}",
+        "Weighted sum of squares, control": f"{result.sums_of_squares.ground:.6f}",
+        "Weighted sum of squares, images": f"{result.sums_of_squares.plates:.6f}",
+        "Weighted sum of squares, total": f"{result.sums_of_squares.total:.6f}",
+        "Photos": "8",
+        "Object space": "geographic" if result.block.geographic else "rectangular",
+        "Rotation angles": "photo-to-ground" if result.block.photo_to_ground else "ground-to-photo",
     }.items():
-        assert re.search(rf"^{name} +{re.escape(value)}", lines, re.MULTILINE), name
+        assert figures[name] == value, name
+    assert facts(result, "iterations")["Status"] == "converged"
 
 
 def test_every_quantity_of_the_report_has_a_unit(result):
-    parts = sections(result.report())
-    unit = re.compile(r"\b(um|mm|m|deg|arcsec|s)\b")
-    for line in parts["Residuals"]:
-        if line.startswith("rms"):
-            assert unit.search(line), line
-    assert len(unit.findall(parts["Check points: adjusted minus given, standard deviations, test"][0])) == 3
-    control = next(title for title in parts if title.startswith("Control as observations"))
-    assert len(unit.findall(parts[control][0])) == 3
-    # Values and deviations stand on two lines under two headings.
-    assert len(unit.findall(parts["Photos"][0])) + (2 if result.block.geographic else 0) == 6
-    beside = 2 if result.block.geographic else 0  # lengths beside seconds of arc
-    assert len(unit.findall(parts["Photos"][1])) == 6 + beside
-    assert len(unit.findall(parts["Points"][1])) == 3 + beside
+    figures = [value for name, value in facts(result, "size").items() if name.startswith("rms of")]
+    assert figures
+    assert all(re.search(r"(µm|mm|m|°|″)\b|″", value) for value in figures)
+    for key, count in {"check_points": 5, "control": 5, "photos-positions": 6, "photos-attitudes": 6}.items():
+        columns = written(result.document().table(key)).columns
+        units = [column for column in columns if column.unit or "Component" in column.head]
+        assert len(units) >= (count if not result.block.geographic else 1), key
 
 
 def test_the_report_names_the_blunder(result):
-    title = next(title for title in sections(result.report()) if title.startswith("Image coordinates"))
-    suspects = sections(result.report())[title]
+    worst = {column.head: column.values for column in result.document().table("worst").columns}
     image, axis = np.unravel_index(np.nanargmax(np.abs(result.standardized)), result.standardized.shape)
-    photo = result.block.photo_ids[result.block.image_photos[image]]
-    point = result.block.point_ids[result.block.image_points[image]]
-    assert suspects[1].split()[:3] == [photo, point, "xy"[axis]]
+    assert worst["Photo"][0] == result.block.photo_ids[result.block.image_photos[image]]
+    assert worst["Point"][0] == result.block.point_ids[result.block.image_points[image]]
+    assert worst["Observation"][0] == f"image {'xy'[axis]}"
     assert abs(result.standardized[image, axis]) > 10
 
 
 def test_values_of_the_report_are_those_of_the_arrays(result):
-    parts = sections(result.report())
-    photo = parts["Photos"][2:4]
-    assert photo[0].split()[0] == result.block.photo_ids[0]
-    angles = [float(value) for value in photo[0].split()[-3:]]
-    np.testing.assert_allclose(angles, np.degrees(result.photo_attitudes[0]), rtol=0, atol=0.51e-7)
-    deviations = [float(value) for value in photo[1].split()[:6]]
-    scale = [ARCSEC, ARCSEC, 1.0] if result.block.geographic else [1.0] * 3
-    expected = result.photo_sd[0] * [*scale, *[ARCSEC] * 3]
-    np.testing.assert_allclose(deviations, expected, rtol=0, atol=0.51e-3)
-    if result.block.geographic:
-        degrees, minutes, seconds = (float(part) for part in photo[0].split()[1:4])
-        longitude = -(abs(degrees) + minutes / 60 + seconds / 3600)
-        assert math.radians(longitude) == pytest.approx(result.photo_positions[0, 0], abs=1e-5 / ARCSEC)
+    document = result.document()
+    *_, values, sd = document.table("photos-attitudes").columns
+    np.testing.assert_array_equal(values.values, result.photo_attitudes)
+    np.testing.assert_allclose(sd.outward(), result.photo_sd[:, 3:] * ARCSEC, rtol=1e-12)
+    line = next(line for line in result.report().split("\nAttitudes\n")[1].split("\n")[1:2])
+    assert line.split()[0] == result.block.photo_ids[0]
+    angles = [float(value) for value in line.split()[1:4]]
+    np.testing.assert_allclose(angles, np.degrees(result.photo_attitudes[0]), rtol=0, atol=1e-3)
 
 
 # The JSON document
@@ -376,8 +365,8 @@ def test_units_and_conventions_of_the_document(result, document):
 
 def test_an_ordering_that_failed_is_reported(result):
     failed = replace(result, predictions={**result.predictions, "amd": math.nan})
-    line = next(line for line in failed.report().splitlines() if line.endswith("too large for this ordering"))
-    assert "minimum degree" in line
+    work = facts(failed, "work")
+    assert work["Multiply-adds if eliminated by minimum degree"] == "too large for this ordering"
     assert json.loads(failed.to_json())["predictions"]["amd"] is None
 
 
@@ -445,7 +434,7 @@ def test_what_is_no_number_is_null():
     assert document["check_points"][0]["difference"][2] is None
     assert document["check_points"][0]["difference"][0] is not None
     assert any("there is no control" in message for message in document["messages"])
-    assert "variance of unit weight             undefined" in result.report()
+    assert facts(result, "size")["Variance of unit weight"] == "undefined"
     assert "covariances are scaled by 1" in result.report()
 
 
@@ -460,12 +449,12 @@ def test_reports_of_geographic_blocks_have_lengths_beside_seconds_of_arc():
     origin = (-1.65, 0.52, 10.0)
     block = simulate(strips=2, photos_per_strip=3, spheroid=Spheroid.wgs84(), origin=origin, seed=1).block
     result = adjust(block)
-    lines = result.report().splitlines()
-    row = next(k for k, line in enumerate(lines) if "sd east m" in line and "sd omega" not in line)
-    assert lines[row].split()[-6:] == ["sd", "east", "m", "sd", "north", "m"]
-    sd = lines[row + 2].split()
-    east, north = (float(each) for each in sd[-2:])
-    metres = 6.37e6 * np.radians(1 / 3600)
-    assert east == pytest.approx(float(sd[0]) * metres * np.cos(0.52), rel=0.01)
-    assert north == pytest.approx(float(sd[1]) * metres, rel=0.01)
-    assert re.search(r"rms of control points +longitude \S+ arcsec \(\S+ m\), latitude", result.report())
+    columns = result.document().table("photos-positions").columns
+    lengths = columns[-1]
+    assert [axis.name for axis in lengths.axes] == ["east", "north"]
+    east, north = lengths.outward()[0]
+    sd = result.photo_sd[0]
+    assert east == pytest.approx(sd[0] * 6.37e6 * np.cos(0.52), rel=0.01)
+    assert north == pytest.approx(sd[1] * 6.37e6, rel=0.01)
+    rms = facts(result, "size")["rms of control points"]
+    assert re.search(r"longitude \S+ ″ \(\S+ m\), latitude", rms)

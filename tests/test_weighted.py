@@ -11,6 +11,7 @@ import pytest
 
 from photogram import Block, InputError, Result, Spheroid, adjust, predict, simulate
 from photogram.giant import Project, read_project
+from photogram.show.cells import written
 from photogram.statistics import global_test
 
 SPACES: dict[str, dict[str, Any]] = {
@@ -315,18 +316,13 @@ def test_document_of_stations_and_control(result):
     np.testing.assert_allclose(found, -result.point_residuals[held] * scale, rtol=1e-12)
 
 
-def test_report_of_stations_and_control(result):
-    report = result.report()
-    stations = report.split("Stations as observations")[1].split("\n\n")[0].splitlines()
-    lines = {line[:24].split()[-1]: line[24:].split() for line in stations[3:7]}
-    assert lines["sd"][:3] == ["fixed"] * 3
-    assert lines["redundancy"][:3] == ["-"] * 3
-    np.testing.assert_allclose(
-        [float(value) for value in lines["redundancy"][3:]], result.photo_redundancy[0, 3:], atol=6e-4
-    )
-    np.testing.assert_allclose(
-        [float(value) for value in lines["standardized"][3:]], -result.photo_standardized[0, 3:], atol=6e-3
-    )
-    assert stations[7].split()[:2] == [result.block.photo_ids[1], "sd"]
-    assert stations[7].split()[-3:] == ["free"] * 3
-    assert "Control as observations" in report
+def test_sections_of_stations_and_control(result):
+    document = result.document()
+    heads, rows = written(document.table("stations-positions")), []
+    rows = [dict(zip([column.head for column in heads.columns], row, strict=True)) for row in heads.rows]
+    own = [row["sd given"] for row in rows if row["Photo"].value == result.block.photo_ids[0]]
+    assert own == ["fixed"] * 3
+    attitudes = document.table("stations-attitudes")
+    tests = next(column for column in attitudes.columns if column.name == "standardized")
+    np.testing.assert_array_equal(tests.values, -result.photo_standardized[:, 3:])
+    assert result.block.photo_ids[1] not in {row[0].value for row in written(attitudes).rows}

@@ -44,7 +44,7 @@ def test_one_command_from_corners_to_a_camera(calibrated):
     assert [each["corners"] for each in document["views"]] == [54] * 13
     assert found.exit_code == document["verdict"]["exit"]
     text = (out / "report.txt").read_text()
-    assert "calibration with targets" in text.split("\n")[0]
+    assert "Calibration with targets" in text.split("\n")[0]
     assert "nothing checks it: its relative error is that of every length" in text
     assert "count from 0 at the centre of the first" in text
     assert (out / "views.csv").read_text().startswith("view,pictures,corners,left_out,rms_px,redundancy,chi2")

@@ -18,12 +18,13 @@ from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
-from photogram.results.components import VarianceComponents, component_lines, statement
+from photogram.results.components import VarianceComponents
 from photogram.results.group_sums import Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.snooping_result import Snooped
-from photogram.show.methods import report_of
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Part, Remarks, Section
 from photogram.show.summary import Brief
 from photogram.statistics.components import WORTH_CHANGING
 
@@ -36,7 +37,7 @@ STANDS = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cleaned(Brief):
+class Cleaned(Brief, Documented):
     """A network without gross errors, with weights that its residuals bear out.
 
     Attributes
@@ -85,18 +86,26 @@ class Cleaned(Brief):
             if factor != 1.0
         ]
 
+    def section(self) -> Section:
+        """Return the section on weights: what was done to them, and the components that are left."""
+        from photogram.results.components_document import components_parts, sentences
+
+        parts: list[Part] = [Remarks(sentences(self.changes))]
+        if self.components is not None:
+            parts += components_parts(self.components)
+        intro = "Weights were estimated from the observations that are left: the adjustment has these."
+        return Section("components", "Weights", parts, intro)
+
+    def document(self) -> Document:
+        """Return the document of the network that is left, with what was done to weights and observations."""
+        network = self.snooped.document()
+        return replace(network, sections=[self.section(), *network.sections])
+
     def report(self) -> str:
         """Return what was done to weights and observations as text."""
-        return report_of(self)
+        from photogram.show.forms import text
 
-
-@report_of.register(Cleaned)
-def _report(found: Cleaned) -> str:
-    lines = found.changes
-    if found.components is not None:
-        lines += ["", "components that are left", *statement(found.components)]
-        lines += component_lines(found.components)
-    return "\n".join(lines) + "\n"
+        return text(Document("Weights", "", [], [], [], [self.section()]))
 
 
 def clean(

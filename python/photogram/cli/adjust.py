@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from photogram.cli.choices import Choices, KeepAll
-from photogram.cli.console import ON_TOP, print_remark, print_sections
+from photogram.cli.console import print_remark, print_sections, print_summary
 from photogram.cli.documents import Documents, Pictures, check_maps
 from photogram.cli.in_parts import DIVIDING, Parts, adjusted_on_disk, print_plan
 from photogram.cli.job import Job, OutputFolder, with_job
@@ -161,18 +161,16 @@ def _finish(
 ) -> None:
     """Write all that was found and asked for, say it in short, and end by the verdict."""
     from photogram.formats.adjusted import excel_file
-    from photogram.results.report import summary
-    from photogram.show.methods import page_of
+    from photogram.show.forms import text
 
     told = removed or result
-    in_crs, more, lines = _in_system(result, documents.crs, project.control_crs)
-    files = _files(project, result, told.report(), [*lines, *sections]) | in_crs
+    in_crs, more = _in_system(result, documents.crs, project.control_crs)
+    document = told.document().with_sections(*more)
+    files = _files(project, result, text(document), sections) | in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
-    taken = [] if removed is None else removed.sections()[ON_TOP:]
-    told_first = summary(result)
     sheets = {} if documents.xlsx is None else {documents.xlsx: excel_file(result)}
-    page = documents.page(job, "adjust", target, lambda: page_of(told).with_sections(*more))
+    page = documents.page(job, "adjust", target, lambda: document)
     beside = {} if stated is None else statement_files(job, stated, target / "statement")
     sizes = project.sizes if project.block.image_unit == "px" else ()
     code = result.verdict.exit_code(strict=strict)
@@ -185,7 +183,7 @@ def _finish(
         documents.as_json(told),
         documents.data(result),
         documents.charts(result, sizes, quiet=job.quiet),
-        summary=lambda: print_sections([*told_first[:ON_TOP], *taken, *told_first[ON_TOP:]], "report.txt"),
+        summary=lambda: print_summary(document, "report.txt"),
         code=code or (0 if stated is None else stated.exit),
     )
 
@@ -208,17 +206,15 @@ def _statement(
         )
 
 
-def _in_system(
-    result: Result, crs: str | None, of_control: str
-) -> tuple[dict[str, bytes], list[Chapter], list[Section]]:
-    """Return the tables of a result in another system, and sections of the page and of the report.
+def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[str, bytes], list[Chapter]]:
+    """Return the tables of a result in another system, and sections of its document.
 
     The system is the one that is asked for, or that of the control.
     """
     if not (crs or of_control):
-        return {}, [], []
+        return {}, []
     from photogram import InputError
-    from photogram.formats.crs_results import control_lines, placed, placed_files, placed_section
+    from photogram.formats.crs_results import placed, placed_files, placed_section
 
     try:
         found = placed(result, crs or of_control)
@@ -226,10 +222,9 @@ def _in_system(
         if crs:
             raise
         print_remark(f"no results in {of_control}: {error}")
-        return {}, [], []
+        return {}, []
     files = {f"in_crs/{name}": each for name, each in placed_files(found).items()}
-    title, lines = control_lines(found)
-    return files, [placed_section(found)], [(title, lines)] if lines else []
+    return files, [placed_section(found)]
 
 
 def started_block(project: Project, *, keep_all: bool) -> tuple[Block, FirstValues | None]:

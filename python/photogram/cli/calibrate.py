@@ -12,7 +12,7 @@ import typer
 from photogram.cli.calibration_options import NOT_GOOD_ENOUGH, PriorName, Seen, Uncertainty, distances_of
 from photogram.cli.choices import LossName
 from photogram.cli.components import COMPONENTS
-from photogram.cli.console import print_remark, print_sections
+from photogram.cli.console import print_remark, print_sections, print_summary
 from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, with_job
 from photogram.cli.options import Quiet, Snooping, Strict, Threads, check_alone, default_out, out_option
@@ -197,6 +197,7 @@ def calibrate(
         if planned.asked:
             planned.run(job, seen, uncertainty, documents, out)
             return
+        from photogram.show.forms import text
         from photogram.targets.page import drawings
 
         if path is None:
@@ -217,16 +218,17 @@ def calibrate(
             lambda other: seen.read(other).adjust(**how, threads=threads),
         )
         weights = _weights(job, found, components or [], threads)
-        files = _files(found) | _cameras(found, to or [], uncertainty.need)
+        document = _document(found, weights)
+        files = _files(found, text(document)) | _cameras(found, to or [], uncertainty.need)
         files |= {} if weights is None else {COMPONENTS: weights.report().encode()}
-        page = documents.page(job, "calibrate", target, partial(_page, found, weights))
+        page = documents.page(job, "calibrate", target, lambda: document)
         drawn = pictures.of(found.result)
         if found.worth is not None:
             drawn |= pictures.of_drawings(partial(drawings, found.worth))
         job.finish(
             {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
-            summary=lambda: _summarise(found, weights),
+            summary=lambda: print_summary(document, "report.txt", "uncertainty", "board", "views"),
             code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
         )
 
@@ -243,7 +245,7 @@ def _adjusted(
         return calibration.adjust(**how, threads=threads, progress=progress)
 
 
-def _files(found: Calibrated) -> dict[str, bytes]:
+def _files(found: Calibrated, report: str) -> dict[str, bytes]:
     """Make everything that goes to the directory, before anything is written."""
     from photogram.formats import to_files
     from photogram.formats.adjusted import table_files
@@ -253,7 +255,7 @@ def _files(found: Calibrated) -> dict[str, bytes]:
     from photogram.targets.document import worth_files
     from photogram.targets.tables import views
 
-    files = {"report.txt": found.report().encode(), **table_files(found.result)}
+    files = {"report.txt": report.encode(), **table_files(found.result)}
     files["views.csv"] = csv_text(frame(views(found)))
     plain = to_files(adjusted_project(found), "plain")
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
@@ -290,19 +292,9 @@ def _weights(
         return corner_components(found, by, threads=threads, progress=progress)
 
 
-def _page(found: Calibrated, weights: VarianceComponents | None) -> Document:
-    from photogram.results.page.cleaning import components_section
-    from photogram.show.methods import page_of
+def _document(found: Calibrated, weights: VarianceComponents | None) -> Document:
+    from photogram.results.components_document import components_section
 
-    page = page_of(found)
+    document = found.document()
     more = [] if weights is None else [components_section(weights)]
-    return replace(page, sections=[*page.sections[:1], *more, *page.sections[1:]])
-
-
-def _summarise(found: Calibrated, weights: VarianceComponents | None) -> None:
-    from photogram.results.components import statement_lines
-    from photogram.targets.report import calibration_summary
-
-    sections = calibration_summary(found)
-    more = [] if weights is None else [("Variance components", statement_lines(weights))]
-    print_sections([*sections[:1], *more, *sections[1:]], "report.txt")
+    return replace(document, sections=[*document.sections[:1], *more, *document.sections[1:]])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photogram.cli.components import COMPONENTS, Components, Found, snooped
-from photogram.cli.console import print_sections
+from photogram.cli.console import print_sections, print_summary
 from photogram.cli.documents import TEXT, Documents
 from photogram.cli.job import InputFile, Job, OutputFolder, Without, with_job
 from photogram.cli.options import (
@@ -113,7 +113,7 @@ def collection(
     with job:
         from photogram.collection import to_bytes
         from photogram.collection.formats import recognised
-        from photogram.collection.report import summary
+        from photogram.show.forms import text
 
         if problem is None:
             problem = job.packaged(*EXAMPLE)
@@ -133,21 +133,22 @@ def collection(
         result = result.estimated(job, photos, components, threads)
         written = pictures.of(result.result)
         if out is not None:
-            written[out / TEXT] = result.told.report().encode()
+            written[out / TEXT] = text(result.document).encode()
             written[out / adjusted] = to_bytes(result.result.adjusted(), packing, found.name)
             written |= result.files(out)
         title = problem.name
-        written |= documents.page(job, "collection", out, lambda: replace(result.page(), title=title))
+        written |= documents.page(job, "collection", out, lambda: replace(result.document, title=title))
         written |= documents.as_json(result.told)
-        sections = [
-            ("File", [f"{job.shown(problem)}: {found.title}"]),
-            *result.summary(summary(result.result)),
-        ]
+
+        def summarize() -> None:
+            print_sections([("File", [f"{job.shown(problem)}: {found.title}"])], "the report")
+            print_summary(result.document, "the report")
+
         job.finish(
             written,
             documents.data(result.result),
             documents.charts(result.result),
-            summary=lambda: print_sections(sections, "the report"),
+            summary=summarize,
             code=result.verdict.exit_code(strict=strict),
         )
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
 import typer
 
-from photogram.cli.console import ON_TOP
 from photogram.cli.job import Job
 from photogram.cli.progress import estimation_status
 from photogram.lazy_dataclasses import dataclass, replace
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photogram.results.network import AdjustedNetwork
     from photogram.results.snooping_result import Snooped
     from photogram.show.page import Document
-    from photogram.show.sections import Section
     from photogram.statistics.verdict import Verdict
 
 Network = TypeVar("Network", bound="AdjustedNetwork")
@@ -112,27 +111,12 @@ class Found(Generic[Network]):
         weights = self.made or self.components
         return {} if weights is None else {out / COMPONENTS: weights.report().encode()}
 
-    def page(self) -> Document:
-        """Return the report for the browser, with what components say."""
-        from photogram.results.page.cleaning import reweighed_page, weighed_page
-        from photogram.show.methods import page_of
+    @cached_property
+    def document(self) -> Document:
+        """The document of the report, with weights and removed observations."""
+        from photogram.results.components_document import weighed_document
 
-        page = page_of(self.told)
         if self.made is not None:
-            return reweighed_page(self.made.changes, self.made.components, page)
-        return page if self.components is None else weighed_page(self.components, page)
-
-    def summary(self, sections: list[Section]) -> list[Section]:
-        """Return what a reader wants first, of a summary of the result on top of which its verdict stands.
-
-        What was taken out comes before, with what became of the weights below its verdict; what components
-        say is in the place of the verdict of the result.
-        """
-        from photogram.results.components import component_sections
-
-        removed = [] if self.log is None else list(self.log.sections())
-        if self.made is not None:
-            removed[ON_TOP:ON_TOP] = [("Weights", self.made.report().splitlines())]
-        if self.components is not None:
-            sections = [*component_sections(self.components), *sections[ON_TOP:]]
-        return [*removed, *sections[ON_TOP if self.log else 0 :]]
+            return self.made.document()
+        network = self.told.document()
+        return network if self.components is None else weighed_document(self.components, network)

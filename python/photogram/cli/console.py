@@ -15,6 +15,7 @@ from photogram.cli.streams import stream_fault
 from photogram.messages import printable
 
 if TYPE_CHECKING:
+    from photogram.show.page import Document
     from photogram.show.sections import Section
 
 INPUT_ERROR = 1
@@ -23,8 +24,8 @@ NOT_USABLE = 4
 SHOWN = 24
 """Lines of a section that the summary of a command shows at most."""
 
-ON_TOP = 2
-"""Sections with which summaries of verdicts begin: the verdict, and what to do next."""
+SUMMARY = ("remarks", "components", "removed", "features", "tests", "worst")
+"""Sections of the document of a network that the summary of a command shows."""
 
 EXTRAS = {
     "contourpy": "report",
@@ -60,6 +61,13 @@ def print_sections(summary: Iterable[Section], whole: str, most: int = SHOWN) ->
             output.print(f"  {escape(line)}")
         if len(lines) > most:
             output.print(f"  and {len(lines) - most} more lines in {whole}")
+
+
+def print_summary(document: Document, whole: str, *keys: str) -> None:
+    """Print verdict, advice, key figures and some sections of a document; `whole` has all of it."""
+    from photogram.show.forms import titled_lines
+
+    print_sections(titled_lines(document, *SUMMARY, *keys), whole)
 
 
 def print_written(paths: Iterable[Path], to: Console = output) -> None:

@@ -85,8 +85,10 @@ def features(
         from photogram import features as fitted
         from photogram.formats.adjusted import feature_files
         from photogram.io.json import to_json
-        from photogram.results.features_report import features_document, features_sections
-        from photogram.show.sections import verdict_sections
+        from photogram.results.features_report import features_document, features_section
+        from photogram.show.forms import titled_lines
+        from photogram.show.judgement import judged
+        from photogram.show.page import Document
 
         definitions = wanted.definitions()
         result, project = result_at(job, path, added, threads, fitted=False)
@@ -98,11 +100,10 @@ def features(
             raise typer.BadParameter("name what to fit: --circle bore=p1,p2,p3 ...", param_hint="PATH")
         found = fitted(result, definitions or declared, k=k, coverage=coverage)
         verdict = result.verdict
+        document = Document("Features", "", [judged(verdict)], verdict.next, [], [features_section(found)])
         job.finish(
             {} if out is None else {out / name: each for name, each in feature_files(found).items()},
             {} if json is None else {json: to_json(features_document(found))},
-            summary=lambda: print_sections(
-                [*verdict_sections(verdict), *features_sections(found)], "--json FILE"
-            ),
+            summary=lambda: print_sections(titled_lines(document), "--json FILE"),
             code=verdict.exit_code(strict=strict),
         )

@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from photogram.cli.check import EXAMPLE
 from photogram.cli.components import COMPONENTS, Components, Found, UnitVarianceName, snooped
-from photogram.cli.console import SHOWN, errors, print_sections
+from photogram.cli.console import SHOWN, errors, print_summary
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.job import Job, OutputFile, OutputFolder, Reads, Without, with_job
 from photogram.cli.options import (
@@ -141,7 +141,7 @@ def giant(
     and report.txt.
     """
     with job:
-        from photogram.results.report import summary
+        from photogram.show.forms import text
 
         check_maps(documents.map)
         if directory is None:
@@ -164,18 +164,19 @@ def giant(
         written = _result_files(project, block, found, out, how.as_published)
         found = found.estimated(job, block, how.components, threads)
         written |= found.files(out) | pictures.of(found.result)
-        asked = documents.page(job, "giant", out, found.page) | documents.as_json(found.told)
+        written[out / "report.txt"] = text(found.document).encode()
+        asked = documents.page(job, "giant", out, lambda: found.document) | documents.as_json(found.told)
         if listing is not None:
             from photogram.giant import listing as printout
 
-            text = printout(project, block, found.result, as_published=how.as_published, limits=allowed)
-            asked[listing] = text.encode()
+            pages = printout(project, block, found.result, as_published=how.as_published, limits=allowed)
+            asked[listing] = pages.encode()
         job.finish(
             written,
             asked,
             documents.data(found.result),
             documents.charts(found.result, quiet=quiet),
-            summary=lambda: print_sections(found.summary(summary(found.result)), "report.txt"),
+            summary=lambda: print_summary(found.document, "report.txt"),
             code=found.verdict.exit_code(strict=strict),
         )
 
@@ -222,8 +223,7 @@ def _result_files(
         result.messages.append(
             Message("RESTART is not written: the stations are beyond what its columns hold")
         )
-    made = {out / name: to_bytes(lines) for name, lines in records.items()}
-    return {**made, out / "report.txt": found.told.report().encode()}
+    return {out / name: to_bytes(lines) for name, lines in records.items()}
 
 
 def _project_and_block(

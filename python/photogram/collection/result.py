@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from photogram.results.selection import Adjusted, Things
 
 if TYPE_CHECKING:
     from photogram.results.network_trial import NetworkTrial
+    from photogram.show.page import Document
 
 __all__ = ["AdjustedCollection"]
 
@@ -56,6 +57,18 @@ class AdjustedCollection(AdjustedNetwork):
     datum: list[tuple[int, str]]
 
     KNOWN: ClassVar[bool] = False
+
+    def document(self) -> Document:
+        """Return the document: judgement, sections, tables."""
+        from photogram.collection.document import collection_document
+
+        return collection_document(self)
+
+    def _members(self) -> dict[str, Any]:
+        """Return the members of the JSON document, without the sections that people read."""
+        from photogram.collection.document import collection_members
+
+        return collection_members(self)
 
     @property
     def _what(self) -> str:

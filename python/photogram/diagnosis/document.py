@@ -8,7 +8,7 @@ from dataclasses import replace
 from photogram.diagnosis.findings import Finding, Section
 from photogram.lazy_dataclasses import asdict
 from photogram.messages import counted, listed
-from photogram.results.page.network import drawings
+from photogram.results.network_document import drawings
 from photogram.results.result import Result
 from photogram.show import page
 from photogram.show.forms import part_lines

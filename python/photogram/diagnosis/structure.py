@@ -10,7 +10,7 @@ from photogram.messages import listed
 from photogram.network.block import Block
 from photogram.network.structuring import structure
 from photogram.network.ties import FEWEST_TIES, ties
-from photogram.results.report import bandwidths
+from photogram.results.document import bandwidths
 from photogram.results.result import Result
 
 

@@ -21,12 +21,9 @@ from photogram.network.geometry import Spheroid, lengths_of_units
 from photogram.network.observations import Control
 from photogram.results.ellipses import metric_covariances
 from photogram.results.result import Result
-from photogram.show.lines import field, table_lines
 from photogram.show.page import Column, Row, Section, Table, decimals_of
-from photogram.show.quantity import Axis, Quantity
-from photogram.show.sections import Section as Text
 
-__all__ = ["Placed", "check_place", "control_lines", "placed", "placed_files", "placed_section"]
+__all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
@@ -326,21 +323,3 @@ def _listed_differences(found: Placed) -> dict[int, list[float]]:
     """Return adjusted minus given of control and check points, by their rows among all points."""
     pairs = (found.differences(), found.control_differences())
     return {row: own for rows, d in pairs for row, own in zip(rows.tolist(), d.tolist(), strict=True)}
-
-
-def control_lines(found: Placed) -> Text:
-    """Return title and lines of control and check points in a report: adjusted minus given, metres."""
-    ids = found.result.block.point_ids
-    differences = _listed_differences(found)
-    rows = sorted(differences, key=lambda row: natural_order(ids[row]))
-    names, kinds = np.array([ids[row] for row in rows], dtype=object), found.result.point_kinds[rows]
-    axes = tuple(Axis.of(name, "m") for name in _LOCAL)
-    d = Quantity(np.reshape([differences[row] for row in rows], (-1, 3)), axes, "difference")
-    lines = table_lines(
-        [
-            *field(Quantity(names, kind="name"), 10, head="point"),
-            *field(Quantity(kinds, kind="name"), 9, head="kind"),
-            *field(d, 14, ".4f", "d {name} {unit}"),
-        ]
-    )
-    return f"Control and check points in {found.crs}: adjusted minus given", lines

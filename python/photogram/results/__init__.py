@@ -3,17 +3,9 @@
 import lazy_loader
 
 WAYS = {
-    "columns_of": ("tables",),
-    "document_of": ("document",),
     "files_of": ("block_files",),
     "findings_of": ("findings",),
-    "page_of": {
-        "Result": ("page.block",),
-        "Snooped": ("page.cleaning",),
-        "VarianceComponents": ("page.cleaning",),
-    },
     "pictured": ("picture_data",),
-    "report_of": ("report",),
     "statement_of": ("statement.statement",),
     "terms_of": ("tables",),
 }

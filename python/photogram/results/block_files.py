@@ -45,7 +45,7 @@ from photogram.results.datum import ResultDatum
 from photogram.results.features import Feature, Features, Quantity
 from photogram.results.iteration import Iteration
 from photogram.results.observation_kinds import ObservedKind
-from photogram.results.result import Redundancies, Result, SumsOfSquares
+from photogram.results.result import Result
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -58,6 +58,7 @@ from photogram.results.result_files import (
     sheet,
     written,
 )
+from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.tables import TABLES
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.methods import files_of

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from photogram import _photocore
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.network import AdjustedNetwork
-from photogram.show.lines import padded
-from photogram.show.methods import Shown, columns_of, document_of, findings_of, report_of
-from photogram.show.sections import Section, composed, headline, verdict_sections
+from photogram.show.methods import Documented, Judged, findings_of
+from photogram.show.quantity import Quantity, Table, members, of_each, records
 from photogram.show.summary import Brief
 from photogram.statistics.components import Component, Estimate
 from photogram.statistics.findings import Findings, GroupFactor
@@ -19,13 +20,14 @@ from photogram.statistics.findings import Findings, GroupFactor
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.show.page import Document
     from photogram.show.sketch.plot import Plot
 
-__all__ = ["VarianceComponents", "component_lines", "component_sections", "statement", "statement_lines"]
+__all__ = ["VarianceComponents", "components_table", "statement"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VarianceComponents(Shown, Brief):
+class VarianceComponents(Judged, Documented, Brief):
     """Variance components of groups of observations.
 
     Attributes
@@ -70,7 +72,30 @@ class VarianceComponents(Shown, Brief):
 
     def table(self) -> pd.DataFrame:
         """Return the components as a data frame."""
-        return self._table("component")
+        return components_table(self).frame()
+
+    def document(self) -> Document:
+        """Return the document: judgement, what to do first, the components."""
+        from photogram.results.components_document import components_document
+
+        return components_document(self)
+
+    def to_json(self) -> bytes:
+        """Return the components as a JSON document (UTF-8)."""
+        estimate, equality = self.estimate, self.estimate.equality
+        of_equality = ("likelihood_ratio", "degrees_of_freedom", "probability")
+        of_step = ("factors", "squares", "redundancy")
+        return json.to_json(
+            {
+                "program": f"photogram {_photocore.__version__}",
+                "verdict": self.verdict.document(),
+                **members(estimate, "converged", "level", helmert_matrix="matrix"),
+                "messages": [str(message) for message in estimate.messages],
+                "components": records(components_table(self).columns),
+                "all_equal": equality and dict(zip(of_equality, equality, strict=True)),
+                "steps": [dict(zip(of_step, step, strict=True)) for step in estimate.steps],
+            }
+        )
 
 
 @findings_of.register(VarianceComponents)
@@ -102,68 +127,40 @@ def _findings(found: VarianceComponents) -> Findings:
     )
 
 
-@columns_of.register(VarianceComponents)
-def _columns(found: VarianceComponents, what: str) -> dict[str, Any]:
-    """`group`, its sums, `factor` of the variance with its deviation and interval, `held` where it is."""
-    del what
+def components_table(found: VarianceComponents) -> Table:
+    """Return the declared table of the components, estimated and held."""
     rows, reference = found.components, found.estimate.reference
-    return {
-        "group": [each.name for each in rows],
-        "observations": [each.count for each in rows],
-        "redundancy": [each.redundancy for each in rows],
-        "sum_of_squares": [each.squares for each in rows],
-        "factor": [each.factor for each in rows],
-        "sd_factor": [each.sd for each in rows],
-        "least_sd_factor": [each.least_sd for each in rows],
-        "low": [each.interval[0] for each in rows],
-        "high": [each.interval[1] for each in rows],
-        "factor_of_sd": [each.factor_of_sd for each in rows],
-        "factor_to_images": [each.factor / reference for each in rows],
-        "test_value": [each.test_value for each in rows],
-        "probability": [each.probability for each in rows],
-        "significant": [each.significant for each in rows],
-        "held": [each.held for each in rows],
-    }
-
-
-@document_of.register(VarianceComponents)
-def _document(found: VarianceComponents) -> bytes:
-    """Return the components as JSON (UTF-8)."""
-    estimate = found.estimate
-    columns, equality = _columns(found, "component"), estimate.equality
-    rows = zip(*columns.values(), strict=True)
-    of_equality = ("likelihood_ratio", "degrees_of_freedom", "probability")
-    of_step = ("factors", "squares", "redundancy")
-    return json.to_json(
-        {
-            "program": f"photogram {_photocore.__version__}",
-            "verdict": found.verdict.document(),
-            "converged": estimate.converged,
-            "level": estimate.level,
-            "components": [dict(zip(columns, row, strict=True)) for row in rows],
-            "helmert_matrix": estimate.matrix,
-            "all_equal": equality and dict(zip(of_equality, equality, strict=True)),
-            "steps": [dict(zip(of_step, step, strict=True)) for step in estimate.steps],
-            "messages": [str(each) for each in estimate.messages],
-        }
-    )
-
-
-@report_of.register(VarianceComponents)
-def _report(found: VarianceComponents) -> str:
-    """Return the components as text: what to do first."""
-    held = ("Groups that were merged or held", [str(each) for each in found.estimate.messages])
-    return composed(headline("variance components"), [*component_sections(found), held])
-
-
-def component_sections(found: VarianceComponents) -> list[Section]:
-    """Return what a reader wants first, as titled sections: verdict, what to do next, components."""
-    return [*verdict_sections(found.verdict), ("Variance components", statement_lines(found))]
-
-
-def statement_lines(found: VarianceComponents) -> list[str]:
-    """Return what to do, and the components."""
-    return [*statement(found), *component_lines(found)]
+    low, high = np.array([each.interval for each in rows]).reshape(-1, 2).T
+    outcomes = [
+        "held" if each.held else "to be changed" if each.worth_changing else "stands" for each in rows
+    ]
+    held = np.array([bool(each.held) for each in rows], dtype=bool)
+    columns = [
+        of_each(rows, "name", kind="name", name="group", head="Group"),
+        of_each(rows, "count", name="observations", head="Number", decimals=0),
+        of_each(rows, "redundancy", name="redundancy", head="Redundancy", decimals=2),
+        of_each(rows, "squares", name="sum_of_squares", head="Weighted sum of squares", decimals=2),
+        of_each(rows, "factor", name="factor", head="Component", decimals=3),
+        of_each(rows, "sd", name="sd_factor", head="sd", decimals=3),
+        of_each(rows, "least_sd", name="least_sd_factor"),
+        Quantity(low, name="low", member="low", head="From", decimals=3),
+        Quantity(high, name="high", member="high", head="To", decimals=3),
+        of_each(rows, "factor_of_sd", name="factor_of_sd", head="Factor of sd", decimals=3),
+        Quantity(
+            [each.factor / reference for each in rows],
+            name="factor_to_images",
+            member="factor_to_images",
+            head="To images",
+            decimals=3,
+        ),
+        of_each(rows, "test_value", name="test_value"),
+        of_each(rows, "probability", name="probability", head="p", figures=2, seen=~held),
+        of_each(rows, "significant", name="significant"),
+        of_each(rows, "held", kind="name", name="held"),
+        Quantity(outcomes, kind="name", head="Outcome"),
+    ]
+    note = "The interval holds the true component with 95 percent: the factor of the variance."
+    return Table("components", "Components", columns, note)
 
 
 def statement(found: VarianceComponents) -> list[str]:
@@ -192,25 +189,3 @@ def _of_sd(each: Component) -> str:
     if each.factor < 1:
         ends = [1 / end for end in reversed(ends)]
     return f"{ends[0]:.2f} to {ends[1]:.2f}"
-
-
-def component_lines(found: VarianceComponents) -> list[str]:
-    """Write a line for each component: plain numbers, but for the number of observations."""
-    reference = found.estimate.reference
-    columns = ("redundancy", "v P v", "component", "sd", "from", "to", "to images", "factor of sd", "p")
-    head, *names = padded(["group", *(each.name for each in found.components)], 34)
-    lines = [f"{head}{'number':>8}" + "".join(f"{column:>13}" for column in columns)]
-    for name, each in zip(names, found.components, strict=True):
-        parts = (
-            each.redundancy,
-            each.squares,
-            each.factor,
-            each.sd,
-            *each.interval,
-            each.factor / reference,
-            each.factor_of_sd,
-        )
-        cells = "".join(f"{part:>13.3f}" if math.isfinite(part) else f"{'-':>13}" for part in parts)
-        p = f"{each.probability:>13.2g}" if not each.held else f"{'held':>13}"
-        lines.append(f"{name}{each.count:>8}{cells}{p}")
-    return lines

@@ -114,12 +114,10 @@ def courses_table(every: Sequence[Course], linear_unit: str) -> list[Quantity]:
         of_each(every, "trajectory", kind="name", head="Trajectory"),
         Quantity(np.array([axes[k].name for k in of], dtype=object), axes, "name", head="Of", of=of),
         of_each(every, "basis", kind="name", head="Basis"),
-        *(of_each(every, name, head=head, decimals=count, label=name) for name, head, count in numbers),
-        of_each(
-            every, "largest", axes, "deviation", head="Largest correction", figures=4, of=of, label="largest"
-        ),
-        of_each(every, "at", head="At s", decimals=3, label="at"),
-        of_each(every, "tested", head="Largest |w|", decimals=2, label="tested"),
+        *(of_each(every, name, head=head, decimals=count) for name, head, count in numbers),
+        of_each(every, "largest", axes, "deviation", head="Largest correction", figures=4, of=of),
+        of_each(every, "at", head="At s", decimals=3),
+        of_each(every, "tested", head="Largest |w|", decimals=2),
     ]
 
 

@@ -1,65 +1,230 @@
-"""The JSON document of an adjusted block; `docs/json.md` describes it."""
+"""The document of an adjusted block: its report, its page, and its JSON document (`docs/json.md`)."""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from photogram import _photocore
-from photogram.io import json
-from photogram.results.calibration_report import calibration_members
-from photogram.results.features_report import features_document
-from photogram.results.film_report import fiducial_members, film_members, scanner_members
-from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import control, images, iterations, photos, points, stations, terms_of
-from photogram.results.report import problems_of
+from photogram.arguments.types import Floats
+from photogram.network.structuring import structure
+from photogram.results.axes import point_axes
+from photogram.results.camera_sections import calibration_members, cameras_section, gains_section
+from photogram.results.check_points import observed_control
+from photogram.results.courses import POSES, courses_table, notable, notable_courses
+from photogram.results.features_report import features_document, features_section
+from photogram.results.film_report import fiducial_members, film_members, films_section, scanner_members
+from photogram.results.network_document import (
+    drawings,
+    network_document,
+    network_members,
+    problems_of,
+    size_section,
+)
+from photogram.results.network_sections import (
+    beside_section,
+    check_section,
+    control_section,
+    stations_section,
+)
+from photogram.results.network_tables import control, terms_of
 from photogram.results.result import Result
-from photogram.results.tables import camera_parameters, check_points, observations
-from photogram.results.weakest import weakest_photos, weakest_points
-from photogram.show.methods import document_of
-from photogram.show.quantity import Quantities, Quantity, chosen, members, records
+from photogram.results.tables import (
+    camera_parameters,
+    check_points,
+    observations,
+    redundancy_by_kind,
+    unheld,
+    unknowns,
+)
+from photogram.show.cells import unit_written
+from photogram.show.page import Document, Fact, Section, significant
+from photogram.show.quantity import Quantity, Table, chosen, members, named, records
 
 
-@document_of.register(Result)
-def to_json(result: Result) -> bytes:
-    """Return the whole result as JSON (UTF-8). What is not a number is null."""
-    return json.to_json(block_members(result))
+@np.errstate(over="ignore", invalid="ignore")  # what is too large for its unit is infinite
+def block_document(result: Result) -> Document:
+    """Return the document of an adjusted block."""
+    pictures, (about, figures) = drawings(result), bandwidths(result)
+    given = [
+        control_section(result),
+        check_section(result),
+        beside_section(result),
+        stations_section(result),
+        cameras_section(result, [pictures[name] for name in ("correlations", "distortion")]),
+        films_section(result, pictures["films"]),
+        _unknowns_section(result),
+    ]
+    return network_document(
+        result,
+        "Adjustment of a block of photos",
+        _size_section(result),
+        given,
+        photos=len(result.block.photo_ids),
+        title=result.block.title,
+        more=_accuracy(result),
+        redundancy=_redundancy_tables(result),
+        beside=[features_section(result.features, pictures["features"])],
+        datum=_datum(result),
+        poses=POSES if result.block.timed else "",
+        details=[gains_section(result)],
+        work=[Fact(f"Bandwidth {name}", value, note=about) for name, value in figures],
+    )
 
 
-def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> dict[str, Any]:
-    """Return what the documents of all networks have, with more members of photos."""
-    summary = result.reliability_summary
-    called = int if terms_of(result).identity == "number" else str
-    weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
-    of_photos = Quantity(result.photo_covariances, member="covariance")
-    of_points = Quantity(result.point_covariances[result.used_points], member="covariance")
-    return {
-        "program": f"photogram {_photocore.__version__}",
-        "status": result.status,
-        "messages": [str(message) for message in result.messages],
-        "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
-        "degrees_of_freedom": result.degrees_of_freedom,
-        "variance_of_unit_weight": result.variance_of_unit_weight,
-        "covariance_scale": result.covariance_scale,
-        "verdict": result.verdict.document(),
-        "reliability": summary.document() if summary else None,
-        "iterations": records(iterations(result))[1:],
-        "photos": records([*photos(result), *photo_members, of_photos]),
-        "points": records([*points(result), of_points]),
-        "observations": records([*images(result), *([weights] if result.loss else [])]),
-        "control": records(control(result)),
-        "stations": records(stations(result)),
-        "weakest": {
-            "points": [vars(each) | {"point": called(each.point)} for each in weakest_points(result)],
-            "photos": [vars(each) | {"photo": called(each.photo)} for each in weakest_photos(result)],
-        },
-        "ordering": result.ordering,
-        "predictions": dict(result.predictions),
-        "operations": dict(result.operations),
-        "seconds": dict(result.seconds),
-    }
+def _accuracy(result: Result) -> list[Fact]:
+    """Return what check points say, and standard deviations of points."""
+    axes, found = point_axes(result.block), list[Fact]()
+    factors = np.array([axis.factor for axis in axes])
+    check = result.used_points & (result.point_kinds == "check")
+    if check.any():
+        columns = (result.point_differences[check] * factors).T
+        worst = zip(axes, (rms_of(column[np.isfinite(column)]) for column in columns), strict=True)
+        note = ", ".join(f"{axis.name} {significant(each, 2)}" for axis, each in worst if math.isfinite(each))
+        unit = "" if result.geographic else f" {axes[2].small}"
+        found.append(Fact("Check points", f"{np.count_nonzero(check)}", note=f"rms {note}{unit}"))
+    height = result.point_sd[result.used_points]
+    known = height[np.isfinite(height).all(axis=1)] * factors
+    if len(known):
+        x, y, z = (significant(float(each), 2) for each in np.median(known, axis=0))
+        units = [unit_written(axis.small) for axis in axes]
+        note = f"{axes[0].name} {x} {units[0]}, {axes[1].name} {y} {units[1]}"
+        found.append(Fact(f"sd of points in {axes[2].name}, median", z, units[2], note))
+    return found
+
+
+def _size_section(result: Result) -> Section:
+    variance, more = result.variance_of_unit_weight, list[Fact]()
+    if result.dropped:
+        more.append(Fact("Points left out", f"{len(result.dropped)}", note=_reasons(result)))
+    value = f"{variance:.6f}" if variance is not None else "undefined"
+    good = [Fact("Variance of unit weight", value, note=_BASIS[result.unit_variance])]
+    good += _sums(result)
+    tables = {"control points": control, "unheld components": unheld, "check points": check_points}
+    for what, table in tables.items():
+        differences = named(table(result), "d").values
+        values = [rms_of(column[np.isfinite(column)]) for column in differences.T]
+        if np.isfinite(differences).any():
+            good.append(Fact(f"rms of {what}", ", ".join(_differences(result, values))))
+    return size_section(result, size_of(result), more, good)
+
+
+def _sums(result: Result) -> list[Fact]:
+    """Return the weighted sums of squares by group."""
+    sums = result.sums_of_squares
+    groups = {"photos": sums.camera, "control": sums.ground, "images": sums.plates}
+    groups |= {kind: observed.sum_of_squares for kind, observed in result.kinds.items()}
+    groups["total"] = sums.total
+    return [Fact(f"Weighted sum of squares, {name}", f"{value:.6f}") for name, value in groups.items()]
+
+
+_BASIS = {
+    "free": "rule of 1987: the weights of photos and cameras do not count",
+    "constrained": "of all weighted values, those of photos and cameras among them",
+    "unity": "set to 1",
+    "redundancy": "based on redundancy numbers",
+}
+
+
+def _reasons(result: Result) -> str:
+    counts = Counter(result.dropped.values())
+    return ", ".join(f"{count}: {reason}" for reason, count in counts.items())
+
+
+def _redundancy_tables(result: Result) -> list[Table]:
+    note = (
+        "The factor is the root of sum over redundancy: what standard deviations of the kind would have to be"
+        " multiplied by to agree, if the others are right."
+    )
+    columns = redundancy_by_kind(result)
+    table = Table("redundancy-by-kind", "Redundancy by kind of observation", columns, note)
+    return [table] if len(columns[0].values) else []
+
+
+def _unknowns_section(result: Result) -> Section:
+    if not result.unknowns:
+        return Section("unknowns", "Common unknowns", [])
+    intro = (
+        "Lever arms, boresights, sensors, levels, planes and lines that several observations have in common;"
+        " clocks, readout times and coefficients of trajectories."
+    )
+    (shown, note), (every, said) = notable(result.unknowns), notable_courses(result)
+    columns = unknowns(shown)
+    tables = [Table("unknowns", "Common unknowns", columns, _sentence(note))] if shown else []
+    if every:
+        said = said or "The largest correction in the span of the table, and its time."
+        columns = courses_table(every, result.block.linear_unit)
+        tables.append(Table("trajectories", "Trajectories", columns, _sentence(said)))
+    return Section("unknowns", "Common unknowns", tables, intro)
+
+
+def _sentence(said: str) -> str:
+    return f"{said[:1].upper()}{said[1:].removesuffix('.')}." if said else ""
+
+
+def _datum(result: Result) -> str:
+    if result.datum.is_chosen:
+        return f"Datum: {result.datum}."
+    return f"Coordinates and standard deviations refer to the datum that is {result.datum}."
+
+
+def size_of(result: Result) -> list[tuple[str, str]]:
+    """Return what the block consists of: names and what there is."""
+    block = result.block
+    kinds = result.point_kinds[result.used_points].tolist()
+    held = np.isfinite(block.point_sd)
+    held[observed_control(block)] = True
+    held &= result.used_points[:, np.newaxis]
+    counts = zip(point_axes(block), held.sum(axis=0), strict=True)
+    return [
+        ("photos", f"{len(block.photo_ids)}"),
+        *([("cameras", f"{len(block.cameras)}")] if block.cameras else []),
+        ("points", ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("pass", "control", "check"))),
+        ("held components of control", ", ".join(f"{axis.name} {count}" for axis, count in counts)),
+        ("image points", f"{int(result.used_images.sum())} used of {len(block.image_xy)}"),
+        *(
+            (f"observations, {each.kind}", f"{each.used} used of {len(each.rows)}")
+            for each in result.kinds.values()
+        ),
+        ("object space", "geographic" if block.geographic else "rectangular"),
+        ("rotation angles", "photo-to-ground" if block.photo_to_ground else "ground-to-photo"),
+        ("datum", str(result.datum)),
+        ("refraction", block.refraction.describe(block.linear_unit) if block.refraction else "none"),
+    ]
+
+
+def bandwidths(result: Result) -> tuple[str, list[tuple[str, str]]]:
+    """Return the bandwidths that the 1987 program would have needed, in the order of the input and as chosen.
+
+    A sentence, and names with values.
+    """
+    images = result.block.image_photos, result.block.image_points
+    figures = []
+    for name, order in (("of the input", None), ("chosen", result.photo_order)):
+        found = structure(*images, order)
+        value = f"{found.effective_bandwidth} effective, {found.naive_bandwidth} without sharing"
+        figures.append((f"in the order {name}", value))
+    return "bandwidth of the normal equations in sets of three unknowns (GIANT guide, Appendix A)", figures
+
+
+def rms_of(values: Floats) -> float:
+    """Return the root mean square of some values; NaN of none."""
+    return math.sqrt(float(np.mean(values**2))) if values.size else math.nan
+
+
+def _differences(result: Result, values: Iterable[float]) -> list[str]:
+    """Write differences in the components, those that are angles also as lengths."""
+    axes, lengths, unit = point_axes(result.block), terms_of(result).lengths, result.block.linear_unit
+    return [
+        f"{axis.name} {value * axis.factor:.5f} {unit_written(axis.small)}"
+        + (f" ({value * lengths[k]:.4f} {unit})" if lengths is not None and axis.angle else "")
+        for k, (axis, value) in enumerate(zip(axes, values, strict=True))
+        if math.isfinite(value)
+    ]
 
 
 def block_members(result: Result) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What reports and JSON documents say of features."""
+"""Features as a section and as a JSON document."""
 
 from __future__ import annotations
 
@@ -8,26 +8,50 @@ import numpy as np
 
 from photogram.messages import listed
 from photogram.results.features import Feature, Features, Quantity, directions
-from photogram.show.page import decimals_of, fixed, probability_written
+from photogram.show.page import Cell, Column, Drawing, Part, Row, Section, Table, Text, decimals_of, fixed
 from photogram.show.quantity import members
-from photogram.show.sections import Section
 
 SHOWN = 4
 """Points that are named of each feature."""
 
 
-def features_sections(features: Features | None) -> list[Section]:
-    """Return the section of a report, if there are features."""
+def features_section(features: Features | None, picture: Drawing | None = None) -> Section:
+    """Return features with their quantities, and whether their form is more than errors."""
     if not features:
-        return []
-    lines = [f"{'':<26}{'value':>18}{'sd':>16}{'U = k sd':>16}  k = {expansion(features)}"]
+        return Section("features", "Features", [])
+    quantities: list[Row] = []
     for each in features:
-        lines += [f"{each.name}: {through(each)}", *(_line(each, own) for own in each.quantities)]
-        if each.form:
-            p = probability_written(each.probability or 0.0)
-            figures = f"T = {each.statistic:.4g} of {each.freedom}, p {'' if p[0] == '<' else '= '}{p}"
-            lines += [f"  form: {each.form} ({figures})"]
-    return [("Features", [*lines, *(f"{each[:1].upper()}{each[1:]}." for each in features.remarks)])]
+        for k, own in enumerate(each.quantities):
+            numbers = zip(written(each, own), (own.value, own.sd, own.expanded), strict=True)
+            cells = [Cell(text, sorts=number) for text, number in numbers]
+            quantities.append([each.name if k == 0 else "", own.name, *cells, own.unit])
+    columns = [
+        *(Column(head, text=True) for head in ("Feature", "Quantity")),
+        *(Column(head) for head in ("Value", "sd", "U = k sd")),
+        Column("Unit", text=True),
+    ]
+    note = f"Coverage factor k = {expansion(features)}."
+    parts: list[Part] = [Table("Quantities of features", columns, quantities, note)]
+    if tested := [each for each in features if each.statistic is not None]:
+        forms = Table.of(
+            "Whether form is more than errors of points",
+            tested,
+            [
+                (Column("Feature", text=True), lambda each: each.name),
+                (Column("What", text=True), through),
+                (Column("T", figures=4), lambda each: each.statistic),
+                (Column("of", decimals=0), lambda each: each.freedom),
+                (Column("p", figures=2), lambda each: each.probability),
+                (Column("Form", text=True), lambda each: each.form),
+            ],
+        )
+        parts += [forms, *([] if picture is None else [picture])]
+    parts += [Text(each) for each in features.remarks]
+    intro = (
+        "Least-squares features through adjusted points, with what follows from the joint covariance of the"
+        " points. T compares the deviations of the points from the feature with their standard deviations."
+    )
+    return Section("features", "Features", parts, intro)
 
 
 def expansion(features: Features) -> str:
@@ -55,11 +79,6 @@ def written(feature: Feature, quantity: Quantity) -> list[str]:
     alike = [each.sd for each in feature.quantities if each.unit == quantity.unit and each.sd > 0]
     decimals = decimals_of(np.array([min(alike, default=np.nan)]))
     return [fixed(each, decimals) for each in (quantity.value, quantity.sd, quantity.expanded)]
-
-
-def _line(feature: Feature, quantity: Quantity) -> str:
-    value, sd, expanded = written(feature, quantity)
-    return f"  {quantity.name:<24}{value:>18}{sd:>16}{expanded:>16}  {quantity.unit}".rstrip()
 
 
 def features_document(features: Features) -> dict[str, Any]:

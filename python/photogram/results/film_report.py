@@ -1,4 +1,4 @@
-"""What reports and documents say of films, their marks, and scanners."""
+"""Films, their marks and scanners as tables, as a section and as members of JSON documents."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from photogram.network.films import Scanner
 from photogram.network.observations import FILM
 from photogram.results.film_pictures import MarkResiduals, mark_residuals
 from photogram.results.result import Result
-from photogram.show.lines import field, stacked, table_lines
-from photogram.show.quantity import Axis, Quantity, members
+from photogram.show.page import Drawing, Part, Section
+from photogram.show.quantity import Axis, Quantity, Table, members
 
 _UNITS = ("mm", "mm", "rad", "", "", "")
 _SAID = (*(Axis("scale x"), Axis("scale y")), *(Axis.of("between axes", "rad"), Axis.of("rotation", "rad")))
@@ -31,8 +31,8 @@ def film_table(result: Result) -> list[Quantity]:
     ]
     return [
         _photos(result),
-        Quantity(result.film[rows], axes, "value", label="value", head="{}", figures=7),
-        Quantity(result.film_sd[rows], axes, "deviation", label="sd", head="sd {}"),
+        Quantity(result.film[rows], axes, "value", head="{}", figures=7),
+        Quantity(result.film_sd[rows], axes, "deviation", head="sd {}"),
         Quantity(read, head="Marks", decimals=0),
         Quantity([" ".join(lost[row]) for row in rows], kind="name", name="lost", head="Lost"),
         Quantity(np.where(np.isfinite(largest), largest, np.nan), head="Largest T", decimals=2),
@@ -79,10 +79,10 @@ def form_table(result: Result) -> list[Quantity]:
     matrices, sd = (np.array([getattr(each, what) for each in forms]) for what in ("matrix", "matrix_sd"))
     return [
         _photos(result),
-        Quantity(matrices.reshape(-1, 6), matrix, "value", label="a", head="{}", figures=9),
-        Quantity(sd.reshape(-1, 6), matrix, "deviation", label="sd", head="sd {}"),
-        Quantity(said.reshape(-1, 4), _SAID, "value", label="value", head="{}", decimals=7),
-        Quantity(said_sd.reshape(-1, 4), _SAID, "deviation", label="sd", head="sd {}"),
+        Quantity(matrices.reshape(-1, 6), matrix, "value", head="{}", figures=9),
+        Quantity(sd.reshape(-1, 6), matrix, "deviation", head="sd {}"),
+        Quantity(said.reshape(-1, 4), _SAID, "value", head="{}", decimals=7),
+        Quantity(said_sd.reshape(-1, 4), _SAID, "deviation", head="sd {}"),
     ]
 
 
@@ -127,42 +127,41 @@ def scanner_table(result: Result) -> list[Quantity]:
     )
     return [
         Quantity([each.name for each in every], kind="name", head="Scanner"),
-        Quantity(values, _DEVICE, "value", label="value", head="{}", decimals=8),
-        Quantity(changes, _DEVICE, "difference", label="change", head="d {}"),
-        Quantity(sd, _DEVICE, "deviation", label="sd", head="sd {}"),
+        Quantity(values, _DEVICE, "value", head="{}", decimals=8),
+        Quantity(changes, _DEVICE, "difference", head="d {}"),
+        Quantity(sd, _DEVICE, "deviation", head="sd {}"),
     ]
 
 
-def film_lines(result: Result) -> list[str]:
-    """Write the films of photos, their forms of six numbers, the marks of cameras, and scanners."""
-    photos, values, sd, marks, lost, largest = film_table(result)
-    if not len(photos.values):
-        return []
-    first = [*field(marks, 8, ".0f", "marks"), *field(largest, 10, ".2f", "largest T")]
-    first += field(lost, 0, head="lost", gap="  ")
-    films = stacked(photos, "photo", [(values, ".7f"), (sd, ".7f")], first)
-    _, matrix, matrix_sd, said, said_sd = form_table(result)
-    forms = stacked(photos, "photo", [(matrix, ".7f"), (matrix_sd, ".7f")])
-    scales = stacked(photos, "photo", [(said, ".7f"), (said_sd, ".7f")])
-    every, *device = scanner_table(result)
-    return [
-        *(line.rstrip() for line in films),
-        *("", "reading = a0 + a1 x + a2 y, x and y in the frame of the marks (mm)", *forms),
-        *("", "mm of the film in a mm of the camera; angle between the axes less 90 degrees", *scales),
-        *("", "certificate and adjusted; mean residuals of readings in the frame of the camera"),
-        *_mark_lines(result),
-        *("", *stacked(every, "scanner", [(each, ".8f") for each in device])),
+def films_section(result: Result, drawing: Drawing) -> Section:
+    """Return the section of films, with the picture of marks and patterns; empty without films."""
+    if not result.films:
+        return Section("films", "Film and fiducials", [])
+    intro = (
+        "Where films lay and how their size has changed, the form of six numbers that other programs have,"
+        " and marks of cameras: what a certificate was moved by, and what their readings leave."
+    )
+    form = (
+        "reading = a0 + a1 x + a2 y, x and y in the frame of the marks (mm); the scanner is errorless in"
+        " standard deviations."
+    )
+    scales = (
+        "Scales are mm of the film in a mm of the camera; between axes is the angle between their images less"
+        " 90 degrees."
+    )
+    photos, *rest = form_table(result)
+    numbers, said = rest[:2], rest[2:]
+    lost = "Lost are marks that were read on other photos. T is that of both coordinates of a reading."
+    marks = "Mean residuals are in the frame of the camera, of all photos."
+    parts: list[Part] = [
+        Table("films", "Films", film_table(result), lost),
+        Table("film-forms", "The same as six numbers", [photos, *numbers], form),
+        Table("film-scales", "Scales, angle between the axes, rotation", [photos, *said], scales),
+        drawing,
+        Table("fiducials", "Fiducial marks", mark_table(result), marks),
+        Table("scanners", "Scanners", scanner_table(result)),
     ]
-
-
-def _mark_lines(result: Result) -> list[str]:
-    names, photos, given, _, *numbers = mark_table(result)
-    width = max([20, *(len(name) + 2 for name in names.values)])
-    heads = ("{name} {unit}", "d {name} {unit}", "sd {name} {unit}", "mean v{name} {unit}")
-    forms = zip([given, *numbers], (".4f", *[".2f"] * 3), heads, strict=True)
-    fields = [each for own, form, head in forms for each in field(own, 13, form, head)]
-    first = [*field(names, width, head="fiducial"), *field(photos, 7, ".0f", "photos")]
-    return table_lines([*first, *fields])
+    return Section("films", "Film and fiducials", parts, intro)
 
 
 def film_members(result: Result) -> list[dict[str, object]]:

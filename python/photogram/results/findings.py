@@ -15,11 +15,11 @@ from photogram.results.fixed_tests import fall_by_lens, held_tested, how_to_cali
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import KINDS, OBSERVATION
 from photogram.results.observation_kinds import kind_words
-from photogram.results.observation_rows import tested_singly
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.reliability_summary import ReliabilitySummary
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
+from photogram.results.tested_observations import tested_singly
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE

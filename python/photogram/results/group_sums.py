@@ -30,8 +30,9 @@ from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.lines import padded
-from photogram.show.methods import Shown, Way, columns_of, report_of
+from photogram.show.methods import Documented, Way
+from photogram.show.page import Document, Section
+from photogram.show.quantity import Quantity, Table, of_each
 from photogram.show.summary import Brief
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
@@ -125,7 +126,7 @@ class GroupSum:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class GroupSums(Shown, Brief):
+class GroupSums(Documented, Brief):
     """Groups of the observations of an adjusted network, with their tests.
 
     A group is judged after gross errors are out, and jointly with the others by variance components: its sum
@@ -156,50 +157,37 @@ class GroupSums(Shown, Brief):
                 return each
         raise KeyError(name)
 
+    def groups_table(self) -> Table:
+        """Return the declared table: sums, factors of standard deviations, probabilities of sums."""
+        groups, tests = self.groups, [each.test for each in self.groups]
+        sides = [
+            (math.nan, math.nan) if test is None else (test.probability_below, test.probability_above)
+            for test in tests
+        ]
+        low, high = np.reshape(sides, (-1, 2)).T
+        columns = [
+            of_each(groups, "name", kind="name", name="group", head="Group"),
+            of_each(groups, "count", name="observations", head="Number", decimals=0),
+            of_each(groups, "redundancy", name="redundancy", head="Redundancy", decimals=2),
+            of_each(groups, "squares", name="sum_of_squares", head="Weighted sum of squares", decimals=2),
+            of_each(groups, "spread", name="spread"),
+            of_each(groups, "freedom", name="degrees_of_freedom"),
+            of_each(groups, "factor", name="factor", head="Factor of sd", decimals=3),
+            Quantity(low, name="probability_below", member="probability_below", head="p low", figures=2),
+            Quantity(high, name="probability_above", member="probability_above", head="p high", figures=2),
+        ]
+        tested = sum(test is not None for test in tests)
+        names = ", ".join(each.name for each in self.rejected) or "none"
+        note = f"Beyond their limits, of {tested} tested at {100 * self.level:g} percent together: {names}."
+        return Table("groups", "Groups of observations", columns, note)
+
     def table(self) -> pd.DataFrame:
         """Return the groups as a data frame."""
-        return self._table("group")
+        return self.groups_table().frame()
 
-
-@columns_of.register(GroupSums)
-def _columns(sums: GroupSums, what: str) -> dict[str, Any]:
-    """`group`, its sums, `factor` of its standard deviations, probabilities of as low and as high a sum."""
-    del what
-    tests = [each.test for each in sums.groups]
-    return {
-        "group": [each.name for each in sums.groups],
-        "observations": [each.count for each in sums.groups],
-        "redundancy": [each.redundancy for each in sums.groups],
-        "sum_of_squares": [each.squares for each in sums.groups],
-        "spread": [each.spread for each in sums.groups],
-        "degrees_of_freedom": [each.freedom for each in sums.groups],
-        "factor": [each.factor for each in sums.groups],
-        "probability_below": [math.nan if test is None else test.probability_below for test in tests],
-        "probability_above": [math.nan if test is None else test.probability_above for test in tests],
-    }
-
-
-@report_of.register(GroupSums)
-def _report(sums: GroupSums) -> str:
-    """Return the groups as lines of text."""
-    columns = (("redundancy", 12), ("v P v", 12), ("factor of sd", 14), ("p low", 10), ("p high", 10))
-    head, *names = padded(["group", *(each.name for each in sums.groups)], 34)
-    lines = [f"{head}{'number':>8}" + "".join(f"{column:>{width}}" for column, width in columns)]
-    for name, each in zip(names, sums.groups, strict=True):
-        test = each.test
-        tests = (
-            f"{'not tested':>20}"
-            if test is None
-            else f"{test.probability_below:>10.2g}{test.probability_above:>10.2g}"
-        )
-        lines.append(
-            f"{name}{each.count:>8}{each.redundancy:>12.2f}{each.squares:>12.2f}{each.factor:>14.3f}{tests}"
-        )
-    found = sums.rejected
-    tested = sum(each.test is not None for each in sums.groups)
-    said = "none" if not found else ", ".join(each.name for each in found)
-    lines.append(f"beyond their limits, of {tested} tested at {100 * sums.level:g} percent together: {said}")
-    return "\n".join(lines) + "\n"
+    def document(self) -> Document:
+        """Return the document: the table of groups."""
+        return Document("Groups of observations", "", [], [], [], [Section.of(self.groups_table())])
 
 
 class Left:

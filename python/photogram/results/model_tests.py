@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,8 +33,9 @@ from photogram.results.distortion import INTERIOR, rows_of_images
 from photogram.results.group_sums import factored
 from photogram.results.result import Result
 from photogram.results.scores import quadratic, score
-from photogram.show.lines import padded
-from photogram.show.methods import Shown, columns_of, report_of
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Remarks, Section
+from photogram.show.quantity import Table, of_each
 from photogram.show.summary import Brief
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ class Model:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Shown, Brief):
+class Comparison(Documented, Brief):
     """Models of the same observations side by side.
 
     Attributes
@@ -154,39 +155,30 @@ class Comparison(Shown, Brief):
 
     def table(self) -> pd.DataFrame:
         """Return the models as a data frame."""
-        return self._table("model")
+        return self.models_table().frame()
 
+    def models_table(self) -> Table:
+        """Return the declared table of the models, the best first."""
+        columns = [
+            of_each(self.models, "name", kind="name", name="model", head="Model"),
+            of_each(
+                self.models, "squares", name="sum_of_squares", head="Weighted sum of squares", decimals=3
+            ),
+            of_each(self.models, "freedom", name="degrees_of_freedom", head="Degrees of freedom", decimals=0),
+            of_each(self.models, "parameters", name="parameters", head="Parameters", decimals=0),
+            of_each(self.models, "bic", name="bic", head="BIC", decimals=2),
+            of_each(self.models, "checks", name="rms_check", head="rms of checks", figures=5),
+        ]
+        return Table("models", "Models", columns, self.statement())
 
-@columns_of.register(Comparison)
-def _columns(found: Comparison, what: str) -> dict[str, Any]:
-    """`model`, its sum of squares, degrees of freedom, parameters, BIC, check points."""
-    del what
-    return {
-        "model": [each.name for each in found.models],
-        "sum_of_squares": [each.squares for each in found.models],
-        "degrees_of_freedom": [each.freedom for each in found.models],
-        "parameters": [each.parameters for each in found.models],
-        "bic": [each.bic for each in found.models],
-        "rms_check": [each.checks for each in found.models],
-    }
-
-
-@report_of.register(Comparison)
-def _report(found: Comparison) -> str:
-    """Return the models as lines of text, the best first."""
-    heads = ("v P v", "freedom", "parameters", "BIC", "rms of checks")
-    head, *names = padded(["model", *(each.name for each in found.models)], 24)
-    lines = [found.statement(), head + "".join(f"{head:>15}" for head in heads)]
-    for name, each in zip(names, found.models, strict=True):
-        checks = f"{each.checks:>15.5g}" if math.isfinite(each.checks) else f"{'-':>15}"
-        lines.append(
-            f"{name}{each.squares:>15.3f}{each.freedom:>15}{each.parameters:>15}{each.bic:>15.2f}{checks}"
-        )
-    lines += [
-        f"{small} within {large}: T {value:.3f} with {dimension}, probability {probability:.2g}"
-        for small, large, value, dimension, probability in found.nested
-    ]
-    return "\n".join(lines) + "\n"
+    def document(self) -> Document:
+        """Return the document: the models, and tests of each against larger ones."""
+        nested = [
+            f"{small} within {large}: T {value:.3f} with {dimension}, probability {probability:.2g}"
+            for small, large, value, dimension, probability in self.nested
+        ]
+        sections = [Section.of(self.models_table()), Section("nested", "Nested models", [Remarks(nested)])]
+        return Document("Models of the same observations", "", [], [], [], sections)
 
 
 def terms_test(result: Result, names: Sequence[str], *, camera: str | None = None) -> TermsTest:

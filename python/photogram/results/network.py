@@ -18,6 +18,7 @@ from photogram import _photocore
 from photogram.arguments.arrays import finite_rows, freeze_fields, standard_deviations
 from photogram.arguments.equality import Valued
 from photogram.arguments.types import Floats, Indices
+from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, fields
 from photogram.messages import Message
 from photogram.network.core_arrays import CoreOptions, core_network
@@ -25,7 +26,7 @@ from photogram.network.unadjusted import Given
 from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
 from photogram.results.selection import Adjusted, Selection
-from photogram.show.methods import Shown, files_of
+from photogram.show.methods import Documented, Judged, files_of
 from photogram.show.summary import Brief, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
@@ -81,7 +82,7 @@ class Observed:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class AdjustedNetwork(Valued, Brief, Shown, ABC):
+class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
     """An adjusted network of P photos with k unknowns each, n points and m image points.
 
     All are in the order in which they were given; what was left out of the adjustment is NaN. Residuals are
@@ -194,6 +195,14 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
             rows.append(("", f"and {len(self.messages) - REMARKS} more remarks"))
         rows.append(("see", ".report(), .plot, .photo_table(), .point_table(), .image_table(), .to_json()"))
         return f"Adjusted {self._what}", rows
+
+    @abstractmethod
+    def _members(self) -> dict[str, Any]:
+        """Return the members of the JSON document, without the sections that people read."""
+
+    def to_json(self) -> bytes:
+        """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
+        return json.to_json(self._members())
 
     @property
     @abstractmethod
@@ -448,6 +457,15 @@ class AdjustedNetwork(Valued, Brief, Shown, ABC):
         from photogram.io.writing import write_whole  # what is only adjusted is not written
 
         write_whole({folder / name: content for name, content in files_of(self).items()})
+
+    def _table(self, what: str) -> pd.DataFrame:
+        """Return the table of one kind of thing as a data frame; pandas takes long to import."""
+        import pandas as pd
+
+        from photogram.results.network_tables import TABLES
+        from photogram.show.quantity import frame
+
+        return pd.DataFrame(frame(TABLES[what](self)))
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""

@@ -34,6 +34,8 @@ class Terms:
     of_photos: tuple[Quantity, ...] = ()  # What tables tell first: of photos, of points that took part
     of_points: tuple[Quantity, ...] = ()
     kinds: Iterable[ObservedKind] = ()  # Observations beside images
+    lengths: Floats | None = None  # (3,) of the units of coordinates, where two of them are angles
+    linear_unit: str = ""
     split: bool = False  # Whether JSON documents tell differences of positions from those of attitudes
 
     @property
@@ -109,6 +111,14 @@ def images(result: AdjustedNetwork, rows: Indices | None = None) -> list[Quantit
     ]
 
 
+def plan_deviations(terms: Terms, sd: Floats) -> list[Quantity]:
+    """Return standard deviations (n, 3 or more) in plan as lengths, if coordinates are angles."""
+    if terms.lengths is None:
+        return []
+    axes = tuple(Axis.of(name, terms.linear_unit) for name in ("east", "north"))
+    return [Quantity(sd[:, :2] * terms.lengths[:2], axes, "deviation", head="sd {}", decimals=4)]
+
+
 def iterations(result: AdjustedNetwork) -> list[Quantity]:
     """Return the history, first the start."""
     return iteration_table(result.iterations, result.initial_weighted_sum_of_squares)
@@ -151,7 +161,7 @@ def _observed(
         Quantity(given, axes, "value", head="Given"),
         Quantity(adjusted[rows], axes, "value", head="Adjusted"),
         difference(own.differences, axes, member=members("difference")),
-        deviation(own.sd, axes, member=members("sd"), label="sd", head="sd given", words=_FREE),
+        deviation(own.sd, axes, member=members("sd"), head="sd given", words=_FREE),
         Quantity(sd[rows], axes, "deviation", head="sd adjusted"),
         redundancy(own.redundancy, axes, seen=np.isfinite(own.sd) & (own.sd > 0)),
         test_value(own.tests, axes),
@@ -161,26 +171,26 @@ def _observed(
 def difference(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
     """Return adjusted minus given values."""
     about, head = "adjusted minus given: {}", "Adjusted - given"
-    own = {"name": "d", "member": "difference", "label": "difference", "about": about, "head": head}
+    own = {"name": "d", "member": "difference", "about": about, "head": head}
     return Quantity(values, axes, "difference", **(own | more))
 
 
 def deviation(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
     """Return standard deviations."""
-    own = {"name": "sd", "member": "sd", "label": "sd", "about": "standard deviation: {}", "head": "sd {}"}
+    own = {"name": "sd", "member": "sd", "about": "standard deviation: {}", "head": "sd {}"}
     return Quantity(values, axes, "deviation", **(own | more))
 
 
 def redundancy(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
     """Return redundancy numbers."""
-    own: dict[str, Any] = dict.fromkeys(("name", "member", "label"), "redundancy")
+    own: dict[str, Any] = dict.fromkeys(("name", "member"), "redundancy")
     about = "redundancy number: {}"
     return Quantity(values, axes, **own, about=about, head="Redundancy", decimals=3, **more)
 
 
 def test_value(values: Floats, axes: tuple[Axis, ...], **more: Any) -> Quantity:
     """Return residuals over their standard deviations, a priori unit weight."""
-    own: dict[str, Any] = dict.fromkeys(("name", "member", "label"), "standardized")
+    own: dict[str, Any] = dict.fromkeys(("name", "member"), "standardized")
     about = "residual over its standard deviation, a priori unit weight: {}"
     return Quantity(values, axes, **own, about=about, head="Test value w", decimals=2, **more)
 

@@ -30,8 +30,8 @@ from photogram.results.features import Features, directions
 from photogram.results.film_pictures import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints
 from photogram.results.network import AdjustedNetwork
-from photogram.results.observation_rows import outlying, tested_observations
 from photogram.results.result import Result
+from photogram.results.tested_observations import outlying, tested_observations
 from photogram.statistics.findings import Observations
 
 

@@ -27,7 +27,9 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances
 from photogram.results.network_trial import NetworkTrial
 from photogram.results.selection import Selection
-from photogram.show.lines import padded
+from photogram.show.cells import written
+from photogram.show.forms import table_text
+from photogram.show.quantity import Quantity, Table, members, records
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Standing, Suspects, Tests
@@ -330,68 +332,60 @@ class Reliability:
         """Return (M,) the group of each row."""
         return np.repeat(np.arange(len(self.suspects)), np.diff(self.suspects.row_starts))
 
-    def table(self) -> pd.DataFrame:
-        """Return a data frame, a row for each observation, with its unit."""
-        import pandas as pd
-
+    def observations(self) -> Table:
+        """Return the declared table of all observations; people see the worst of each kind."""
         suspects, groups = self.suspects, self.row_groups()
         rows = range(len(groups))
-        names = [str(suspects.name(group)) for group in range(len(suspects))]
-        return pd.DataFrame(
-            {
-                "kind": [suspects.kind(int(group)) for group in groups],
-                "name": [names[int(group)] for group in groups],
-                "component": [suspects.row_name(row) for row in rows],
-                "unit": [suspects.unit(row) for row in rows],
-                "sd": self.sd,
-                "redundancy": self.redundancy,
-                "detectable": self.detectable,
-                "external_sd": self.external,
-                "group_T": self.tests.statistic[groups],
-                "group_dimension": self.tests.rank[groups],
-                "group_error": self.tests.error,
-                "group_error_sd": self.tests.error_sd,
-                "group_detectable_sd": self.group_detectable[groups],
-                "group_external_sd": self.group_external[groups],
-            }
+        names = np.array([str(suspects.name(group)) for group in range(len(suspects))], dtype=object)
+
+        def column(name: str, values: Any, head: str = "", **more: Any) -> Quantity:
+            return Quantity(values, name=name, member=name, head=head, **more)
+
+        columns = [
+            column("kind", [suspects.kind(int(group)) for group in groups], "Kind", kind="name"),
+            column("name", names[groups], "Worst of it", kind="name"),
+            column("component", [suspects.row_name(row) for row in rows], "Component", kind="name"),
+            column("unit", [suspects.unit(row) for row in rows], "Unit", kind="name"),
+            column("sd", self.sd),
+            column("redundancy", self.redundancy, "Redundancy", decimals=3),
+            column("detectable", self.detectable, "Detectable", figures=4),
+            column("external_sd", self.external, "Moves up to, sd", decimals=2),
+            column("group_T", self.tests.statistic[groups]),
+            column("group_dimension", self.tests.rank[groups]),
+            column("group_error", self.tests.error),
+            column("group_error_sd", self.tests.error_sd),
+            column("group_detectable_sd", self.group_detectable[groups]),
+            column("group_external_sd", self.group_external[groups]),
+        ]
+        weight = "known" if self.known else f"estimated with {self.standing.degrees_of_freedom} degrees"
+        note = (
+            f"Errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
+            f" {self.level:g}, unit weight {weight}."
         )
+        if count := int(self.untestable.sum()):
+            first = ", ".join(names[np.flatnonzero(self.untestable)[:3]])
+            note += f" {count} groups are checked by no other observation, such as {first}."
+        testable, kinds = self.redundancy > TESTABLE, suspects.kinds[groups]
+        of_kinds = [testable & (kinds == kind) for kind in range(len(suspects.kind_names))]
+        worst = [int(np.where(own, self.external, -math.inf).argmax()) for own in of_kinds if own.any()]
+        shown = np.array(worst, dtype=np.int64)
+        return Table("observations", "Reliability of observations", columns, note, shown=shown)
+
+    def table(self) -> pd.DataFrame:
+        """Return a data frame, a row for each observation, with its unit."""
+        return self.observations().frame()
 
     def lines(self) -> list[str]:
         """Return lines for a report: of every kind the observation whose undetected error does most."""
-        weight = "known" if self.known else f"estimated with {self.standing.degrees_of_freedom} degrees"
-        lines = [
-            f"errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
-            f" {self.level:g}, unit weight {weight}",
-        ]
-        rows = [("kind", "worst of it", f"{'redundancy':>11}{'detectable':>20}{'moves up to sd':>15}")]
-        groups = self.row_groups()
-        testable = self.redundancy > TESTABLE
-        for kind, name in enumerate(self.suspects.kind_names):
-            own = testable & (self.suspects.kinds[groups] == kind)
-            if not own.any():
-                continue
-            row = int(np.where(own, self.external, -math.inf).argmax())
-            what = f"{self.suspects.row_name(row)} of {self.suspects.name(int(groups[row]))}"
-            size = f"{self.detectable[row]:.4g} {self.suspects.unit(row)}"
-            numbers = f"{self.redundancy[row]:>11.3f}{size:>20}{self.external[row]:>15.2f}"
-            rows.append((name, what, numbers))
-        kinds, worst, figures = zip(*rows, strict=True)
-        lines += map("".join, zip(padded(kinds, 12), padded(worst, 44), figures, strict=True))
-        count = int(self.untestable.sum())
-        if count:
-            first = ", ".join(
-                str(self.suspects.name(each)) for each in np.flatnonzero(self.untestable)[:3].tolist()
-            )
-            lines.append(f"{count} groups are checked by no other observation, such as {first}")
-        return lines
+        table = written(self.observations())
+        return [table.note, *table_text(table)]
 
     def document(self) -> dict[str, Any]:
         """Return what JSON documents have: every row with its unit."""
         return {
-            "level": self.level,
-            "power": self.power,
+            **members(self, "level", "power"),
             "unit_weight": "known" if self.known else "unknown",
-            "observations": self.table().to_dict(orient="records"),
+            "observations": records(self.observations().columns),
         }
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.lazy_dataclasses import asdict, dataclass
+from photogram.lazy_dataclasses import dataclass
 from photogram.results.reliability import Inseparable, Reliability
-from photogram.show.lines import padded
+from photogram.show.page import Part, Remarks
+from photogram.show.quantity import Quantity, Table, members, of_each, records
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.snooping.suspects import Suspects, Tests
 
@@ -128,68 +129,72 @@ class ReliabilitySummary:
         """(G,) which groups have a direction whose errors show notably in their own residuals."""
         return self.tests.testable(self.suspects.row_starts)
 
+    def kinds_table(self) -> Table:
+        """Return the declared table of the kinds of observations."""
+        mean = [each.redundancy / max(each.components, 1) for each in self.kinds]
+        columns = [
+            of_each(self.kinds, "kind", kind="name", head="Kind"),
+            of_each(self.kinds, "groups", head="Groups", decimals=0),
+            of_each(self.kinds, "components", head="Components", decimals=0),
+            of_each(self.kinds, "redundancy", head="Redundancy", decimals=3),
+            Quantity(mean, head="Mean", decimals=3),
+            of_each(self.kinds, "unchecked", head="Unchecked", decimals=0),
+            of_each(self.kinds, "one_sided", head="One-sided", decimals=0),
+        ]
+        note = (
+            "No other observation checks the unchecked groups. An error of a one-sided group shows in no"
+            " residual if it has some direction."
+        )
+        return Table("reliability-kinds", "Redundancy of groups of observations", columns, note)
+
+    def weakest_table(self, unit: str = "") -> Table:
+        """Return the declared table of the weakest observations; `unit` is that of the object space."""
+        heads = {"redundancy": "Least redundancy", "detectable_sd": "Detectable error, sd"}
+        heads["external_sd"] = "Moves up to, sd"
+        columns = [
+            of_each(self.weakest, "kind", kind="name", name="kind"),
+            of_each(self.weakest, "name", kind="name", name="name", head="Group"),
+            *(
+                of_each(self.weakest, name, name=name, head=head, decimals=3 if name == "redundancy" else 2)
+                for name, head in heads.items()
+            ),
+            of_each(
+                self.weakest, "own_point", name="own_point", head=f"Own point {unit}".rstrip(), decimals=4
+            ),
+        ]
+        about = (
+            f"Tests of the level {self.level:g} find the detectable errors in {100 * self.power:.0f} of 100"
+            f" cases, unit weight {'known' if self.known else 'estimated'}. They are the largest."
+        )
+        return Table("reliability-weakest", "Largest undetected errors", columns, about)
+
     def table(self) -> pd.DataFrame:
         """Return the weakest observations as a data frame."""
-        import pandas as pd
+        return self.weakest_table().frame()
 
-        columns = list(WeakObservation.__annotations__)
-        return pd.DataFrame([asdict(each) for each in self.weakest], columns=columns)
-
-    def lines(self, unit: str) -> list[str]:
-        """Return the section of a report; `unit` is that of the object space."""
-        weight = "known" if self.known else "estimated"
-        head, *names = padded(["kind", *(each.kind for each in self.kinds)], 16)
-        lines = [
-            f"{head}{'groups':>10}{'components':>12}{'redundancy':>12}{'mean':>8}{'unchecked':>11}"
-            f"{'one-sided':>11}"
-        ]
-        lines += [
-            f"{name}{each.groups:>10}{each.components:>12}{each.redundancy:>12.3f}"
-            f"{each.redundancy / max(each.components, 1):>8.3f}{each.unchecked:>11}{each.one_sided:>11}"
-            for name, each in zip(names, self.kinds, strict=True)
-        ]
-        head, *names = padded(["group", *(each.name for each in self.weakest)], 44)
-        lines += [
-            "",
-            f"errors that are found in {100 * self.power:.0f} of 100 cases by tests of the level"
-            f" {self.level:g}, unit weight {weight}; what does most when it is not found:",
-            f"{head}{'least redundancy':>17}{'detectable sd':>15}{'moves up to sd':>16}"
-            f"{f'own point {unit}'.rstrip():>18}",
-        ]
-        lines += [
-            f"{name}{each.redundancy:>17.3f}{each.detectable_sd:>15.2f}{each.external_sd:>16.2f}"
-            f"{f'{each.own_point:.4f}' if math.isfinite(each.own_point) else '-':>18}"
-            for name, each in zip(names, self.weakest, strict=True)
-        ]
-        lines += ["", *self._pair_lines()]
-        return lines
-
-    def _pair_lines(self) -> list[str]:
-        lines = []
+    def parts(self, unit: str) -> list[Part]:
+        """Return the parts of a section; `unit` is that of the object space."""
+        sentences = []
         if self.two_rays:
-            lines.append(
+            sentences.append(
                 f"{self.two_rays} points stand on two photos: which of their images is wrong nothing tells"
             )
         if self.pairs:
             more = self.pairs_found - len(self.pairs)
-            lines.append("on other points cannot be told apart:")
-            lines += [f"  {pair}" for pair in self.pairs]
-            lines += [f"  and {more} more"] if more > 0 else []
-        return lines or ["all observations of a point can be told apart"]
+            sentences.append("on other points cannot be told apart:")
+            sentences += [*map(str, self.pairs), *([f"and {more} more"] if more > 0 else [])]
+        sentences = sentences or ["all observations of a point can be told apart"]
+        return [self.kinds_table(), self.weakest_table(unit), Remarks(sentences)]
 
     def document(self) -> dict[str, Any]:
         """Return the member `reliability` of JSON documents."""
         return {
-            "level": self.level,
-            "power": self.power,
+            **members(self, "level", "power"),
             "unit_weight": "known" if self.known else "unknown",
-            "kinds": [asdict(each) for each in self.kinds],
-            "weakest": [asdict(each) for each in self.weakest],
+            "kinds": records(self.kinds_table().columns),
+            "weakest": records(self.weakest_table().columns),
             "points_on_two_photos": self.two_rays,
-            "inseparable": [
-                {"first": each.first, "second": each.second, "correlation": each.correlation}
-                for each in self.pairs
-            ],
+            "inseparable": [members(pair, "first", "second", "correlation") for pair in self.pairs],
             "inseparable_found": self.pairs_found,
             "points_looked_into": self.points_looked_into,
         }

@@ -33,6 +33,7 @@ from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
 from photogram.results.observation_kinds import ObservedKind, observed_kinds
 from photogram.results.selection import Adjusted, Things, photo_components, point_components
+from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.trajectories import (
     AdjustedTrajectory,
     adjusted_trajectories,
@@ -49,8 +50,9 @@ if TYPE_CHECKING:
 
     from photogram.results.features import Features
     from photogram.results.network_trial import NetworkTrial
+    from photogram.show.page import Document
 
-__all__ = ["Redundancies", "Result", "SumsByKind", "SumsOfSquares"]
+__all__ = ["Result"]
 
 NOT_PHOTOGRAPHED = "not photographed"
 REJECTED = "all its image observations are rejected"
@@ -62,46 +64,6 @@ def dropped_points(block: Block, solution: _photocore.BlockSolution) -> dict[str
     reasons = {block.point_ids[point]: reason for point, reason in solution.dropped}
     rejected = [name for name in block.rejected_points if reasons.get(name) == NOT_PHOTOGRAPHED]
     return reasons | dict.fromkeys(rejected, REJECTED)
-
-
-@dataclass(frozen=True)
-class SumsByKind:
-    """Sums over kinds of observations.
-
-    Attributes
-    ----------
-    camera
-        Of the weighted positions and attitudes of the photos, and of weighted parameters of cameras.
-    ground
-        Of the held components of control.
-    plates
-        Of the image coordinates.
-    observations
-        Of the observations beside images.
-    """
-
-    camera: float
-    ground: float
-    plates: float
-    observations: float = 0.0
-
-    @property
-    def measured(self) -> float:
-        """Of all but photos."""
-        return self.ground + self.plates + self.observations
-
-    @property
-    def total(self) -> float:
-        """All together."""
-        return self.camera + self.ground + self.plates + self.observations
-
-
-class SumsOfSquares(SumsByKind):
-    """Weighted sums of squares."""
-
-
-class Redundancies(SumsByKind):
-    """Sums of redundancy numbers."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -206,6 +168,18 @@ class Result(OnFilm, AdjustedNetwork):
             unknowns=adjusted_unknowns(block, solution, scale),
             dropped=dropped_points(block, solution),
         )
+
+    def document(self) -> Document:
+        """Return the document: judgement, sections, tables."""
+        from photogram.results.document import block_document
+
+        return block_document(self)
+
+    def _members(self) -> dict[str, Any]:
+        """Return the members of the JSON document, without the sections that people read."""
+        from photogram.results.document import block_members
+
+        return block_members(self)
 
     @property
     def _what(self) -> str:
@@ -324,7 +298,12 @@ class Result(OnFilm, AdjustedNetwork):
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return what the result says about one kind of thing; `attrs` name the datum."""
-        table = super()._table(what)
+        import pandas as pd
+
+        from photogram.results.tables import TABLES
+        from photogram.show.quantity import frame
+
+        table = pd.DataFrame(frame(TABLES[what](self)))
         table.attrs["datum"] = str(self.datum)
         return table
 
@@ -393,7 +372,7 @@ class Result(OnFilm, AdjustedNetwork):
         """(n, 3) observed minus adjusted held components; 0 where fixed, NaN where not held."""
         return np.where(np.isfinite(self.block.point_sd), -self.point_differences, np.nan)
 
-    @property
+    @cached_property
     def point_kinds(self) -> NDArray[np.str_]:
         """(n,) `control` with an observed component, `check` with known ones alone, else `pass`."""
         return point_kinds(self.block)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import orjson
+import numpy as np
 
 from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.exchanged_names import Exchange
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Paged
-from photogram.show.quantity import members
-from photogram.show.sections import Section, composed, headline, verdict_sections
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Fact, Facts, Part, Remarks, Section
+from photogram.show.quantity import Quantity, Table, members, of_each, records
 from photogram.show.summary import Brief, Rows, few
 from photogram.statistics.findings import Removed
 from photogram.statistics.limits import global_test
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
     from photogram.statistics.verdict import Verdict
 
-__all__ = ["LN10", "Snooped", "estimated_errors", "recorded", "rivals_of"]
+__all__ = ["Snooped", "log_table", "recorded"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Snooped(Brief, Paged):
+class Snooped(Brief, Documented):
     """A network after data snooping.
 
     Attributes
@@ -99,17 +99,18 @@ class Snooped(Brief, Paged):
         """Return the log as a data frame, a row for each component that was taken out, with its unit."""
         import pandas as pd
 
-        return pd.DataFrame([row for entry in self.log for row in _rows(entry)], columns=list(_COLUMNS))
+        entries = zip(self.log, records(log_table(self.log).columns), strict=True)
+        rows = [row for entry, member in entries for row in _rows(entry, member)]
+        return pd.DataFrame(rows, columns=list(_COLUMNS))
 
-    def document(self) -> dict[str, Any]:
-        """Return the log as it stands in the JSON document."""
+    def members(self) -> dict[str, Any]:
+        """Return the member `snooping` of JSON documents: settings, rounds and the log."""
         outcome, settings = self.outcome, self.settings
         return {
             "family_level" if not settings.fdr else "false_discovery_rate": settings.level,
             "unit_weight": "known" if settings.known else "unknown",
             "distribution": "chi2" if settings.known else "F",
-            "tests": outcome.tests,
-            "robust_factors": outcome.factors,
+            **members(outcome, "tests", "remarks", robust_factors="factors"),
             "before": _standing(outcome.before),
             "after": _standing(outcome.standing),
             "rounds": [
@@ -117,57 +118,72 @@ class Snooped(Brief, Paged):
                 | members(each, "removed", "returned", "remarks")
                 for each in outcome.rounds
             ],
-            "log": [_member(entry) for entry in self.log],
+            "log": records(log_table(self.log).columns),
             "exchanged_names": [
                 members(each, "photos", "points", T_as_named="as_named", T_exchanged="exchanged")
                 | {"dimension": each.dimension}
                 for each in self.exchanged
             ],
-            "remarks": outcome.remarks,
         }
 
     def to_json(self) -> bytes:
         """Return the whole result with its verdict and the log, `snooping`, as one JSON document (UTF-8)."""
-        own = {"snooping": self.document()}
-        return json.to_json({**orjson.loads(self.result.to_json()), **own})
+        return json.to_json({**self.result._members(), "snooping": self.members()})
 
-    def sections(self) -> list[Section]:
-        """Return the log as titled sections of a report."""
-        return [*verdict_sections(self.verdict), *self._own()]
+    def document(self) -> Document:
+        """Return the document of the network without the removed observations, with the log."""
+        network = self.result.document()
+        removed = Fact(
+            "Taken out", f"{len(self.removed)}", note=f"of {len(self.suspects)} groups of observations"
+        )
+        return replace(
+            network, highlights=[removed, *network.highlights], sections=[self._section(), *network.sections]
+        )
 
-    def _own(self) -> list[Section]:
-        lines = [line for entry in self.log for line in _lines(entry)] or ["nothing"]
-        return [("Data snooping", self._head()), ("Taken out, in order", lines)]
-
-    def report(self) -> str:
-        """Return the report: that of the network without what was taken out, then the log of that."""
-        return self.result.report() + "\n" + composed(headline("data snooping"), self._own())
-
-    def _head(self) -> list[str]:
-        outcome, settings = self.outcome, self.settings
-        weight = "known: chi-square tests" if settings.known else "unknown: F tests"
-        rate = "false discovery rate" if settings.fdr else "family level"
-        out = len(self.removed)
-        lines = [
-            f"{'unit weight':<36}{weight}",
-            f"{rate:<36}{settings.level:g} over {outcome.tests} tests, kept in all rounds",
-            f"{'unit variance before':<36}{_said(outcome.before)}",
-            f"{'unit variance after':<36}{_said(outcome.standing)}",
-            f"{'rounds':<36}{len(outcome.rounds)}",
-            f"{'taken out':<36}{out}, returned {sum(e.returned is not None for e in self.log)},"
-            f" suspect but kept {sum(bool(e.kept) for e in self.log)}",
-            *outcome.remarks,
+    def _section(self) -> Section:
+        consequences = [f"{each.name}: {line}" for each in self.log for line in each.consequences]
+        remarks = [
+            *([] if self.log else ["Nothing was taken out."]),
+            *self.outcome.remarks,
             *(f"{each.sentence}: {each.reason}" for each in self.exchanged),
+            *consequences,
         ]
-        if out:
-            lines.append(f"the unit variance holds after removal of {out} groups: it is biased low by little")
-        return lines
+        parts: list[Part] = [Facts("Data snooping", self._facts())]
+        if self.log:
+            parts += [log_table(self.log), _tests_table(self.log)]
+        if remarks:
+            parts.append(Remarks(remarks))
+        intro = "The error of what was taken out is estimated from the rest of the network."
+        return Section("removed", "What was taken out", parts, intro)
+
+    def _facts(self) -> list[Fact]:
+        outcome, settings = self.outcome, self.settings
+        returned = sum(entry.returned is not None for entry in self.log)
+        suspect = sum(bool(entry.kept) for entry in self.log)
+        biased = f"holds after removal of {len(self.removed)} groups: it is biased low by little"
+        return [
+            Fact("Unit weight", "known: chi-square tests" if settings.known else "unknown: F tests"),
+            Fact(
+                "False discovery rate" if settings.fdr else "Family level",
+                f"{settings.level:g}",
+                note=f"over {outcome.tests} tests, kept in all rounds",
+            ),
+            Fact("Unit variance before", _said(outcome.before)),
+            Fact("Unit variance after", _said(outcome.standing), note=biased if self.removed else ""),
+            Fact("Rounds", f"{len(outcome.rounds)}"),
+            Fact(
+                "Taken out", f"{len(self.removed)}", note=f"returned {returned}, suspect but kept {suspect}"
+            ),
+        ]
 
 
 def recorded(found: Snooped) -> Snooped:
     """Return the same with the removed observations as part of its result."""
     record = Removed(
-        [{**_member(entry), "subject": entry.subject} for entry in found.removed],
+        [
+            record | {"subject": entry.subject}
+            for record, entry in zip(records(log_table(found.removed).columns), found.removed, strict=True)
+        ],
         images=found.share_removed("image"),
         control=found.share_removed("control"),
         rivals=found.rivals,
@@ -181,6 +197,7 @@ def recorded(found: Snooped) -> Snooped:
     return replace(found, result=replace(found.result, snooped=record))
 
 
+LN10 = math.log(10)
 _COLUMNS = (
     *("round", "kind", "name", "component", "unit", "error", "error_sd"),
     *("dimension", "first_T", "T", "F", "log10_p", "limit_p", "redundancy"),
@@ -188,11 +205,11 @@ _COLUMNS = (
 )
 
 
-def _rows(entry: Removal) -> list[dict[str, Any]]:
+def _rows(entry: Removal, member: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the rows of the table: what the document has, but for what each component has of its own."""
-    member = _member(entry)
     log_p = member["prediction_log10_p"]
-    common = member | {
+    common = {
+        **member,
         "rivals": rivals_of(entry.rivals, 3),
         "consequences": "; ".join(entry.consequences),
         "prediction_T": math.nan if entry.prediction is None else entry.prediction,
@@ -205,27 +222,73 @@ def _rows(entry: Removal) -> list[dict[str, Any]]:
     return [common | dict(zip(names, row, strict=True)) for row in rows]
 
 
-LN10 = math.log(10)
+def log_table(log: Sequence[Removal]) -> Table:
+    """Return the declared table of removed observations, in order."""
+    log_p = np.array([each.log_probability for each in log], dtype=float)
+    after = [each.prediction_log_probability for each in log]
+    rivals = [
+        [members(one, "name", T="statistic") | members(one, "dimension", "odds") for one in each.rivals]
+        for each in log
+    ]
+    columns = [
+        of_each(log, "round", head="Round", decimals=0),
+        of_each(log, "kind", kind="name"),
+        of_each(log, "name", kind="name", head="What"),
+        Quantity([*map(estimated_errors, log)], kind="name", head="Estimated error"),
+        *(
+            Quantity([getattr(each, name) for each in log], member=member)
+            for name, member in {
+                "components": "components",
+                "units": "units",
+                "error": "estimated_error",
+                "error_sd": "estimated_error_sd",
+                "consequences": "consequences",
+                "prediction": "prediction_T",
+                "prediction_error": "predicted_error",
+            }.items()
+        ),
+        of_each(log, "dimension"),
+        of_each(log, "first_statistic", member="first_T"),
+        of_each(log, "statistic", member="T"),
+        of_each(log, "fisher", member="F"),
+        Quantity(np.exp(log_p), member="p"),
+        Quantity(log_p / LN10, member="log10_p"),
+        of_each(log, "limit", member="limit_p"),
+        of_each(log, "redundancy", head="Redundancy", decimals=3),
+        Quantity(rivals, member="rivals"),
+        Quantity([None if each is None else each / LN10 for each in after], member="prediction_log10_p"),
+        of_each(log, "returned"),
+        Quantity([each.kept or None for each in log], member="kept"),
+        Quantity([rivals_of(each.rivals[:3], 2) for each in log], kind="name", head="Or instead"),
+        Quantity([*map(_state, log)], kind="name", head="Now"),
+    ]
+    return Table("log", "In order", columns)
 
 
-def _member(entry: Removal) -> dict[str, Any]:
-    log_p, after = entry.log_probability, entry.prediction_log_probability
-    return {
-        **members(entry, "round", "kind", "name", "components", "units", "dimension"),
-        **members(entry, first_T="first_statistic", T="statistic", F="fisher"),
-        "p": math.nan if math.isnan(log_p) else math.exp(log_p),
-        "log10_p": log_p / LN10,
-        **members(entry, limit_p="limit", estimated_error="error", estimated_error_sd="error_sd"),
-        "redundancy": entry.redundancy,
-        "rivals": [
-            members(rival, "name", T="statistic") | members(rival, "dimension", "odds")
-            for rival in entry.rivals
-        ],
-        **members(entry, "consequences", prediction_T="prediction"),
-        "prediction_log10_p": None if after is None else after / LN10,
-        **members(entry, predicted_error="prediction_error", returned="returned"),
-        "kept": entry.kept or None,
-    }
+def _tests_table(log: Sequence[Removal]) -> Table:
+    """Return the tests of removed observations, also against the rest of the network."""
+    nothing = math.nan
+    after = [(each.prediction, each.prediction_log_probability) for each in log]
+    columns = [
+        of_each(log, "name", kind="name", head="What"),
+        of_each(log, "first_statistic", head="T at first", decimals=2),
+        of_each(log, "statistic", head="T", decimals=2),
+        of_each(log, "dimension", head="Dimension", decimals=0),
+        of_each(log, "fisher", head="F", decimals=2),
+        Quantity([each.log_probability / LN10 for each in log], head="log10 p", decimals=1),
+        Quantity([math.log10(each.limit) for each in log], head="Limit", decimals=1),
+        Quantity([nothing if t is None else t for t, _ in after], head="T against the rest", decimals=2),
+        Quantity(
+            [nothing if log_p is None else log_p / LN10 for _, log_p in after], head="log10 p", decimals=1
+        ),
+    ]
+    return Table("removed-tests", "Tests", columns)
+
+
+def _state(each: Removal) -> str:
+    if each.kept:
+        return f"kept: {each.kept}"
+    return "out" if each.returned is None else f"back in round {each.returned}"
 
 
 _STANDING = ("status", "weighted_sum_of_squares", "degrees_of_freedom")
@@ -259,32 +322,3 @@ def estimated_errors(entry: Removal) -> str:
         f"{component} {error:.4g} {unit} (sd {sd:.2g})".replace("  ", " ")
         for component, error, unit, sd in rows
     )
-
-
-def _lines(entry: Removal) -> list[str]:
-    """Write an entry of the log: what, why, how large, what else it may be, what went with it."""
-    if entry.kept:
-        state = f"suspect, kept: {entry.kept}"
-    elif entry.returned is not None:
-        state = f"round {entry.round}, returned in round {entry.returned}"
-    else:
-        state = f"round {entry.round}"
-    errors, lines = estimated_errors(entry), [f"{entry.name}: {state}"]
-    if not math.isnan(entry.log_probability):
-        lines.append(
-            f"    T {entry.statistic:.2f} ({entry.first_statistic:.2f} at first sight), dimension"
-            f" {entry.dimension}, F {entry.fisher:.2f}, log10 p {entry.log_probability / LN10:.1f}"
-            f" (limit {math.log10(entry.limit):.1f})"
-        )
-    if errors:
-        lines.append(f"    estimated error {errors}; redundancy {entry.redundancy:.3f}")
-    lines += [
-        f"    or {rival.name}: T {rival.statistic:.2f}, odds {rival.odds:.2g} : 1" for rival in entry.rivals
-    ]
-    lines += [f"    {consequence}" for consequence in entry.consequences]
-    if entry.prediction is not None and entry.prediction_log_probability is not None:
-        lines.append(
-            f"    against the rest: T {entry.prediction:.2f}, log10 p"
-            f" {entry.prediction_log_probability / LN10:.1f}"
-        )
-    return lines

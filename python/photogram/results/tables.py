@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Floats, Indices
+from photogram.network.geometry import lengths_of_units
 from photogram.results import network_tables
 from photogram.results.axes import TURNS, component_axis, image_axes, point_axes
 from photogram.results.cameras import AdjustedCamera
@@ -28,8 +29,7 @@ from photogram.results.network_tables import (
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.result import Result
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.methods import columns_of
-from photogram.show.quantity import Axis, Quantity, component, frame, joined, long
+from photogram.show.quantity import Axis, Quantity, component, joined, long
 from photogram.statistics.reliability import TESTABLE
 
 _EITHER = "standard deviation that was given, or is assumed: {}"
@@ -50,14 +50,12 @@ _FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
 """What the columns of features have."""
 
 
-@columns_of.register(Result)
-def _columns(result: Result, what: str) -> dict[str, Any]:
-    return frame(TABLES[what](result))
-
-
 @terms_of.register(Result)
 def _terms(result: Result) -> Terms:
     block, axes = result.block, point_axes(result.block)
+    lengths = None
+    if block.geographic:
+        lengths = lengths_of_units(result.photo_positions.mean(axis=0, keepdims=True), block.spheroid)[0]
     return Terms(
         photos=np.array(block.photo_ids, dtype=object),
         points=np.array(block.point_ids, dtype=object),
@@ -78,6 +76,8 @@ def _terms(result: Result) -> Terms:
             ),
         ),
         kinds=result.kinds.values(),
+        lengths=lengths,
+        linear_unit=block.linear_unit,
         split=True,
     )
 
@@ -87,7 +87,7 @@ def check_points(result: Result) -> list[Quantity]:
     checks = result.check_points
     statistic, p = checks.statistics
     return [
-        *_compared(result, checks.rows, checks.differences, checks.given_sd, checks.assumed),
+        *_compared(result, checks.rows, checks.differences, checks.given_sd),
         Quantity(
             checks.assumed,
             name="assumed",
@@ -100,7 +100,12 @@ def check_points(result: Result) -> list[Quantity]:
             member="statistic",
             about="of the test: T, or F where the unit weight is estimated",
         ),
-        Quantity(p, name="probability", member="p", about="of a statistic as large where nothing is wrong"),
+        Quantity(
+            p,
+            name="probability",
+            member="p",
+            about="of a statistic as large where nothing is wrong",
+        ),
     ]
 
 
@@ -111,14 +116,11 @@ def unheld(result: Result) -> list[Quantity]:
     differences = np.where(there, result.point_differences, np.nan)
     rows = np.flatnonzero(np.isfinite(differences).any(axis=1))
     unknown = np.full((len(rows), 3), np.nan)
-    return _compared(result, rows, differences[rows], unknown, np.zeros(len(rows), dtype=bool))
+    return _compared(result, rows, differences[rows], unknown)
 
 
-def _compared(
-    result: Result, rows: Indices, differences: Floats, given_sd: Floats, assumed: Bools
-) -> list[Quantity]:
+def _compared(result: Result, rows: Indices, differences: Floats, given_sd: Floats) -> list[Quantity]:
     terms, axes, sd = terms_of(result), point_axes(result.block), result.point_sd[rows]
-    labels = np.where(assumed, "sd assumed", "sd given").tolist()
     with np.errstate(all="ignore"):
         tests = differences / np.hypot(sd, np.nan_to_num(given_sd))
     return [
@@ -126,10 +128,8 @@ def _compared(
         Quantity(result.given.point_positions[rows], axes, "value", head="Given"),
         Quantity(result.point_positions[rows], axes, "value", head="Adjusted"),
         difference(differences, axes),
-        deviation(sd, axes, label="sd adjusted", head="sd adjusted"),
-        deviation(
-            given_sd, axes, name="given_sd", member="given_sd", label=labels, head="sd given", about=_EITHER
-        ),
+        deviation(sd, axes, head="sd adjusted"),
+        deviation(given_sd, axes, name="given_sd", member="given_sd", head="sd given", about=_EITHER),
         Quantity(tests, axes, head="Test value", decimals=2),
     ]
 
@@ -149,8 +149,7 @@ def observations(kind: ObservedKind) -> list[Quantity]:
             "residual",
             "residual",
             "observed minus adjusted",
-            "residual",
-            "Residual",
+            head="Residual",
         ),
         redundancy(kind.redundancy, axes),
         test_value(kind.standardized, axes),
@@ -205,14 +204,14 @@ def unknowns(every: Sequence[AdjustedUnknown]) -> list[Quantity]:
         component_axis(*both) for each in every for both in zip(each.components, each.units, strict=True)
     )
     rows: dict[str, Any] = {"of": np.arange(len(axes))}
-    value = Quantity(_all(every, "values"), axes, "deviation", "value", "", "adjusted", **rows, label="value")
+    value = Quantity(_all(every, "values"), axes, "deviation", "value", "", "adjusted", **rows)
     return [
         Quantity(_each(every, "kind"), kind="name", name="kind", about="what it is", head="Kind"),
         Quantity(_each(every, "name"), kind="name", name="unknown", about="name of the unknown", head="Name"),
         *component(axes, **rows),
         deviation(_all(every, "given.deviations"), axes, **rows, **_GIVEN_SD),
         replace(value, head="Adjusted", figures=7),
-        difference(_all(every, "change"), axes, **rows, name="change", label="change", head="Change"),
+        difference(_all(every, "change"), axes, **rows, name="change", head="Change"),
         deviation(_all(every, "sd"), axes, **rows, head="sd adjusted"),
         redundancy(_all(every, "redundancy"), axes, **rows),
         test_value(_all(every, "standardized"), axes, **rows),
@@ -240,7 +239,6 @@ def camera_parameters(every: Sequence[AdjustedCamera]) -> list[Quantity]:
 
 _GIVEN_SD: dict[str, Any] = {
     "name": "sd_given",
-    "label": "sd given",
     "head": "sd given",
     "about": "standard deviation that was given: infinite free, 0 held",
 }

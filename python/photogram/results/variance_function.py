@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from photogram import _photocore
-from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.group_sums import GroupSum
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Shown, columns_of, document_of, report_of
-from photogram.show.sections import composed, headline
+from photogram.show.judgement import remarks_section
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Fact, Facts, Section
+from photogram.show.quantity import Quantity, Table, members, of_each
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Line, Markers, error_bars
 from photogram.show.sketch.plot import Plot
@@ -67,7 +68,7 @@ class Bin:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VarianceFunction(Shown, Brief):
+class VarianceFunction(Documented, Brief):
     """The variance of image coordinates as a function: sigma^2 = sd^2 (a^2 + b^2 (r / R)^2).
 
     Attributes
@@ -126,64 +127,43 @@ class VarianceFunction(Shown, Brief):
 
     def table(self) -> pd.DataFrame:
         """Return the bins as a data frame."""
-        return self._table("bin")
+        return self.bins_table().frame()
 
+    def bins_table(self) -> Table:
+        """Return the declared table: mean of the bin, redundancy, factors by residuals and function."""
+        low, high = np.array([each.interval for each in self.bins]).reshape(-1, 2).T
+        function = [self.factor(each.value) for each in self.bins]
+        factors = {"low": (low, "From"), "high": (high, "To"), "function": (function, "Function")}
+        columns = [
+            of_each(self.bins, "value", name=self.name, head=self.name.capitalize(), figures=4),
+            of_each(self.bins, "count", name="coordinates", head="Number", decimals=0),
+            of_each(self.bins, "redundancy", name="redundancy", head="Redundancy", decimals=2),
+            of_each(self.bins, "factor", name="factor", head="Factor", decimals=3),
+            *(
+                Quantity(values, name=name, member=name, head=head, decimals=3)
+                for name, (values, head) in factors.items()
+            ),
+        ]
+        return Table("bins", "Quantiles: factor of the given variance", columns)
 
-@columns_of.register(VarianceFunction)
-def _columns(found: VarianceFunction, what: str) -> dict[str, Any]:
-    """Mean of the bin, its redundancy, factors of the variance by residuals and by the function."""
-    del what
-    return {
-        found.name: [each.value for each in found.bins],
-        "coordinates": [each.count for each in found.bins],
-        "redundancy": [each.redundancy for each in found.bins],
-        "factor": [each.factor for each in found.bins],
-        "low": [each.interval[0] for each in found.bins],
-        "high": [each.interval[1] for each in found.bins],
-        "function": [found.factor(each.value) for each in found.bins],
-    }
-
-
-@document_of.register(VarianceFunction)
-def _document(found: VarianceFunction) -> bytes:
-    """Return the function as JSON (UTF-8)."""
-    columns = _columns(found, "bin")
-    return json.to_json(
-        {
-            "program": f"photogram {_photocore.__version__}",
-            "of": found.name,
-            "largest": found.largest,
-            "coefficients": found.estimate.coefficients.tolist(),
-            "covariance": found.estimate.covariance.tolist(),
-            "test_value": found.test_value,
-            "probability": found.probability,
-            "converged": found.estimate.converged,
-            "bins": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
-        }
-    )
-
-
-@report_of.register(VarianceFunction)
-def _report(found: VarianceFunction) -> str:
-    """Return the function and the bins as text."""
-    names = ("a^2", "b^2")
-    estimate = found.estimate
-    said = [f"variance = given variance x (a^2 + b^2 ({found.name} / {found.largest:.6g})^2)"]
-    said += [
-        f"{name} {value:>12.4f}   sd {sd:.4f}"
-        for name, value, sd in zip(names, estimate.coefficients, estimate.sd, strict=True)
-    ]
-    said.append(f"b^2 / sd {found.test_value:.2f}, probability {found.probability:.2g} where nothing grows")
-    if not estimate.converged:
-        said.insert(0, f"not converged after {estimate.steps} adjustments: do not use it")
-    lines = [
-        f"{found.name:>12}{'number':>8}{'redundancy':>12}{'factor':>10}{'from':>10}{'to':>10}{'function':>10}"
-    ]
-    for each in found.bins:
-        cells = "".join(
-            f"{cell:>10.3f}" if math.isfinite(cell) else f"{'-':>10}"
-            for cell in (each.factor, *each.interval, found.factor(each.value))
-        )
-        lines.append(f"{each.value:>12.4g}{each.count:>8}{each.redundancy:>12.2f}{cells}")
-    sections = [("Function", said), ("Quantiles: factor of the given variance", lines)]
-    return composed(headline("variance function"), sections)
+    def document(self) -> Document:
+        """Return the document: the function, and quantiles of the radius."""
+        estimate = self.estimate
+        values = zip(("a^2", "b^2"), estimate.coefficients.tolist(), estimate.sd.tolist(), strict=True)
+        facts = [
+            Fact("Variance", f"given variance x (a^2 + b^2 ({self.name} / {self.largest:.6g})^2)"),
+            *(Fact(name, f"{value:.4f}", note=f"sd {sd:.4f}") for name, value, sd in values),
+            Fact(
+                "b^2 / sd",
+                f"{self.test_value:.2f}",
+                note=f"probability {self.probability:.2g} where nothing grows",
+            ),
+        ]
+        remarks = []
+        if not estimate.converged:
+            remarks.append(f"not converged after {estimate.steps} adjustments: do not use it")
+        function = Section("function", "Function", [Facts("", facts)])
+        more = {**members(estimate, "coefficients", "covariance", "converged")}
+        more |= {"of": self.name, **members(self, "largest", "test_value", "probability")}
+        sections = [remarks_section(remarks), function, Section.of(self.bins_table())]
+        return Document("Variance function", "", [], [], [], sections, more)

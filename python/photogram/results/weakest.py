@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
@@ -12,7 +10,6 @@ from photogram.network.geometry import geographic_to_geocentric, lengths_of_unit
 from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.lines import padded
 from photogram.show.methods import Way
 
 WORST = 10
@@ -24,6 +21,7 @@ NEAR = 1e-3
 class WeakestPoint:
     """A point among those that are determined worst."""
 
+    row: int  # Among the points of the network
     point: str  # Its name
     # The largest of its standard deviations over the smallest, in any directions: the root of the ratio
     # of the eigenvalues of its covariance matrix. Rays that meet at right angles give about 1, nearly
@@ -39,6 +37,7 @@ class WeakestPoint:
 class WeakestPhoto:
     """A photo among those that are determined worst."""
 
+    row: int  # Among the photos of the network
     photo: str  # Its name
     # Largest over smallest eigenvalue of the covariance matrix of position and attitude, scaled to a
     # diagonal of ones. Points on a line leave a photo free to turn about it: then it has no bound
@@ -101,7 +100,11 @@ def weakest_points(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
     chosen = [*near[np.argsort(distance[near])].tolist(), *worst.tolist()]
     return [
         WeakestPoint(
-            result.given.point_ids[row], float(ratio[row]), float(distance[row]), int(result.point_rays[row])
+            row,
+            result.given.point_ids[row],
+            float(ratio[row]),
+            float(distance[row]),
+            int(result.point_rays[row]),
         )
         for row in list(dict.fromkeys(chosen))[:count]
     ]
@@ -122,38 +125,9 @@ def weakest_photos(result: AdjustedNetwork, count: int = WORST) -> list[WeakestP
     sd = np.sqrt(np.where(variances > 0, variances, 1.0))
     condition = _condition(poses / (sd[:, :, np.newaxis] * sd[:, np.newaxis, :]), network.ranks[known])
     return [
-        WeakestPhoto(names[rows[each]], float(condition[each]), int(images[rows[each]]))
-        for each in np.argsort(-condition, kind="stable")[:count].tolist()
+        WeakestPhoto(int(rows[k]), names[rows[k]], float(condition[k]), int(images[rows[k]]))
+        for k in np.argsort(-condition, kind="stable")[:count].tolist()
     ]
-
-
-def weakest_lines(result: AdjustedNetwork) -> list[str]:
-    """Return the lines of a report on the weakest points and photos; none without cofactors."""
-    points, photos = weakest_points(result), weakest_photos(result)
-    lines = []
-    if points:
-        head, *names = padded(["point", *(each.point for each in points)], 16)
-        lines += [
-            "largest standard deviation over the smallest (nearly parallel rays: above 10,000), and distance",
-            "from the nearest station in the median of such distances (at its own place: below 0.001)",
-            f"{head}{'ratio':>12}{'distance':>12}{'rays':>6}",
-        ]
-        lines += [
-            f"{name}{each.ratio:>12.4g}"
-            f"{f'{each.distance:.4g}' if math.isfinite(each.distance) else '-':>12}{each.rays:>6}"
-            for name, each in zip(names, points, strict=True)
-        ]
-    if photos:
-        head, *names = padded(["photo", *(each.photo for each in photos)], 16)
-        lines += [
-            *([""] if lines else []),
-            "condition of the covariance matrix of position and attitude, scaled to a diagonal of ones",
-            f"{head}{'condition':>12}{'images':>8}",
-        ]
-        lines += [
-            f"{name}{each.condition:>12.4g}{each.images:>8}" for name, each in zip(names, photos, strict=True)
-        ]
-    return lines
 
 
 def _condition(matrices: Floats, ranks: Indices | int) -> Floats:

@@ -16,8 +16,6 @@ from photogram.show.lines import degrees_written, unit_of
 from photogram.show.page import Cell, Column, Table, decimals_of, fixed, significant
 from photogram.show.quantity import Axis, Quantities, Quantity, chosen, long
 
-LISTED = 120
-"""Rows of a table with a row for each component at most."""
 _SIGNS = {
     "arc seconds": "″",
     "arcsec": "″",
@@ -88,26 +86,6 @@ def _columns(each: Quantity, by: Floats | None) -> list[tuple[Column, list[Writt
         marks = None if marked is None else marked[:, k]
         found.append((column, _numbers(each, values[:, k], [axis] * len(values), [count], marks)))
     return found
-
-
-def long_table(
-    caption: str, table: Quantities, tests: Floats, by: Floats | None = None, what: str = ""
-) -> list[Table]:
-    """Return a table with a row for each component that is there, those of the largest tests; none without.
-
-    `tests` are (n, k) test values, infinite where there is none, NaN where the component is not there, `by`
-    (r, k) deviations that say how many decimals values and differences have; `what` rows are called where
-    they are not all.
-    """
-    places = np.argwhere(~np.isnan(tests))
-    if not len(places):
-        return []
-    sizes = np.abs(tests[tuple(places.T)])
-    order = np.argsort(np.where(np.isinf(sizes), 1.0, -sizes), kind="stable")
-    kept = np.sort(order[:LISTED])
-    some = f"The {len(kept)} of {len(places)}{what} with the largest test values."
-    note = "" if len(kept) == len(places) else some
-    return [page_table(caption, long(table, places[kept]), note, by)]
 
 
 def _mixed(each: Quantity) -> bool:

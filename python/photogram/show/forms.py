@@ -43,26 +43,49 @@ def to_json(document: Document) -> bytes:
 def text(document: Document) -> str:
     """Return a document as a report: verdict, advice, highlights, sections, details; plots are left out."""
     judged = [
+        (title, [textwrap.fill(sentence, WIDTH) for sentence in sentences])
+        for title, sentences in _judged(document)
+    ]
+    parts = [f"photogram {_photocore.__version__}  {document.what}  {document.title}".rstrip()]
+    parts += [
+        "\n".join([title, "-" * len(title), *lines]) for title, lines in [*judged, *_sections(document, ())]
+    ]
+    return "\n\n".join(parts).translate(PLAIN) + "\n"
+
+
+def titled_lines(document: Document, *keys: str) -> list[tuple[str, list[str]]]:
+    """Return titles and lines: verdict and advice, a line for each sentence, key figures, sections with keys.
+
+    All sections without keys.
+    """
+    titled = [*_judged(document), *_sections(document, keys)]
+    return [(title.translate(PLAIN), [line.translate(PLAIN) for line in lines]) for title, lines in titled]
+
+
+def _judged(document: Document) -> list[tuple[str, list[str]]]:
+    """Return the sentences of verdict and advice below their titles."""
+    titled: list[tuple[str, list[object]]] = [
         (f"{document.first}, {judgement.on}".removesuffix(", "), [judgement.headline, *judgement.lines])
         for judgement in document.judgements
     ]
-    parts = [f"photogram {_photocore.__version__}  {document.what}  {document.title}".rstrip()]
-    parts += [_titled(title, [_sentence(line) for line in lines]) for title, lines in judged]
-    parts.append(_titled("What to do next", [_sentence(line) for line in document.advice]))
-    parts.append(_titled("Key figures", fact_lines([*document.head, *document.highlights])))
-    sections = (*document.sections, *document.details)
-    parts += [_titled(section.title, _section_lines(section)) for section in sections]
-    return "\n\n".join(part for part in parts if part).translate(PLAIN) + "\n"
+    titled.append(("What to do next", [*document.advice]))
+    return [(title, [_sentence(line) for line in lines]) for title, lines in titled if lines]
 
 
-def _titled(title: str, lines: Sequence[str]) -> str:
-    """Return lines below their underlined title; nothing without lines."""
-    return "\n".join([title, "-" * len(title), *lines]) if lines else ""
+def _sections(document: Document, keys: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Return the lines of key figures and sections below their titles; none without lines."""
+    figures = fact_lines([*document.head, *document.highlights])
+    titled = [("Key figures", figures)] + [
+        (section.title, _section_lines(section))
+        for section in (*document.sections, *document.details)
+        if section.key in keys or not keys
+    ]
+    return [(title, "\n".join(lines).split("\n")) for title, lines in titled if lines]
 
 
 def _sentence(message: object) -> str:
     line = str(message)
-    return textwrap.fill(f"{line[:1].upper()}{line[1:]}".removesuffix(".") + ".", WIDTH)
+    return f"{line[:1].upper()}{line[1:]}".removesuffix(".") + "."
 
 
 def _section_lines(section: Section) -> list[str]:
@@ -115,13 +138,12 @@ def table_text(table: Table) -> list[str]:
         for texts, (column, cell) in zip(columns, row, strict=True):
             mark = "*" if cell.tone == "look" and not column.text else ""
             texts.append(f"{column.written(cell.value)}{mark}".translate(PLAIN))
-    if (
-        max(len(text) for texts in columns for text in texts) > WIDTH // 2
-    ):  # sentences: a paragraph for each row
-        rows = ("; ".join(filter(None, row)) for row in zip(*columns, strict=True))
+    if max(len(text) for texts in columns for text in texts) > WIDTH // 2:  # sentences: rows are paragraphs
+        rows = ("; ".join(filter(None, row)) for row in zip(*(texts[1:] for texts in columns), strict=True))
         return [textwrap.fill(row, WIDTH, subsequent_indent="  ") for row in rows]
     padded = [
-        [f"{text:{'<' if column.text else '>'}{max(map(len, texts))}}" for text in texts]
+        [f"{text:{layout}}" for text in texts]
         for column, texts in zip(table.columns, columns, strict=True)
+        for layout in [f"{'<' if column.text else '>'}{max(map(len, texts))}"]
     ]
     return ["  ".join(row).rstrip() for row in zip(*padded, strict=True)]

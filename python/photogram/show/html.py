@@ -10,6 +10,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from photogram import _photocore
+from photogram.show import quantity
 from photogram.show.cells import written
 from photogram.show.page import Cell, Column, Document, Drawing, Layers, Part, Picture, Section, Table
 
@@ -120,7 +121,7 @@ def _drawn(section: Section) -> Section:
             layers = [inlined(each) if isinstance(each, Drawing) else written(each) for each in part.parts]
             own = [each for each in layers if each is not None]
             parts += own if len(own) < 2 else [Layers(part.name, own)]
-        else:
+        elif not isinstance(part, quantity.Table) or part.visible:
             parts.append(written(part))
     return replace(section, parts=parts)
 

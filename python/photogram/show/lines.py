@@ -78,12 +78,6 @@ def padded(texts: Iterable[str], least: int) -> list[str]:
     return [f"{text:<{width}}" for text in column]
 
 
-def blank(names: Field) -> Field:
-    """Return a field without text that is as wide as another field."""
-    width = len(names.head)
-    return Field(" " * width, [" " * width] * len(names.texts))
-
-
 def _numbers(
     quantity: Quantity, axis: Axis, values: Floats, width: int, forms: Sequence[str], head: str, gap: str
 ) -> Field:
@@ -157,26 +151,3 @@ def table_lines(*rows: Sequence[Field]) -> list[str]:
     for of_one in zip(*texts, strict=True):
         found += of_one
     return found
-
-
-def stacked(
-    names: Quantity,
-    head: str,
-    quantities: Sequence[tuple[Quantity, str]],
-    first: Sequence[Field] = (),
-    above: str = "{name} {unit}",
-) -> list[str]:
-    """Return a table in which each thing has a line for each quantity, under the names of the components.
-
-    `quantities` have the forms in which their numbers are written, `first` stands behind the first of the
-    lines, `above` are heads of the components.
-    """
-    (named,) = field(names, 10, head=head)
-    below = Field("", blank(named).texts)
-    rows = []
-    for place, (each, form) in enumerate(quantities):
-        labels = [each.label] * len(named.texts) if isinstance(each.label, str) else each.label
-        label = [Field(f"{'':<14}" if place == 0 else "", [f"{text:<14}" for text in labels])]
-        own = field(each, 18, form, above if place == 0 else "")
-        rows.append([named if place == 0 else below, *label, *own, *(first if place == 0 else ())])
-    return table_lines(*rows)

@@ -95,8 +95,6 @@ class Quantity:
         Its name in JSON documents, or names of parts of its components; empty: it is not there.
     about
         A line for Parquet; `{}` stands for the name of an axis.
-    label
-        What stands before its line in a report as text, of all things or of each.
     head, decimals, figures
         Of its columns on a page; `{}` stands for the name of an axis. Significant figures where decimals are
         None, and nothing else tells them. Without a head it is not there.
@@ -118,7 +116,6 @@ class Quantity:
     name: str | None = None
     member: str | Mapping[str, slice] = ""
     about: str = ""
-    label: str | Sequence[str] = ""
     head: str = ""
     decimals: int | None = None
     figures: int = 3
@@ -192,10 +189,10 @@ class Table:
 def of_each(
     things: Sequence[Any], attribute: str, axes: tuple[Axis, ...] = (), kind: Kind = "number", **more: Any
 ) -> Quantity:
-    """Return an attribute (`a.b`) of n things; its name in JSON documents, unless `member` is another."""
+    """Return an attribute (`a.b`) of n things; its `name` in JSON documents, unless `member` is another."""
     found = [*map(attrgetter(attribute), things)]
     values = np.array(found, dtype=object if kind == "name" else None)
-    return Quantity(values, axes, kind, **{"member": attribute, **more})
+    return Quantity(values, axes, kind, **{"member": more.get("name") or attribute, **more})
 
 
 def attribute(
@@ -205,9 +202,9 @@ def attribute(
     return Quantity(attrgetter(name)(thing), axes, kind, **{"name": name, "member": name, **more})
 
 
-def labelled(table: Quantities, label: str) -> Quantity:
-    """Return the quantity that has a label."""
-    return next(each for each in table if each.label == label)
+def named(table: Quantities, name: str) -> Quantity:
+    """Return the quantity with a name of its columns."""
+    return next(column for column in table if column.name == name)
 
 
 def chosen(table: Quantities, rows: Indices) -> list[Quantity]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
+from photogram.io import json
 from photogram.lazy_dataclasses import dataclass, field, fields, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
@@ -22,7 +23,8 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.methods import Shown
+from photogram.show.methods import Documented, Judged
+from photogram.show.page import Document
 from photogram.show.summary import Brief, Rows
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
@@ -139,7 +141,7 @@ def deviation_of_corners(result: Result) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibrated(Brief, Shown):
+class Calibrated(Brief, Judged, Documented):
     """An adjusted calibration of K cameras in V views of a board of n points.
 
     Attributes
@@ -166,6 +168,21 @@ class Calibrated(Brief, Shown):
         """Return how the adjustment ended in a few lines."""
         title, rows = self.result.brief()
         return title, [*self.calibration.brief()[1], *rows]
+
+    def document(self) -> Document:
+        """Return the document: judgement, the board, the views, and the block."""
+        from photogram.targets.page import calibration_page
+
+        return calibration_page(self)
+
+    def _members(self) -> dict[str, Any]:
+        from photogram.targets.document import calibration_members
+
+        return calibration_members(self)
+
+    def to_json(self) -> bytes:
+        """Return the whole calibration as a JSON document (UTF-8)."""
+        return json.to_json(self._members())
 
     @property
     def verdict(self) -> Verdict:

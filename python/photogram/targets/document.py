@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.io import json
 from photogram.results.document import block_members
-from photogram.show.methods import document_of
 from photogram.show.quantity import Quantity, records
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.calibration_result import Calibrated, Worth
@@ -23,13 +21,7 @@ from photogram.targets.new_views import Suggestions
 from photogram.targets.tables import STRETCHES, board_fit, prior_shift, splines, views
 
 
-@document_of.register(Calibrated)
-def to_json(calibrated: Calibrated) -> bytes:
-    """Return the whole calibration as JSON (UTF-8)."""
-    return json.to_json(calibration_document(calibrated))
-
-
-def calibration_document(calibrated: Calibrated) -> dict[str, Any]:
+def calibration_members(calibrated: Calibrated) -> dict[str, Any]:
     """Return the members of the document."""
     sensors = [
         {"camera": calibrated.cameras[row].name, "pose": calibrated.sensors[row].tolist()}
@@ -41,7 +33,7 @@ def calibration_document(calibrated: Calibrated) -> dict[str, Any]:
         "board": _board(calibrated),
         "views": records([*views(calibrated), Quantity(calibrated.poses, member="pose")]),
         **({"sensors": sensors} if sensors else {}),
-        **({} if calibrated.snooped is None else {"snooping": calibrated.snooped.document()}),
+        **({} if calibrated.snooped is None else {"snooping": calibrated.snooped.members()}),
         **({"moved_by_priors": records(moved)} if moved else {}),
         **({"splines": [asdict(each) for each in told]} if (told := splines(calibrated)) else {}),
         **({} if calibrated.worth is None else worth_members(calibrated.worth)),

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from photogram.show.cells import page_table
-from photogram.show.methods import page_of
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.calibration_result import Calibrated, Worth
@@ -19,11 +18,10 @@ from photogram.targets.residual_drawing import plot_board_residuals, plot_poores
 from photogram.targets.tables import board_facts, prior_shift, spline_lines, views, worst_points
 
 
-@page_of.register(Calibrated)
 @np.errstate(over="ignore", invalid="ignore")
 def calibration_page(calibrated: Calibrated) -> Document:
     """Return the report of a calibration for the browser."""
-    page = page_of(calibrated.snooped or calibrated.result)
+    page = (calibrated.snooped or calibrated.result).document()
     board: list[Part] = [Facts("The board", board_facts(calibrated))]
     if worst := worst_points(calibrated):
         board.append(Remarks(worst))

@@ -196,21 +196,6 @@ def prior_shift(calibrated: Calibrated) -> list[Quantity]:
     ]
 
 
-def moved_lines(calibrated: Calibrated) -> list[str]:
-    """Return the largest of it in a line for each parameter that moved by more than a fifth of its sd."""
-    table = prior_shift(calibrated)
-    if not table:
-        return []
-    names, changes, of_sd = (each.values for each in table)
-    largest = int(np.argmax(np.abs(of_sd)))
-    lines = [f"largest: {names[largest]} by {of_sd[largest]:+.2f} of its standard deviation"]
-    return lines + [
-        f"{name} moved by {change:+.3g}, {over:+.2f} of its standard deviation"
-        for name, change, over in zip(names, changes, of_sd, strict=True)
-        if abs(over) > MOVED
-    ]
-
-
 HANGS = 0.05
 """Redundancy of a prior below which what it is of comes from it."""
 

@@ -9,7 +9,7 @@ from photogram.arguments.types import Floats
 from photogram.giant.printout.forms import Page, Space, Values, fixed, headed, paginate
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
-from photogram.results.result import SumsOfSquares
+from photogram.results.sums import SumsOfSquares
 
 TITLE = "CAMERA STATIONS CORRECTIONS"
 

@@ -1,44 +1,61 @@
-"""The page of every adjusted network: how good it is, how it went, what was remarked."""
+"""The document of every adjusted network, block or collection: how good it is, how it went, remarks."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats
+from photogram.messages import Message
 from photogram.plots.accessor import sketch_of
 from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import iterations, terms_of
-from photogram.results.observation_rows import IMAGE_COORDINATES, outlying, tested_singly
-from photogram.results.page.tables import photos_section, points_section
-from photogram.results.report import ORDERINGS, problems_of
-from photogram.show.cells import page_table, unit_written
-from photogram.show.judgement import judged, remarks_section, verdict_table
-from photogram.show.page import (
-    Cell,
-    Column,
-    Document,
-    Drawing,
-    Fact,
-    Facts,
-    Part,
-    Row,
-    Section,
-    Table,
-    significant,
+from photogram.results.network_sections import (
+    images_section,
+    linked,
+    photos_section,
+    points_section,
+    weakest_tables,
 )
-from photogram.show.quantity import Axis
+from photogram.results.network_tables import (
+    control,
+    images,
+    iterations,
+    photos,
+    points,
+    stations,
+    terms_of,
+)
+from photogram.results.tested_observations import IMAGE_COORDINATES, outlying, tested_singly
+from photogram.results.weakest import weakest_photos, weakest_points
+from photogram.show import quantity
+from photogram.show.cells import unit_written
+from photogram.show.judgement import judged, remarks_section, verdict_table
+from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
+from photogram.show.quantity import Axis, Quantities, Quantity, members, records
+from photogram.show.sections import problems
 from photogram.statistics.evidence import GLOBAL
 from photogram.statistics.findings import Tested
 
+ORDERINGS = {
+    "input": "in input order",
+    "rcm": "by reverse Cuthill-McKee",
+    "amd": "by minimum degree",
+    "dissection": "by nested dissection",
+    "graph-dissection": "by dissection of the graph",
+    "parts": "in parts, and the separators between them",
+}
+NOTABLE = 3.0
+"""Test values above are counted; the limit of the tests, which decides, is in the verdict."""
 _NOT_CHECKED = 0.01
 
 
-def network_page(
+def network_document(
     result: AdjustedNetwork,
     what: str,
     size: Section,
@@ -47,24 +64,33 @@ def network_page(
     photos: int,
     title: str = "",
     more: Sequence[Fact] = (),
-    redundancy: Sequence[Table] = (),
+    redundancy: Sequence[quantity.Table] = (),
     beside: Sequence[Section] = (),
     datum: str = "",
     poses: str = "",
+    work: Sequence[Fact] = (),
+    details: Sequence[Section] = (),
 ) -> Document:
-    """Return the page of a network: its number of `photos`, sections on its `size` and on what was `given`.
+    """Return the document of a network: its number of `photos`, sections on its `size` and what was `given`.
 
-    `more` is what a reader wants first besides; `redundancy` stands beside the picture of redundancy numbers,
-    `beside` beside the plan; `datum` says what coordinates refer to, `poses` what the poses of photos are
-    where that is not plain.
+    `more` are further highlights, `redundancy` tables below the plot of redundancy numbers, `beside` sections
+    below the plan. `datum` describes the reference of coordinates, `poses` the meaning of the poses of
+    photos, `work` are further figures on the normal equations, `details` sections of the text report alone.
     """
-    pictures, worst = drawings(result), _worst_of(tested_singly(result))
+    pictures, tested = drawings(result), tested_singly(result)
+    worst = _worst_of(tested)
+    weak = weakest_points(result), weakest_photos(result)
     worst_photos, worst_points = _worst_images(result, worst)
+    worst_photos += [each.row for each in weak[1]]
+    worst_points += [each.row for each in weak[0]]
     intro = (
         "The redundancy number of an observation is the share of its error that shows in its own"
         " residual; the rest"
         " goes into the unknowns. Their sum is the number of observations beyond what is needed."
     )
+    summary = result.reliability_summary
+    reliability = [] if summary is None else summary.parts(terms_of(result).linear_unit)
+    tables = [table for table in weakest_tables(result, *weak) if len(table.columns[0].values)]
     return Document(
         what=what,
         title=title,
@@ -72,21 +98,59 @@ def network_page(
         advice=result.verdict.next,
         highlights=[*_highlights(result, photos), *more],
         sections=[
+            remarks_section(problems_of(result)),
             Section("network", "Plan of the network", [pictures["network"]]),
             *beside,
             size,
             Section("residuals", "Image residuals", [pictures["residuals"]]),
             Section("redundancy", "Redundancy", [pictures["redundancy"], *redundancy], intro),
+            Section("reliability", "Reliability", reliability),
             _tests_section(result, pictures["tests"]),
-            _worst_section(result, worst),
+            Section("worst", "Worst observations", _worst_table(result, tested, worst), _WORST_INTRO),
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
+            Section("weakest", "Weakest points and photos", tables),
             _iterations_section(result),
-            remarks_section(problems_of(result)),
+            Section("work", "Work", [Facts("Work", [*_work(result), *work])]),
         ],
+        details=[*details, images_section(result)],
         phases=result.seconds,
     )
+
+
+def problems_of(result: AdjustedNetwork) -> list[str]:
+    """Return what keeps a reader from using the values: a failed test and outliers before other remarks.
+
+    The tests of outliers are those of the verdict.
+    """
+    messages = [*(Message(str(outlier)) for outlier in result.verdict.outliers), *result.messages]
+    return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
+
+
+def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> dict[str, Any]:
+    """Return the members of the JSON documents of all networks, with more members of photos."""
+    summary = result.reliability_summary
+    weights = Quantity(result.image_weights[result.used_images], member="weight_factor")
+    of_photos = Quantity(result.photo_covariances, member="covariance")
+    of_points = Quantity(result.point_covariances[result.used_points], member="covariance")
+    weak_points, weak_photos = weakest_tables(result, weakest_points(result), weakest_photos(result))
+    return {
+        "program": f"photogram {_photocore.__version__}",
+        **members(result, "status", "degrees_of_freedom", "variance_of_unit_weight", "covariance_scale"),
+        **members(result, "ordering", "predictions", "operations", "seconds"),
+        "messages": [str(message) for message in result.messages],
+        "loss": {"name": result.loss[0], "scale": result.loss[1]} if result.loss else None,
+        "verdict": result.verdict.document(),
+        "reliability": summary.document() if summary else None,
+        "iterations": records(iterations(result))[1:],
+        "photos": records([*photos(result), *photo_members, of_photos]),
+        "points": records([*points(result), of_points]),
+        "observations": records([*images(result), *([weights] if result.loss else [])]),
+        "control": records(control(result)),
+        "stations": records(stations(result)),
+        "weakest": {"points": records(weak_points.columns), "photos": records(weak_photos.columns)},
+    }
 
 
 def size_section(
@@ -111,6 +175,7 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
         _unit_weight(result),
         Fact("Photos", f"{photos:,}", note=f"{points:,} points, {images:,} images"),
         Fact("Degrees of freedom", f"{result.degrees_of_freedom:,.0f}"),
+        Fact("Iterations", f"{len(result.iterations)}", note=result.status),
     ]
     if images:
         rms = math.sqrt(float(((result.residuals[used] * axis.factor) ** 2).mean()))
@@ -169,9 +234,9 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     return facts
 
 
-def _precision_table(result: AdjustedNetwork) -> list[Table]:
+def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
     """Return how the standard deviations of adjusted values are spread; none where none were computed."""
-    terms, rows = terms_of(result), list[Row]()
+    terms, rows = terms_of(result), list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
         ("photos", terms.photo_axes, result.photo_sd),
@@ -179,18 +244,20 @@ def _precision_table(result: AdjustedNetwork) -> list[Table]:
         for axis, column in zip(axes, deviations.T, strict=True):
             known = column[np.isfinite(column)] * axis.factor
             if known.size:
-                figures = [float(each) for each in np.quantile(known, (0.5, 0.9, 1.0))]
-                rows.append([what, axis.name, *figures, unit_written(axis.small)])
-    columns = (
-        Column("Standard deviations of", text=True),
-        Column("Component", text=True),
-        Column("Median", figures=3),
-        Column("90 % are below", figures=3),
-        Column("Largest", figures=3),
-        Column("Unit", text=True),
-    )
+                rows.append((what, axis.name, *np.quantile(known, (0.5, 0.9, 1.0)), unit_written(axis.small)))
+    if not rows:
+        return []
+    things, components, median, most, largest, units = zip(*rows, strict=True)
+    columns = [
+        Quantity(things, kind="name", head="Standard deviations of"),
+        Quantity(components, kind="name", head="Component"),
+        Quantity(median, head="Median"),
+        Quantity(most, head="90 % are below"),
+        Quantity(largest, head="Largest"),
+        Quantity(units, kind="name", head="Unit"),
+    ]
     note = "A posteriori: scaled by the unit variance where that is estimated."
-    return [Table("Precision", columns, rows, note)] if rows else []
+    return [quantity.Table("precision", "Precision", columns, note)]
 
 
 def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
@@ -201,28 +268,32 @@ def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
     return Section("tests", "Tests", parts, intro)
 
 
-def _worst_section(result: AdjustedNetwork, worst: Sequence[Worst]) -> Section:
-    """Return the worst observations."""
-    intro = (
-        "A residual alone says little: an error shows in it only by the share of its redundancy number."
-        " The test"
-        " value takes both into account. Names of photos and points lead to their rows below."
-    )
-    parts = [_worst_table(result, worst)] if worst else []
-    return Section("worst", "Worst observations", parts, intro)
-
-
 def _iterations_section(result: AdjustedNetwork) -> Section:
     """Return the history."""
-    facts = [
-        Fact("Status", result.status),
-        Fact("Photos eliminated", ORDERINGS.get(result.ordering, result.ordering)),
-    ]
-    if result.loss is not None:
-        facts.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
     note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
-    table = page_table("Iterations", iterations(result), note)
-    return Section("iterations", "Iterations", [table, Facts("Course", facts)])
+    table = quantity.Table("iterations", "Iterations", iterations(result), note)
+    course = [Fact("Status", result.status)]
+    if result.loss is not None:
+        course.append(Fact("Robust loss", f"{result.loss[0]}, from {result.loss[1]:g} standard deviations"))
+    return Section("iterations", "Iterations", [table, Facts("Course", course)])
+
+
+def _work(result: AdjustedNetwork) -> list[Fact]:
+    """Return the order of elimination, and numbers of operations, also of other orders."""
+    ordering = ORDERINGS.get(result.ordering, result.ordering)
+    return [
+        Fact("Photos eliminated", ordering),
+        Fact("Normal equations formed", f"{result.formations}", note="times"),
+        *(
+            Fact(
+                f"Multiply-adds if eliminated {ORDERINGS.get(name, name)}",
+                "too large for this ordering" if math.isnan(count) else f"{count:.3e}",
+            )
+            for name, count in result.predictions.items()
+            if name != result.ordering
+        ),
+        *(Fact(f"Multiply-adds of one {name}", f"{count:.3e}") for name, count in result.operations.items()),
+    ]
 
 
 WORST = 25
@@ -253,45 +324,52 @@ def _worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list
     return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
 
 
-def _worst_table(result: AdjustedNetwork, worst: Sequence[Worst]) -> Table:
-    """Return the observations whose test values are the largest, of all kinds."""
-    terms, every = terms_of(result), tested_singly(result)
-    marked = {each.kind: outlying(result.verdict, each) for each in every}
+_WORST_INTRO = (
+    "A residual alone says little: an error shows in it only by the share of its redundancy number."
+    " The test"
+    " value takes both into account. Names of photos and points lead to their rows below."
+)
+
+
+def _worst_table(
+    result: AdjustedNetwork, every: Sequence[Tested], worst: Sequence[Worst]
+) -> list[quantity.Table]:
+    """Return the observations whose test values are the largest, of all kinds; none without test values."""
+    if not worst:
+        return []
+    terms, marks = terms_of(result), {each.kind: outlying(result.verdict, each) for each in every}
     numbers = dict(zip((each.kind for each in every), _numbers(result), strict=True))
-    rows: list[list[Cell | str | float | None]] = []
+    rows: list[tuple[Any, ...]] = []
     for _, tested, place in worst:
         residuals, sd, redundancy, axes = numbers[tested.kind]
-        axis = axes[place[1]]
-        names: list[Cell | str | None] = [str(tested.name(place)), None, None]
+        axis, photo, point = axes[place[1]], -1, -1
+        name = str(tested.name(place))
         if tested.kind == IMAGE_COORDINATES:
             photo, point = result.given.image_photos[place[0]], result.image_points[place[0]]
-            names = [
-                f"image {axis.name}",
-                Cell(str(terms.photos[photo]), goes_to=f"photo-{photo}"),
-                Cell(str(terms.points[point]), goes_to=f"point-{point}"),
-            ]
-        rows.append(
-            [
-                *names,
-                float(residuals[place]) * axis.factor,
-                float(sd[place]) * axis.factor,
-                unit_written(axis.small),
-                float(redundancy[place]),
-                Cell(float(tested.values[place]), tone="look" if marked[tested.kind][place] else ""),
-            ]
-        )
-    columns = (
-        Column("Observation", text=True),
-        Column("Photo", text=True),
-        Column("Point", text=True),
-        Column("Residual", figures=3),
-        Column("sd given", figures=3),
-        Column("Unit", text=True),
-        Column("Redundancy", decimals=3),
-        Column(f"Test value {worst[0][1].statistic}", decimals=2),
-    )
+            name = f"image {axis.name}"
+        numbers_of = (residuals[place] * axis.factor, sd[place] * axis.factor, unit_written(axis.small))
+        marked = marks[tested.kind][place]
+        rows.append((name, photo, point, *numbers_of, redundancy[place], tested.values[place], marked))
+    names, of_photos, of_points, misfits, deviations, units, shares, tests, outliers = zip(*rows, strict=True)
+    columns = [
+        Quantity(names, kind="name", head="Observation"),
+        linked("photo", [str(terms.photos[row]) if row >= 0 else "" for row in of_photos], of_photos),
+        linked("point", [str(terms.points[row]) if row >= 0 else "" for row in of_points], of_points),
+        Quantity(misfits, head="Residual"),
+        Quantity(deviations, head="sd given"),
+        Quantity(units, kind="name", head="Unit"),
+        Quantity(shares, head="Redundancy", decimals=3),
+        Quantity(
+            tests,
+            head=f"Test value {worst[0][1].statistic}",
+            decimals=2,
+            marked=np.array(outliers, dtype=bool),
+        ),
+    ]
+    count = sum(int(np.count_nonzero(np.abs(np.nan_to_num(each.values)) > NOTABLE)) for each in every)
     said = "Marked observations are the outliers of the verdict: the section Tests has the limits."
-    return Table("Worst observations", columns, rows, f"The {len(rows)} of the largest test values. {said}")
+    note = f"The {len(rows)} of the largest test values; {count} exceed {NOTABLE:g} in size. {said}"
+    return [quantity.Table("worst", "Worst observations", columns, note)]
 
 
 def _numbers(result: AdjustedNetwork) -> list[tuple[Floats, Floats, Floats, tuple[Axis, ...]]]:

@@ -1,0 +1,90 @@
+"""The document of an adjusted collection: its report, its page, and its JSON (`docs/collection.md`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from photogram.collection.result import AdjustedCollection
+from photogram.results.network_document import drawings, network_document, network_members, size_section
+from photogram.results.network_sections import control_section, stations_section
+from photogram.show.page import Document, Fact, Section, significant
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def collection_document(result: AdjustedCollection) -> Document:
+    """Return the document of an adjusted collection."""
+    pictures = drawings(result)
+    cameras = Section("cameras", "Cameras", [pictures[name] for name in ("distortion", "correlations")])
+    return network_document(
+        result,
+        "Adjustment of a collection of photos",
+        _size_section(result),
+        [control_section(result), stations_section(result), cameras],
+        photos=int(np.count_nonzero(result.photo_images)),
+    )
+
+
+def _size_section(result: AdjustedCollection) -> Section:
+    given, variance = result.collection, result.variance_of_unit_weight
+    counts = {
+        "photos": result.photo_images > 0,
+        "points": result.used_points,
+        "image points": result.used_images,
+    }
+    size = [(name, f"{np.count_nonzero(used)} used of {len(used)}") for name, used in counts.items()]
+    more = [Fact("Camera", given.camera, note=f"unknowns of a photo: {', '.join(given.parameters)}")]
+    if result.datum:
+        held = [f"{name} of photo {photo}" for photo, name in result.datum]
+        more.append(Fact("Datum", "held parameters", note=", ".join(held)))
+    if behind := int(np.count_nonzero(result.point_rays_behind)):
+        more.append(Fact("Points behind a camera", f"{behind}", tone="look"))
+    first = 0.5 * result.initial_weighted_sum_of_squares
+    good = [
+        Fact("Cost at first, half the sum of squares", significant(first, 7)),
+        Fact("Cost", significant(result.cost, 7)),
+        Fact("Variance of unit weight", f"{variance:.6f}" if variance is not None else "undefined"),
+    ]
+    return size_section(result, size, more, good)
+
+
+def collection_members(result: AdjustedCollection) -> dict[str, Any]:
+    """Return the members of the JSON document of an adjusted collection."""
+    return {
+        **network_members(result),
+        "units": {
+            **_units(result),
+            "covariance": "products of these",
+            "operations": "multiply-adds, each time the phase is carried out",
+            "seconds": "s",
+        },
+        "conventions": {
+            "camera": f"P = R(w) X + t, {result.collection.formula}",
+            "residual": "observed minus computed",
+            "difference": "adjusted minus given; standardized has its sign",
+            "standardized": "residual / (sd x root of redundancy number), a priori unit weight",
+            "covariance": "cofactors times covariance_scale",
+            "cost": "half the sum that is minimised",
+            "control, stations": "residual: given minus adjusted; sd 0: fixed, null: free",
+        },
+        "initial_cost": 0.5 * result.initial_weighted_sum_of_squares,
+        "cost": result.cost,
+        "weighted_sum_of_squares": result.weighted_sum_of_squares,
+        "datum": [{"photo": photo, "parameter": parameter} for photo, parameter in result.datum],
+        "camera": result.collection.camera,
+        "parameters": result.collection.parameters,
+    }
+
+
+def _units(result: AdjustedCollection) -> dict[str, str]:
+    """Return the units of parameters, of positions and of residuals, what shares a unit together."""
+    names, units = result.collection.parameters[6:], result.collection.units[6:]
+    lengths = [name for name, unit in zip(names, units, strict=True) if unit]
+    plain = [name for name, unit in zip(names, units, strict=True) if not unit]
+    return {
+        "w1, w2, w3": "rad",
+        "t1, t2, t3, position": "unit of the object space",
+        ", ".join([*lengths, "residual_px"]): "pixel",
+        **({", ".join(plain): "1"} if plain else {}),
+    }

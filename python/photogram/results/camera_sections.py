@@ -1,0 +1,252 @@
+"""The section of cameras: adjusted ones with their tests, correlations and distortion, and fixed ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from photogram.network.cameras import Camera
+from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
+from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
+from photogram.results.result import Result
+from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section
+from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
+
+LISTED = 12
+"""Cameras with a table of their own."""
+NAMED = 3
+"""Photos that are named of each correlation."""
+RADII = 9
+"""Radii of a distortion curve that people see."""
+
+
+def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
+    """Return adjusted cameras with their tests, correlations and distortion, and those that are held."""
+    found = calibrations(result)
+    shown, note = found[:LISTED], "the table of cameras has all"
+    tables = [parameters_table(each, law_of(result)) for each in shown]
+    parts: list[Part] = [*_layers("camera-layers", tables)]
+    if groups := [(each.camera.name, group) for each in shown for group in each.groups]:
+        parts.append(_terms_together(groups))
+    curves = [
+        _curve_table(each.camera.name, curve, str(each.camera.camera.unit))
+        for each in shown
+        if (curve := distortion_curve(result, each.camera)) is not None
+    ]
+    parts += [*drawings, *_layers("curve-layers", curves)]
+    remarks = [
+        f"{each.camera.name}: {sentence}"
+        for each in shown
+        for sentence in (*_pairs(each), *_field_remarks(result, each), *each.remarks())
+    ]
+    parts += [Remarks(remarks)] if remarks else []
+    held = [each for each in result.cameras if each.given.is_held]
+    facts = [
+        Fact(
+            f"{each.name}: {each.camera.model}",
+            values_written(each.camera),
+            each.camera.unit or "",
+            f"{each.photos} photos, {each.images} images",
+        )
+        for each in held[:LISTED]
+    ]
+    if len(held) > LISTED:
+        facts.append(Fact("Not shown here", f"{len(held) - LISTED}", note=note))
+    if facts:
+        parts.append(Facts("Cameras that are held", facts))
+    if len(found) > LISTED:
+        parts.append(Facts("More cameras", [Fact("Not shown here", f"{len(found) - LISTED}", note=note)]))
+    intro = "The interior orientation: what was given, what was found, and what the images say about it."
+    return Section("cameras", "Cameras", parts, intro if found else "")
+
+
+def _layers(name: str, tables: list[Table]) -> list[Layers] | list[Table]:
+    return [Layers(name, tables)] if len(tables) > 1 else tables
+
+
+def law_of(result: Result) -> str:
+    """Return the distribution of the tests of parameters."""
+    return "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
+
+
+def values_written(camera: Camera) -> str:
+    """Return the parameters of a camera that are not zero."""
+    return ", ".join(f"{name} {value:.8g}" for name, value in camera.parameters.items() if value != 0)
+
+
+def parameters_table(found: Calibration, law: str = "") -> Table:
+    """Return the estimated parameters of a camera with their tests, which have a distribution."""
+    every, camera = found.parameters, found.camera
+    axes, of = tuple(Axis.of(each.name, each.unit) for each in every), np.arange(len(every))
+    names = replace(component(axes, of)[0], head="Parameter")
+    alike: dict[str, Any] = {"axes": axes, "of": of}
+    free = {math.inf: "free"}
+    columns = [
+        of_each(every, "name", member="name", kind="name"),
+        of_each(every, "unit", kind="name"),
+        names,
+        of_each(every, "given", kind="value", member="", head="Given", **alike),
+        of_each(every, "given_sd", kind="deviation", member="", head="sd given", words=free, **alike),
+        of_each(every, "value", kind="value", head="Adjusted", **alike),
+        of_each(every, "sd", kind="deviation", head="sd adjusted", **alike),
+        of_each(every, "change", kind="difference", head="Change", **alike),
+        of_each(every, "test_value", head=f"t {law}".strip(), decimals=2),
+        of_each(every, "probability", head="p", figures=2),
+        of_each(every, "significant"),
+        of_each(every, "multiple_correlation", head="R with all others", decimals=4),
+        of_each(every, "from_prior"),
+        of_each(every, "gain"),
+        Quantity(
+            [outcome(each) for each in every],
+            kind="name",
+            head="Outcome",
+            marked=np.array([not each.separable or each.contradicts for each in every], dtype=bool),
+        ),
+    ]
+    note = (
+        f"{camera.camera.model}, {camera.camera.direction}; {camera.photos} photos, {camera.images} images."
+        " t tests terms of the lens against zero, the others against the given value; R is the multiple"
+        " correlation with all other unknowns: near 1 nothing tells the parameter from them."
+    )
+    deviations = np.array([each.sd for each in every])
+    return Table(f"parameters-{camera.name}", camera.name, columns, note, "", deviations)
+
+
+def gains_section(result: Result) -> Section:
+    """Return the redundancy numbers of weighted parameters, and the gains of all, for reports as text."""
+    tables = []
+    for found in calibrations(result)[:LISTED]:
+        every, name = found.parameters, found.camera.name
+        weighted = np.array([0 < each.given_sd < math.inf for each in every], dtype=bool)
+        columns = [
+            of_each(every, "name", kind="name", head="Parameter"),
+            of_each(every, "redundancy", head="Redundancy", decimals=3, seen=weighted),
+            of_each(every, "gain", head="Gain"),
+        ]
+        tables.append(Table(f"gains-{name}", name, columns))
+    intro = "Without a parameter, the weighted sum of squares would rise by its gain."
+    return Section("gains", "Redundancy numbers and gains of camera parameters", tables, intro)
+
+
+def outcome(each: ParameterTest) -> str:
+    """Return the outcome of the tests of a parameter."""
+    words = ["significant" if each.significant else "not significant"]
+    if not each.is_lens:
+        words = ["differs from the given value" if each.significant else "as given"]
+    if not each.separable:
+        words.append("not separable")
+    if each.from_prior:
+        words.append("from its prior")
+    return ", ".join(words)
+
+
+def _terms_together(groups: Sequence[tuple[str, GroupTest]]) -> Table:
+    every = [group for _, group in groups]
+    columns = [
+        Quantity([camera for camera, _ in groups], kind="name", head="Camera"),
+        Quantity([", ".join(each.names) for each in every], kind="name", head="Terms together"),
+        of_each(every, "test_value", head="F", decimals=2),
+        of_each(every, "probability", head="p", figures=2),
+        of_each(every, "outcome", kind="name", head="Outcome"),
+    ]
+    return Table("camera-groups", "Terms of the lens tested together", columns)
+
+
+def _pairs(found: Calibration) -> list[str]:
+    """Name what is correlated by more than 0.95."""
+    alike = [(f"{each.first} and {each.second}", each.coefficient) for each in found.correlations]
+    alike += [
+        (f"{each.parameter} and {each.component} of {_first_photos(each.photos)}", each.coefficient)
+        for each in found.poses
+    ]
+    return [f"{both} are correlated by {coefficient:.4f}" for both, coefficient in alike]
+
+
+def _first_photos(photos: Sequence[str]) -> str:
+    """Name three photos at the most."""
+    named = f"photo {', '.join(photos[:NAMED])}"
+    return named if len(photos) <= NAMED else f"{named} and {len(photos) - NAMED} others"
+
+
+def _image_axis(name: str, unit: str) -> Axis:
+    return Axis(name, unit, small="um", factor=1000.0) if unit == "mm" else Axis.of(name, unit)
+
+
+def _curve_table(camera: str, curve: DistortionCurve, unit: str) -> Table:
+    axes = (_image_axis("", unit),)
+    inside = np.flatnonzero(curve.radii <= curve.observed * (1 + 1e-9))
+    rows = inside[np.unique(np.linspace(0, len(inside) - 1, RADII).round().astype(int))]
+    added = "measured" if curve.direction == "backward" else "ideal"
+    heads = {
+        "values": "Distortion",
+        "sd": "sd",
+        "sd_mapping": "sd of the mapping",
+        "balanced": "Balanced",
+        "sd_balanced": "sd of balanced",
+    }
+    columns = [
+        Quantity(curve.radii, (Axis.of("", unit),), "deviation", head="Radius", decimals=4),
+        *(
+            Quantity(getattr(curve, name), axes, "deviation", head=head, decimals=3)
+            for name, head in heads.items()
+        ),
+    ]
+    note = (
+        f"Radial distortion, added to {added} coordinates, over the {added} radius up to"
+        f" {curve.observed:.4g} {unit}. The mapping is curve and principal distance together. The balanced"
+        f" curve is zero at {curve.balanced_at:.4g} {unit}, with a principal distance of"
+        f" {curve.balanced_distance:.7g} {unit}."
+    )
+    return Table(f"distortion-{camera}", f"Radial distortion of {camera}", columns, note, shown=rows)
+
+
+def _field_remarks(result: Result, found: Calibration) -> list[str]:
+    """Return the largest effect of the terms of the lens that are not radial."""
+    field = lens_field(result, found.camera)
+    return [] if field is None else [_field_sentence(field, str(found.camera.camera.unit))]
+
+
+def _field_sentence(field: LensField, unit: str) -> str:
+    factor, written = (1000.0, "um") if unit == "mm" else (1.0, "px")
+    at = field.largest
+    x, y = field.positions[at]
+    (dx, dy), (sx, sy) = field.vectors[at], np.sqrt(np.diag(field.covariances[at]))
+    return (
+        f"{', '.join(field.names)}: at the most {factor * dx:.3f} and {factor * dy:.3f} {written} (sd"
+        f" {factor * sx:.3f} and {factor * sy:.3f}), at x {x:.4g}, y {y:.4g} {unit}"
+    )
+
+
+def calibration_members(result: Result) -> list[dict[str, Any]]:
+    """Return what the JSON document contains of each camera with unknown parameters."""
+    return [_member(result, each) for each in calibrations(result)]
+
+
+def _member(result: Result, found: Calibration) -> dict[str, Any]:
+    curve, field = distortion_curve(result, found.camera), lens_field(result, found.camera)
+    return {
+        "camera": found.camera.name,
+        "parameters": records(parameters_table(found).columns),
+        "groups": [
+            members(each, "names", "test_value", "probability", "significant") for each in found.groups
+        ],
+        "correlations": [vars(each) for each in found.correlations],
+        "pose_correlations": [vars(each) for each in found.poses],
+        "terms": [
+            members(each, "names", "statistic", "probability", "worth_keeping", largest_effect_sd="effect")
+            for each in found.terms
+        ],
+        "removable": found.removable,
+        "remarks": found.remarks(),
+        "distortion": curve
+        and members(curve, "direction", observed_radius="observed")
+        | members(curve, "balanced_at", "balanced_distance", radius="radii", distortion="values")
+        | members(curve, "sd", sd_of_mapping="sd_mapping")
+        | members(curve, "balanced", balanced_sd="sd_balanced"),
+        "field": field
+        and members(field, terms="names", position="positions", vector="vectors", covariance="covariances"),
+    }

@@ -1,1 +1,0 @@
-"""The report of an adjusted network for the browser, part by part."""
