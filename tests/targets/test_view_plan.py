@@ -35,6 +35,9 @@ def test_each_view_has_a_name_and_makes_the_map_better(plan):
     assert plan.sentences[0].startswith("middle of the picture, ")
     assert plan.sentences[0].endswith(" m, tilted 30 degrees about x")
     assert " -> " in plan.sentences[-1]
+    table = plan.document().table("views").frame()
+    assert table["largest_px"].iloc[-1] == plan.largest
+    assert list(table["corners"]) == [30] * 6
     assert plan.largest == pytest.approx(
         np.nanmax(uncertainty_map(plan.calibrated, grid=(12, 8)).sd), rel=1e-12
     )

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from photogram.cli.calibration_options import NOT_GOOD_ENOUGH, PriorName, Seen, Uncertainty, distances_of
 from photogram.cli.choices import LossName
 from photogram.cli.components import COMPONENTS
-from photogram.cli.console import print_remark, print_sections, print_summary
+from photogram.cli.console import output, print_remark, print_summary
 from photogram.cli.documents import Documents, OfPrograms
 from photogram.cli.job import InputFile, Job, OutputFolder, with_job
 from photogram.cli.options import Quiet, Snooping, Strict, Threads, check_alone, default_out, out_option
@@ -116,15 +117,26 @@ class Planned:
         target = out or Path("planned-views")
         pictures = documents.pictures(job, target)
         plan = self.made(job, seen, uncertainty)
-        from photogram.show.methods import page_of
-        from photogram.targets.view_plan_report import plan_drawings, plan_files, plan_sections
+        from photogram.io.csv_text import csv_text
+        from photogram.show.forms import summary
+        from photogram.show.quantity import frame
+        from photogram.targets.document import worth_files
 
-        files = {target / name: content for name, content in plan_files(plan).items()}
-        page = documents.page(job, "calibrate", target, lambda: page_of(plan))
+        document, worth = plan.document(), plan.calibrated.worth
+        assert worth is not None
+
+        def summarize() -> None:
+            for line in summary(document, "views", "parameters"):
+                output.print(escape(line))
+
+        views = csv_text(frame(document.table("views").columns))
+        texts = {"report.txt": plan.report().encode(), "views.csv": views, **worth_files(worth)}
         job.finish(
-            files | pictures.of_drawings(lambda: plan_drawings(plan)) | page,
+            {target / name: content for name, content in texts.items()}
+            | pictures.of_drawings(document.drawings)
+            | documents.page(job, "calibrate", target, lambda: document),
             documents.as_json(plan),
-            summary=lambda: print_sections(plan_sections(plan), "report.txt"),
+            summary=summarize,
             code=0 if plan.enough else NOT_GOOD_ENOUGH,
         )
 

@@ -307,10 +307,17 @@ class Document:
 
     def tables(self, *, layers: bool = False) -> list[quantity.Table]:
         """Return the tables of all sections and details, with those in layers on request."""
+        return [part for part in self._parts(layers) if isinstance(part, quantity.Table)]
+
+    def drawings(self) -> list[Drawing]:
+        """Return the plots of all sections and details."""
+        return [part for part in self._parts(True) if isinstance(part, Drawing)]
+
+    def _parts(self, layers: bool) -> list[Part]:
         parts = [part for section in (*self.sections, *self.details) for part in section.parts]
         if layers:
             parts = [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]
-        return [part for part in parts if isinstance(part, quantity.Table)]
+        return parts
 
     def table(self, key: str) -> quantity.Table:
         """Return the table with a key, the first of several layers."""

@@ -3,10 +3,7 @@
 from photogram.arguments.on_demand import attach_checked
 
 WAYS = {
-    "document_of": ("view_plan_report",),
     "findings_of": ("findings",),
-    "page_of": ("view_plan_report",),
-    "report_of": ("view_plan_report",),
 }
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted
-from photogram.show.methods import Paged, document_of, report_of
+from photogram.show.methods import Documented
 from photogram.show.summary import Brief, Rows
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.new_views import Candidate
+
+if TYPE_CHECKING:
+    from photogram.show.page import Document
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +38,7 @@ class PlannedView:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class ViewPlan(Brief, Paged):
+class ViewPlan(Brief, Documented):
     """Views of a board that are to calibrate a camera, none of which has been taken.
 
     Attributes
@@ -124,7 +128,7 @@ class ViewPlan(Brief, Paged):
             *found,
             "Hold the board about so, still while each picture is taken, and take some views more than are"
             " planned: cross-validation needs them to test the lens, which a plan takes for right.",
-            f"photogram calibrate PHOTOGRAPHS {own} --sd images={given.sd0:g}",
+            f"Calibrate with `photogram calibrate PHOTOGRAPHS {own} --sd images={given.sd0:g}`.",
         ]
 
     def brief(self) -> tuple[str, Rows]:
@@ -133,10 +137,8 @@ class ViewPlan(Brief, Paged):
             (f"{number}", said) for number, said in enumerate(self.sentences, 1)
         ]
 
-    def report(self) -> str:
-        """Return the plan as text."""
-        return report_of(self)
+    def document(self) -> Document:
+        """Return the plan as a document; `docs/json.md` lists the members of its JSON form."""
+        from photogram.targets.view_plan_document import document
 
-    def to_json(self) -> bytes:
-        """Return the plan as a JSON document (UTF-8); `docs/targets.md` lists its members."""
-        return document_of(self)
+        return document(self)

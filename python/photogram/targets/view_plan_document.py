@@ -1,0 +1,81 @@
+"""The document of a plan of views."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+
+from photogram.network.attitudes import Attitudes
+from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
+from photogram.show.quantity import Axis, Quantity, Table, of_each
+from photogram.targets.document import worth_members
+from photogram.targets.page import drawings, worth_facts
+from photogram.targets.plan_drawing import plot_planned_views
+from photogram.targets.view_plan_result import ViewPlan
+
+CAPTION = "Where the corners of the board are in each picture; red: its point 0."
+PREDICTED = "This is a plan: the standard deviations follow from the planned board poses only."
+
+
+def document(plan: ViewPlan) -> Document:
+    """Return the document of a plan."""
+    calibration, worth = plan.calibrated.calibration, plan.calibrated.worth
+    assert worth is not None
+    tone: Tone = "good" if plan.need and plan.enough else "" if plan.enough else "bad"
+    views = Drawing("planned-views", "Views", CAPTION, partial(plot_planned_views, plan))
+    maps = Layers("uncertainty", [views, *drawings(worth)])
+    return Document(
+        what="Plan of views of a board",
+        title="",
+        judgements=[Judgement("Plan", plan.headline, [PREDICTED, *plan.assumed], tone)],
+        advice=plan.next,
+        highlights=worth_facts(worth),
+        sections=[
+            Section.of(_views(plan)),
+            Section("uncertainty", "Uncertainty of projection", [maps]),
+            Section.of(_parameters(plan)),
+        ],
+        members={
+            "board": calibration.board.described,
+            "size": calibration.corners.sizes[0],
+            "model": calibration.cameras[0].model,
+            "sd_of_corners": calibration.sd0,
+            "distance": plan.distance if math.isfinite(plan.distance) else None,
+            "need": plan.need or None,
+            "enough": plan.enough,
+            "largest": plan.largest,
+            "maps": worth_members(worth)["maps"],
+        },
+    )
+
+
+def _parameters(plan: ViewPlan) -> Table:
+    camera, nominal = plan.calibrated.cameras[0], plan.calibrated.calibration.cameras[0]
+    free = camera.estimated
+    columns = [
+        Quantity(np.array(camera.names, dtype=object)[free], (), "name", member="name", head="Parameter"),
+        Quantity(nominal.values[free], member="nominal", head="Nominal", figures=6),
+        Quantity(camera.sd[free], member="sd", head="Standard deviation", figures=2),
+    ]
+    return Table("parameters", "Camera", columns)
+
+
+def _views(plan: ViewPlan) -> Table:
+    poses = np.array([view.candidate.pose for view in plan.views])
+    turns = Attitudes.of("matrix_to_vision", poses[:, :3, :3]).values("rotation_vector_to_vision")
+    unit, pixels = plan.calibrated.calibration.board.unit, (Axis.of("px", "px"),)
+    columns = [
+        Quantity(np.arange(1, len(poses) + 1), name="view", member="view", head="View"),
+        of_each(plan.views, "candidate.name", (), "name", name="board", member="board", head="Board"),
+        of_each(plan.views, "corners", name="corners", head="Corners"),
+        of_each(
+            plan.views, "largest", pixels, "value", name="largest_px", member="largest_px", head="Largest"
+        ),
+        Quantity(turns, tuple(Axis.of(f"r{axis}", "") for axis in "xyz"), name=""),
+        Quantity(poses[:, :3, 3], tuple(Axis.of(f"t{axis}", unit) for axis in "xyz"), "value", ""),
+        Quantity(poses, member="pose"),
+    ]
+    about = "Largest is the largest standard deviation over the picture with this view and those before it."
+    return Table("views", "Views to take", columns, about=about)
