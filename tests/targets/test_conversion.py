@@ -73,7 +73,8 @@ def test_a_turned_camera_is_found_with_its_turn():
     assert turns.difference.rotation > 0.01
     assert not turns.difference.fitted.finite
     assert stays.difference.rotation == 0
-    assert "motion of the axes  none" in stays.report()
+    motion = {fact.name: fact.value for fact in stays.document().highlights}["motion of the axes"]
+    assert motion == "none"
 
 
 def test_knots_show_any_lens():

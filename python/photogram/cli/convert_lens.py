@@ -115,6 +115,8 @@ def convert_lens(
     Over 60 x 40 pixels: rms and largest difference, where it is, and the motion of the axes. Where the camera
     has covariances the new one has them too.
     """
+    from photogram.show.forms import summary
+
     if plots and out is None:
         raise typer.BadParameter("goes with --out DIR", param_hint="--plots")
     with job:
@@ -127,7 +129,7 @@ def convert_lens(
         job.finish(
             {} if out is None else {out / name: content for name, content in _files(found, plots).items()},
             {} if json is None else {json: found.to_json()},
-            summary=lambda: output.print(found.report(), end="", markup=False),
+            summary=lambda: output.print("\n".join(summary(found.document())), markup=False),
             code=0 if tolerance is None or found.within(tolerance) else BEYOND_TOLERANCE,
         )
 

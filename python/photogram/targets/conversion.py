@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import is_covariance, number, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.io import json
-from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
+from photogram.show.methods import Documented
+from photogram.show.page import Document, Fact, Section
+from photogram.show.quantity import Axis, Quantity, Table
 from photogram.show.summary import Brief, Rows
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.lens_fit import (
@@ -44,7 +45,7 @@ FIRMEST = 1e-2
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Conversion(Brief):
+class Conversion(Brief, Documented):
     """A lens of another model in place of a camera.
 
     Attributes
@@ -93,12 +94,15 @@ class Conversion(Brief):
 
     def brief(self) -> tuple[str, Rows]:
         """Return what came out in a few lines."""
-        at = " and ".join(distance_text(each, self.difference.unit) for each in self.difference.distances)
+        found = self.difference
+        at = " and ".join(distance_text(each, found.unit) for each in found.distances)
+        shift = ", ".join(f"{each:.3g}" for each in found.translation)
+        turn = f"{found.rotation:.3g} degrees" if np.any(found.fitted.motion != np.eye(4)) else "none"
         column, row = self.where
         rows = [
             ("difference", f"rms {self.rms:.3g} px, largest {self.largest:.3g} px {at}"),
             ("largest at", f"column {column:.0f}, row {row:.0f}"),
-            ("motion of the axes", self._motion()),
+            ("motion of the axes", f"{turn}, {shift} {found.unit}" if found.fitted.finite else turn),
             *self.camera.brief()[1],
         ]
         if self.covariance is not None:
@@ -107,37 +111,31 @@ class Conversion(Brief):
             rows.append(("not shown", f"{100 * self.unseen:.1f} percent of the picture"))
         return f"{self.source.title}: {self.source.model} as {self.camera.model}", rows
 
-    def _motion(self) -> str:
-        found = self.difference
-        shift = ", ".join(f"{each:.3g}" for each in found.translation)
-        turn = f"{found.rotation:.3g} degrees" if np.any(found.fitted.motion != np.eye(4)) else "none"
-        return f"{turn}, {shift} {found.unit}" if found.fitted.finite else turn
-
-    def to_csv(self) -> bytes:
-        """Return a row for each distance and pixel: column, row, dx, dy; empty where nothing is shown."""
-        found = self.difference
+    def document(self) -> Document:
+        """Return the conversion as a document: figures, differences over the picture, the new camera."""
+        title, rows = self.brief()
+        found, camera = self.difference, self.camera
         down, across = np.meshgrid(found.rows, found.columns, indexing="ij")
         times = len(found.distances)
-        return csv_text(
-            {
-                "distance": np.repeat(found.distances, across.size),
-                "column": np.tile(across.ravel(), times),
-                "row": np.tile(down.ravel(), times),
-                "dx": found.vectors[..., 0].ravel(),
-                "dy": found.vectors[..., 1].ravel(),
-            }
-        )
-
-    def to_json(self) -> bytes:
-        """Return the whole conversion as a JSON document."""
-        found, own = self.difference, self.camera
-        return json.to_json(
-            {
+        differences = [
+            Quantity(np.repeat(found.distances, across.size), name="distance"),
+            Quantity(np.tile(across.ravel(), times), name="column"),
+            Quantity(np.tile(down.ravel(), times), name="row"),
+            Quantity(found.vectors.reshape(-1, 2), (Axis("dx"), Axis("dy")), name=""),
+        ]
+        return Document(
+            what="Lens conversion",
+            title=title,
+            judgements=[],
+            advice=[],
+            highlights=[Fact(name, text) for name, text in rows],
+            sections=[Section.of(Table("differences", "Differences", differences))],
+            members={
                 "kind": "lens conversion",
                 "source": {"name": self.source.title, "model": self.source.model},
-                "model": own.model,
-                "parameters": dict(own.parameters),
-                "knots": own.knots,
+                "model": camera.model,
+                "parameters": dict(camera.parameters),
+                "knots": camera.knots,
                 "size": list(found.size),
                 "pixel_origin": "center",
                 "distances": [each if math.isfinite(each) else None for each in found.distances],
@@ -151,19 +149,17 @@ class Conversion(Brief):
                 "difference": found.vectors,
                 "names": list(self.names),
                 "covariance": self.covariance,
-            }
+            },
         )
+
+    def to_csv(self) -> bytes:
+        """Return a row for each distance and pixel: column, row, dx, dy; empty where nothing is shown."""
+        return self.document().table("differences").csv()
 
     def rig(self) -> Rig:
         """Return the new camera as files of other programs take it."""
         own = self.camera.replace(name=self.source.title)
         return Rig(cameras=(own,), sizes=(self.difference.size,), sensors=np.eye(4)[np.newaxis])
-
-    def report(self) -> str:
-        """Return the same as text."""
-        title, rows = self.brief()
-        wide = max(len(name) for name, _ in rows)
-        return "\n".join([title, "", *(f"{name:<{wide}}  {said}" for name, said in rows), ""])
 
 
 def convert_lens(
