@@ -7,7 +7,7 @@ from relisted import relisted
 
 from photogram import InputError
 from photogram.targets import Board, first_values
-from photogram.targets.sightings import LISTED, Listings
+from photogram.targets.sightings import CORNER_ORDERS, Listings
 
 
 def remarks(first):
@@ -31,7 +31,7 @@ def test_mirrored_corners_are_named_with_their_wrong_order():
     first = first_values(board, relisted(board, corners, {2: 1}))
     (said,) = [each for each in remarks(first) if "mirrored" in each]
     assert "middle03" in said
-    assert LISTED[1] in said
+    assert CORNER_ORDERS[1] in said
     assert (first.corners.point == corners.point).all()
 
 

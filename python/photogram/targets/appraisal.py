@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.results.result import Result
 
-FEWEST = 3
-"""Views of a part."""
+MIN_VIEWS_PER_PART = 3
 
 
 def cross_validate(
@@ -70,7 +69,7 @@ def cross_validate(
     views = np.unique(corners.views[mine])
     parts, tests, housings = [], [], []
     for pair in splits(len(views), into):
-        if min(map(len, pair)) < FEWEST:
+        if min(map(len, pair)) < MIN_VIEWS_PER_PART:
             raise InputError(f"{len(views)} views are too few for cross-validation by {into}")
         adjusted = []
         for part in pair:
@@ -138,8 +137,7 @@ def _unit(parts: list[Calibrated]) -> tuple[float, float]:
     return sum(sums) / sum(freedoms), sum(freedoms)
 
 
-FIGURES = 2
-"""Significant, of the median distance of boards."""
+DISTANCE_FIGURES = 2  # significant, of the median distance of boards
 
 
 def appraise(
@@ -228,7 +226,7 @@ def median_distance(calibrated: Calibrated, camera: int) -> float:
     views = np.unique(housing.seen.views[housing.seen.cameras == own])
     middle = [*(housing.points.max(axis=0) + housing.points.min(axis=0)) / 2, 1.0]
     places = (housing.sensors[own] @ housing.poses[views] @ middle)[:, :3]
-    return float(f"{np.median(np.linalg.norm(places, axis=1)):.{FIGURES}g}")
+    return float(f"{np.median(np.linalg.norm(places, axis=1)):.{DISTANCE_FIGURES}g}")
 
 
 check_arguments(globals(), ["cross_validate"])

@@ -20,17 +20,12 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.show.summary import Brief, Rows
 
 BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric_circles", "points"]
-Shape = Literal["held", "bend", "points"]
-"""What of a board is unknown: nothing, the two deflections of its middle lines, or every point."""
+Shape = Literal["held", "bend", "points"]  # unknowns: none, deflections of the middle lines, every point
 
 MAX_POINTS = 100_000
-"""Points of a board of columns and rows."""
-MAX_LENGTH = 1e50
-"""In the unit of a board: the squares of squares of lengths are finite."""
-MANY_VIEWS = 8
-"""Views from which the points of a board are adjusted, where nobody says what its shape is."""
-PLANE_PARTS, SPACING_PARTS = 200.0, 500.0
-"""Parts of the spacing that a target is expected to be out of the plane, and out of its place in it."""
+MAX_LENGTH = 1e50  # in the unit of the board: fourth powers of lengths remain finite
+MIN_VIEWS_OF_FREE_POINTS = 8  # the default shape is `points` from this number
+PLANE_SDS_PER_SPACING, PLACE_SDS_PER_SPACING = 200.0, 500.0
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -245,7 +240,7 @@ class Board(Valued, Brief):
 
     def shape_of(self, views: int) -> Shape:
         """Return what of the board is unknown where it is seen in so many views."""
-        return self.shape or ("points" if views >= MANY_VIEWS else "held")
+        return self.shape or ("points" if views >= MIN_VIEWS_OF_FREE_POINTS else "held")
 
     def deviations(self, views: int) -> Floats:
         """Return (n, 3) standard deviations of the points: those of their shape, 0 where they are held."""
@@ -255,8 +250,8 @@ class Board(Valued, Brief):
         if self.point_sd is not None:
             return np.asarray(self.point_sd)
         typical = min(self.pitch)
-        plane = typical / PLANE_PARTS if self.sd_plane is None else self.sd_plane
-        spacing = typical / SPACING_PARTS if self.sd_spacing is None else self.sd_spacing
+        plane = typical / PLANE_SDS_PER_SPACING if self.sd_plane is None else self.sd_plane
+        spacing = typical / PLACE_SDS_PER_SPACING if self.sd_spacing is None else self.sd_spacing
         return np.tile([spacing, spacing, plane], (count, 1))
 
     def replace(self, **changes: Any) -> Self:

@@ -106,19 +106,18 @@ def _number(file: TomlFile, key: str) -> float:
     return float_of(_value(file, key, int | float, "a number"))
 
 
-_KALIBR = {"aprilgrid": "aprilgrid", "checkerboard": "chessboard", "circlegrid": "circles"}
-"""Kinds of boards by the names of Kalibr."""
+_KINDS_OF_KALIBR = {"aprilgrid": "aprilgrid", "checkerboard": "chessboard", "circlegrid": "circles"}
 
 
 def _of_kalibr(path: Path) -> Board:
     """Read a target of Kalibr, in metres."""
     content = Tree(read_yaml_text(path), path)
     kind = content["target_type"].text()
-    if kind not in _KALIBR:
-        raise content["target_type"].error(f"{kind} is none of {', '.join(_KALIBR)}")
+    if kind not in _KINDS_OF_KALIBR:
+        raise content["target_type"].error(f"{kind} is none of {', '.join(_KINDS_OF_KALIBR)}")
     what = "tag" if kind == "aprilgrid" else "target"
     given: dict[str, Any] = {
-        "kind": _KALIBR[kind],
+        "kind": _KINDS_OF_KALIBR[kind],
         "columns": content[f"{what}Cols"].whole(1),
         "rows": content[f"{what}Rows"].whole(1),
     }

@@ -119,7 +119,9 @@ class Calibration(Start):
             # Knots that no image touches are determined by priors alone.
             free = None if _has_knots(start) else adjust(start.block(), covariance="verdict", **how)
             if free is None:
-                result = adjust(weighted_block(start), **how, covariance="verdict", tolerance=FINELY)
+                result = adjust(
+                    weighted_block(start), **how, covariance="verdict", tolerance=SPLINE_TOLERANCE
+                )
             else:
                 result = _with_priors(start, free, threads)
             worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
@@ -158,10 +160,8 @@ class Calibration(Start):
 
 
 ROUNDS = 8
-"""In which the standard deviation of corners is found, at the most, and the change that is none."""
 CHANGE = 0.01
-FINELY = 1e-6
-"""Of a standard deviation: where the steps of a splined lens end."""
+SPLINE_TOLERANCE = 1e-6  # convergence limit of splined lenses, in standard deviations
 
 
 def _ended(start: Start, result: Result, unregularised: Result | None) -> Calibrated:
@@ -227,8 +227,7 @@ def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
     return found
 
 
-NOTABLE, MOST = 0.01, 0.2
-"""Shares of the motion that are errors of poses: told, and refused where an offset is free."""
+NOTABLE_POSE_ERROR, MAX_POSE_ERROR = 0.01, 0.2  # shares of the motion: remark, error if an offset is free
 
 
 def checked_clocks(calibrated: Calibrated) -> list[Message]:
@@ -247,14 +246,14 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
             continue
         views = np.unique(corners.views[corners.cameras == camera])
         share = float(shares[0, views].sum() / shares[1, views].sum())
-        if share > MOST and np.isinf(sd[camera]):
+        if share > MAX_POSE_ERROR and np.isinf(sd[camera]):
             photos = [result.block.photo_ids[row] for row in calibrated.photos[views].tolist()]
             what = f"the offset of {each.name} is not determined: the board hardly moves"
             told = (
                 f"{what}; {share:.0%} of its motion are errors of its poses. Weigh it (sd_offsets, --offset)"
             )
             raise RankError(told, photos, [], [each.name], what)
-        if share > NOTABLE:
+        if share > NOTABLE_POSE_ERROR:
             messages.append(
                 Message(
                     f"the offset of {each.name} comes out too small by about {share:.0%}: so much of the"
@@ -277,8 +276,7 @@ def _shares(calibrated: Calibrated) -> Floats:
     return np.stack([6 * np.nan_to_num(by_errors) * result.covariance_scale, there])
 
 
-ANY, TAKEN = 5.0, 4.0
-"""Times the rms of all: beyond the first a coordinate calls for action, beyond the second corners go."""
+REMOVAL_FACTOR, OUTLIER_FACTOR = 5.0, 4.0  # times the rms: start of removal, removed corners
 
 
 def marked_as_mrcal(result: Result) -> Bools:
@@ -290,7 +288,9 @@ def marked_as_mrcal(result: Result) -> Bools:
     weighted = np.abs(result.residuals / result.image_given_sd)
     rms = np.sqrt(np.nanmean(weighted**2))
     far = np.nanmax(weighted, axis=1, initial=0.0)
-    return far > TAKEN * rms if (far > ANY * rms).any() else np.zeros(len(far), dtype=bool)
+    return (
+        far > OUTLIER_FACTOR * rms if (far > REMOVAL_FACTOR * rms).any() else np.zeros(len(far), dtype=bool)
+    )
 
 
 def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:

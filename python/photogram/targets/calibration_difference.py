@@ -17,10 +17,8 @@ from photogram.targets.motion_fit import Criterion, Fitted, differences_at, fitt
 from photogram.targets.projection import fixed_points, of_functions, point_partials, worst
 from photogram.targets.vision import imaged, unknown_of, values_of
 
-DEFINED = 1e-5
-"""Of the largest: what the cofactors of differences over a grid say less of is rounding."""
-TESTED = (12, 8)
-"""The grid over which two different models are tested."""
+RANK_TOLERANCE = 1e-5  # smaller singular values, relative to the largest, are rounding errors
+TEST_GRID = (12, 8)  # pixels across and down, for cameras of different models
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +290,7 @@ class _Expected:
             change = (values_of(b.camera) - values_of(a.camera))[unknown]
             chi2 = float(change @ np.linalg.solve(a.covariance + b.covariance, change))
             return DifferenceTest.of("parameters of both cameras", chi2, len(change))
-        pixels = image_grid(size, TESTED)[2]
+        pixels = image_grid(size, TEST_GRID)[2]
         pixels = pixels[a.sees(pixels)]
         vectors, effects = [], []
         for each in distances:
@@ -313,7 +311,7 @@ def _tested(vectors: Floats, effects: Floats) -> DifferenceTest:
     """Test (n, 2) vectors by (n, 2, r) F of their covariance F F', which has no more than r dimensions."""
     known = np.isfinite(vectors).all(axis=1) & np.isfinite(effects).all(axis=(1, 2))
     u, s, _ = np.linalg.svd(effects[known].reshape(-1, effects.shape[2]), full_matrices=False)
-    defined = s > DEFINED * s[0]
+    defined = s > RANK_TOLERANCE * s[0]
     chi2 = float((((u.T @ vectors[known].ravel())[defined] / s[defined]) ** 2).sum())
     return DifferenceTest.of("differences over the picture", chi2, int(np.count_nonzero(defined)))
 

@@ -109,12 +109,10 @@ class Worth:
 
 
 Part = Literal["cameras", "sensors", "board", "views"]
-"""What has cofactors."""
 Chosen = tuple[list[str], list[tuple[str, list[str]]], list[Floats | int]]
 """Names of unknowns, what they are in the result, and their partials by steps of the block; numbers of those
 that are such steps."""
-STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")
-"""Steps of a pose in vision axes: R <- Exp(w) R, t <- t + dt."""
+STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")  # R <- Exp(w) R, t <- t + dt in vision axes
 
 
 class UnknownWeight(Result):

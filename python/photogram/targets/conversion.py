@@ -25,8 +25,8 @@ from photogram.show.summary import Brief, Rows
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.lens_fit import (
     GRID,
-    HELD,
     KNOTS,
+    NO_MOTION,
     Moved,
     Points,
     fitted_in_stages,
@@ -40,8 +40,7 @@ from photogram.targets.motion_fit import Fitted, points_at
 from photogram.targets.output.rig import Rig
 from photogram.targets.vision import TURNED
 
-FIRMEST = 1e-2
-"""Of the mean covariance of the images: what is added to each, so that no pixel weighs everything."""
+MIN_RELATIVE_VARIANCE = 1e-2  # added to each covariance, so that no pixel dominates
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -216,7 +215,7 @@ def convert_lens(
     finite = math.isfinite(apart[0])
     roots = None if known is None else _roots(source, known, points[near])
     shown = Points(points[near], places[near], finite, roots)
-    moving = HELD if intrinsics_only or start.knots is not None else slice(0 if finite else 3, 6)
+    moving = NO_MOTION if intrinsics_only or start.knots is not None else slice(0 if finite else 3, 6)
     found = fitted_in_stages(Moved(start), shown, free, moving)
     images = Points(points, places, finite).imaged(found)[0]
     images[~shows(start, points)] = np.nan
@@ -230,7 +229,7 @@ def convert_lens(
             size=size,
             unit="m",
             criterion="pixels",
-            fitted=Fitted(found.motion, finite and moving != HELD, int(np.count_nonzero(near))),
+            fitted=Fitted(found.motion, finite and moving != NO_MOTION, int(np.count_nonzero(near))),
             columns=columns,
             rows=rows,
             distances=apart,
@@ -277,7 +276,7 @@ def _roots(source: Camera, known: tuple[list[int], Floats], points: Floats) -> F
     partials = source.partials(points * TURNED)[2][..., rows]
     covariances = partials @ matrix @ partials.transpose(0, 2, 1)
     mean = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 2
-    lower = np.linalg.cholesky(covariances + (FIRMEST * mean or 1.0) * np.eye(2))
+    lower = np.linalg.cholesky(covariances + (MIN_RELATIVE_VARIANCE * mean or 1.0) * np.eye(2))
     return np.asarray(np.linalg.inv(lower))
 
 

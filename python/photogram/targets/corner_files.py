@@ -20,7 +20,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.targets.board import Board
 from photogram.targets.board_files import is_board
 from photogram.targets.corner_views import Measured
-from photogram.targets.opencv_corners import BEGIN, is_npz, is_storage, read_npz, read_storage
+from photogram.targets.opencv_corners import BEGIN_BYTES, is_npz, is_storage, read_npz, read_storage
 
 _SYNONYMS: Mapping[str, str] = {
     **dict.fromkeys(("photo", "picture", "file", "filename", "img", "image_name"), "image"),
@@ -34,11 +34,9 @@ _SYNONYMS: Mapping[str, str] = {
     "sigma": "sd",
 }
 _NUMBERS = {"x", "y", "sd", "level", "weight", "time"}
-NANOSECONDS = 1e12
-"""Times beyond are nanoseconds: seconds would lie 30,000 years ahead."""
+MIN_NANOSECONDS = 1e12  # larger times are in nanoseconds
 HEADLESS = ("time", "point", "x", "y")
-MISSING = "-"
-"""What stands for a missing value in the text of mrcal."""
+MISSING = "-"  # in the text format of mrcal
 
 
 def _spelled(names: Sequence[str]) -> list[str]:
@@ -221,7 +219,7 @@ def _seconds(table: ColumnTable, times: Floats, first: list[int]) -> Floats:
     missing = np.flatnonzero(np.isnan(own))
     if len(missing):
         raise table.error(first[int(missing[0])], "column time: is empty")
-    return np.asarray(own * (1e-9 if own.max(initial=0.0) > NANOSECONDS else 1.0))
+    return np.asarray(own * (1e-9 if own.max(initial=0.0) > MIN_NANOSECONDS else 1.0))
 
 
 def _points(table: ColumnTable, board: Board | None) -> Indices:
@@ -266,14 +264,12 @@ def _of_tags(table: ColumnTable, board: Board) -> Indices:
 
 
 MODEL = ".cameramodel"
-KEY = "optimization_inputs"
-"""Of a model of mrcal that keeps its corners."""
+KEY = "optimization_inputs"  # in camera models of mrcal with corners
 PICTURES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".tif", ".tiff", ".webp"})
 ENDINGS = frozenset(
     {*(".vnl", ".csv", ".tsv", ".txt", ".yml", ".yaml", ".xml", ".json", ".npz", ".toml"), MODEL}
 )
-MOST = 2000
-"""Files of a folder that are looked at."""
+MAX_FILES_EXAMINED = 2000
 
 
 @dataclass(frozen=True)
@@ -306,8 +302,10 @@ def files_at(path: Path) -> list[Path]:
         if not path.is_dir():
             path.stat()
             return [path]
-        inside = sorted(path.iterdir())[:MOST]
-        below = [file for each in inside if each.is_dir() for file in sorted(each.iterdir())[:MOST]]
+        inside = sorted(path.iterdir())[:MAX_FILES_EXAMINED]
+        below = [
+            file for each in inside if each.is_dir() for file in sorted(each.iterdir())[:MAX_FILES_EXAMINED]
+        ]
         return [each for each in [*inside, *below] if each.is_file()]
 
 
@@ -320,7 +318,7 @@ def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Pa
             continue
         if is_board(each):
             boards.append(each)
-        elif each.suffix == MODEL or (each.suffix == ".txt" and KEY in read_beginning(each, BEGIN)):
+        elif each.suffix == MODEL or (each.suffix == ".txt" and KEY in read_beginning(each, BEGIN_BYTES)):
             models.append(each)
         elif (form := next((own for own in _FORMS if own.knows(each)), None)) is not None:
             corners.setdefault(form, []).append(each)

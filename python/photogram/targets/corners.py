@@ -15,10 +15,8 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.show.summary import Brief, Rows, few
 
-FEWEST = 6
-"""Corners with which a view says something of the camera."""
-_FLAT = 1e-3
-"""What the corners of a view may be wide, over their length, to count as lying on one line."""
+MIN_CORNERS_PER_VIEW = 6
+_MAX_WIDTH_OF_LINE = 1e-3  # width over length of the corners of a view on one line
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -179,8 +177,8 @@ class Corners(Valued, Brief):
         found = {}
         for row, name in enumerate(self.pictures):
             own = self.use & (self.picture == row)
-            if np.count_nonzero(own) < FEWEST:
-                found[name] = f"{np.count_nonzero(own)} corners, fewer than {FEWEST}"
+            if np.count_nonzero(own) < MIN_CORNERS_PER_VIEW:
+                found[name] = f"{np.count_nonzero(own)} corners, fewer than {MIN_CORNERS_PER_VIEW}"
             elif _on_a_line(self.xy[own]) or _on_a_line(places[self.point[own]]):
                 found[name] = "all corners lie on one line"
         return found
@@ -188,7 +186,7 @@ class Corners(Valued, Brief):
 
 def _on_a_line(places: Floats) -> bool:
     long, wide = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[:2]
-    return not wide > _FLAT * long
+    return not wide > _MAX_WIDTH_OF_LINE * long
 
 
 def _size(given: object) -> tuple[int, int] | None:

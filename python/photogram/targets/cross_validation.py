@@ -26,8 +26,7 @@ from photogram.targets.housing import Housing
 from photogram.targets.projection import common_partials, datum_rows
 from photogram.targets.vision import unknown_of, values_of
 
-EXPLAINED = 0.01
-"""Probability beyond which calibrations differ as they should."""
+MIN_PROBABILITY = 0.01  # calibrations with a larger p agree
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class DifferenceTest:
     @property
     def explained(self) -> bool:
         """Whether the cofactors explain the difference."""
-        return self.probability > EXPLAINED
+        return self.probability > MIN_PROBABILITY
 
     @property
     def factor(self) -> float:
@@ -68,10 +67,8 @@ class DifferenceTest:
 
 
 Into = Literal["odd", "halves"] | int
-"""How views are split."""
 
-FROM_PRIORS = 1e-6
-"""Of the cofactors of a change: those below are of what both parts take from their priors."""
+RANK_TOLERANCE = 1e-6  # smaller relative cofactors of a change are due to the common priors
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +152,7 @@ def _seen_by_both(change: Floats, cofactors: Floats, whole: Floats) -> tuple[Flo
     """
     scale = 1 / np.sqrt(whole)
     values, vectors = np.linalg.eigh(cofactors * scale[:, np.newaxis] * scale)
-    kept = values > FROM_PRIORS
+    kept = values > RANK_TOLERANCE
     return vectors[:, kept].T @ (scale * change), np.diag(values[kept])
 
 
@@ -197,7 +194,7 @@ class CrossValidation(Brief):
     @property
     def explained(self) -> bool:
         """Whether covariances explain how parts differ: no p below 0.01 over the number of splits."""
-        return min(each[-1].probability for each in self.tests) > EXPLAINED / len(self.tests)
+        return min(each[-1].probability for each in self.tests) > MIN_PROBABILITY / len(self.tests)
 
     @property
     def factor(self) -> float:

@@ -27,21 +27,17 @@ from photogram.targets.board import Board
 from photogram.targets.corner_views import Measured
 
 Picture = NDArray[np.uint8]
-STEPS, STEP = 50, 1e-4
-"""Iterations of a corner, and the step in pixels that ends them."""
-SMALLEST, LARGEST = 2, 15
-"""Half the sides of windows, pixels."""
-NEIGHBOURS = 14
-"""Corners that say where another one must be."""
-APART = 1.0
-"""Pixels from there: whatever the lens, less than a wrong corner is."""
+MAX_REFINEMENT_STEPS, MIN_REFINEMENT_PX = 50, 1e-4
+MIN_HALF_WINDOW_PX, MAX_HALF_WINDOW_PX = 2, 15
+NEIGHBOURS = 14  # corners that predict the place of another
+MAX_PREDICTION_ERROR_PX = 1.0
 
 
 def refined(cv2: Any, picture: Picture, xy: Floats, half: Floats) -> Floats:
     """Return the saddle points next to corners (n, 2), in windows of their half sides (n,), pixels."""
     found = xy.copy()
-    end = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, STEPS, STEP)
-    sides = np.clip(half, SMALLEST, LARGEST).astype(int)
+    end = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, MAX_REFINEMENT_STEPS, MIN_REFINEMENT_PX)
+    sides = np.clip(half, MIN_HALF_WINDOW_PX, MAX_HALF_WINDOW_PX).astype(int)
     for each in np.unique(sides).tolist():
         own = sides == each
         start = xy[own].astype(np.float32).reshape(-1, 1, 2)
@@ -64,12 +60,12 @@ def settled(
     sides = half * _scales(own, xy)
     found = refined(cv2, picture, xy, sides)
     expected = _by_neighbours(cv2, own, found)
-    away = ~(np.linalg.norm(found - expected, axis=1) < APART)
+    away = ~(np.linalg.norm(found - expected, axis=1) < MAX_PREDICTION_ERROR_PX)
     known = away & np.isfinite(expected).all(axis=1)
     if known.any():
         found[known] = refined(cv2, picture, expected[known], sides[known])
         expected = _by_neighbours(cv2, own, found)
-        away = ~(np.linalg.norm(found - expected, axis=1) < APART)
+        away = ~(np.linalg.norm(found - expected, axis=1) < MAX_PREDICTION_ERROR_PX)
     return points[~away], found[~away]
 
 
@@ -99,17 +95,12 @@ def _by_neighbours(cv2: Any, places: Floats, xy: Floats) -> Floats:
 
 
 FAMILIES = ("4X4", "5X5", "6X6", "7X7")
-COUNTS = (50, 100, 250, 1000)
-"""Tags of the dictionaries of a family; the smaller ones are the first of the larger ones."""
-FEWEST = 4
-"""Tags that fix a homography."""
-NEAR = 0.5
-"""Of the pitch of the board: how far a tag may be from where the others put it, as lenses are."""
-CLEAR = 0.8
-"""Of the way to what is beside a corner, a tag or a square: half the side of its window."""
+DICTIONARY_SIZES = (50, 100, 250, 1000)  # smaller dictionaries are the begin of larger ones
+MIN_TAGS_OF_HOMOGRAPHY = 4
+MAX_TAG_ERROR = 0.5  # distance of a tag from its predicted place, in pitches of the board
+WINDOW_OF_GAP = 0.8  # half window over the distance to the neighbour of a corner, tag or square
 
-Found = tuple[Indices, Floats]
-"""Numbers of points of the board, and where they are: (n,), (n, 2)."""
+Found = tuple[Indices, Floats]  # (n,) numbers of points of the board, and their (n, 2) images
 Placed = tuple[Found, float] | None
 
 
@@ -152,12 +143,18 @@ class Tags:
         tags = np.asarray(found, dtype=np.float64).reshape(-1, 4, 2)
         known = (ids < len(centres)) & (np.bincount(ids)[ids] == 1)
         ids, tags = ids[known], tags[known]
-        if len(ids) < FEWEST:
+        if len(ids) < MIN_TAGS_OF_HOMOGRAPHY:
             return None
         pitch = float(np.abs(np.diff(np.unique(centres.round(9)))).min())
-        plane, fits = self.cv2.findHomography(_centres(tags), centres[ids], self.cv2.RANSAC, NEAR * pitch)
+        plane, fits = self.cv2.findHomography(
+            _centres(tags), centres[ids], self.cv2.RANSAC, MAX_TAG_ERROR * pitch
+        )
         own = np.zeros(0, dtype=bool) if plane is None else fits.ravel().astype(bool)
-        return (ids[own], tags[own], np.asarray(plane)) if np.count_nonzero(own) >= FEWEST else None
+        return (
+            (ids[own], tags[own], np.asarray(plane))
+            if np.count_nonzero(own) >= MIN_TAGS_OF_HOMOGRAPHY
+            else None
+        )
 
 
 def charuco_tags(cv2: Any, board: Board) -> Tags:
@@ -169,7 +166,7 @@ def charuco_tags(cv2: Any, board: Board) -> Tags:
         for legacy in (False, True) if squares[1] % 2 == 0 else (False,):
             white = (i + j) % 2 == (0 if legacy else 1)
             count = int(np.count_nonzero(white))
-            size = next((each for each in COUNTS if each >= count), None)
+            size = next((each for each in DICTIONARY_SIZES if each >= count), None)
             if size is None:
                 continue
             dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{family}_{size}"))
@@ -190,7 +187,7 @@ def charuco_tags(cv2: Any, board: Board) -> Tags:
         if points is None or not len(points):
             return None
         seen = np.asarray(points).ravel().astype(int), np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        return seen, CLEAR * (1 - edge) / 2
+        return seen, WINDOW_OF_GAP * (1 - edge) / 2
 
     return Tags(ways, corners_of, board.places[:, :2], cv2)
 
@@ -214,7 +211,7 @@ def grid_tags(cv2: Any, board: Board) -> Tags:
         # Seen from the front OpenCV goes round clockwise, and the board does not.
         turns = [np.roll(flat[:, ::-1], turn, axis=1) for turn in range(4)]
         turn = int(np.argmin([np.abs(each - own).sum() for each in turns]))
-        return (points[ids].ravel(), np.roll(tags[:, ::-1], turn, axis=1).reshape(-1, 2)), CLEAR / 2
+        return (points[ids].ravel(), np.roll(tags[:, ::-1], turn, axis=1).reshape(-1, 2)), WINDOW_OF_GAP / 2
 
     return Tags(ways, corners_of, board.places[:, :2], cv2)
 
@@ -232,14 +229,10 @@ def _mapped(plane: Floats, xy: Floats) -> Floats:
     return np.asarray(found[..., :2] / found[..., 2:])
 
 
-PART = 0.4
-"""Half the side of the window of a corner, over the least distance to its neighbours."""
-ENOUGH = 1600
-"""Pixels of the longer side of a picture that is searched at first."""
-LEAST = (25.0, 8.0)
-"""Square pixels of the smallest circles: large ones first, among which grain is none."""
-ROUND, FLAT = 0.5, 0.05
-"""Of circles that are tilted by 75 degrees: 4 pi A / P^2, and the ratio of moments."""
+WINDOW_OF_SPACING = 0.4  # half window over the least distance between corners
+MAX_FIRST_SIDE_PX = 1600  # longer side of the reduced picture that is searched first
+MIN_CIRCLE_AREAS_PX = (25.0, 8.0)  # largest first, so that film grain is not taken for circles
+MIN_CIRCULARITY, MIN_INERTIA_RATIO = 0.5, 0.05  # of circles tilted by 75 degrees
 
 
 def detected(
@@ -352,12 +345,12 @@ def _chessboard(cv2: Any, board: Board, picture: Picture) -> Floats | None:
             break
     if start is None:
         return None
-    return refined(cv2, picture, start, PART * _nearest(start.reshape(*board.grid[::-1], 2)))
+    return refined(cv2, picture, start, WINDOW_OF_SPACING * _nearest(start.reshape(*board.grid[::-1], 2)))
 
 
 def _reductions(picture: Picture) -> list[int]:
     """Return how many times smaller a picture is searched, one after the other."""
-    times = math.ceil(max(picture.shape) / ENOUGH)
+    times = math.ceil(max(picture.shape) / MAX_FIRST_SIDE_PX)
     return [times, 1] if times > 1 else [1]
 
 
@@ -377,11 +370,11 @@ def _circles(cv2: Any, board: Board, picture: Picture) -> Floats | None:
     """Return the centres of all circles, which tilted boards show as ellipses."""
     skewed = board.kind == "asymmetric_circles"
     how = cv2.CALIB_CB_ASYMMETRIC_GRID if skewed else cv2.CALIB_CB_SYMMETRIC_GRID
-    for least in LEAST:
+    for least in MIN_CIRCLE_AREAS_PX:
         blobs = cv2.SimpleBlobDetector_Params()
         blobs.minArea, blobs.maxArea = least, picture.size / len(board.places)
         blobs.minDistBetweenBlobs = math.sqrt(least)
-        blobs.minCircularity, blobs.minInertiaRatio = ROUND, FLAT
+        blobs.minCircularity, blobs.minInertiaRatio = MIN_CIRCULARITY, MIN_INERTIA_RATIO
         detector = cv2.SimpleBlobDetector_create(blobs)
         for more in (cv2.CALIB_CB_CLUSTERING, 0):
             there, xy = cv2.findCirclesGrid(picture, board.grid, flags=how | more, blobDetector=detector)

@@ -27,10 +27,10 @@ __all__ = [
     "steps_of_125",
 ]
 
-MAX_CORNERS = 4000
-VECTORS_ACROSS = 24  # Along the longer side of a picture
+MAX_DOTS = 4000  # corners
+ARROWS_ALONG_PICTURE = 24
 WIDTH_INCHES = 7.6
-COLOURS_OF_LEVEL = 4  # Steps of colour from one contour to the next
+COLOURS_PER_CONTOUR = 4
 
 
 def steps_of_125(low: float, high: float) -> Floats:
@@ -148,7 +148,7 @@ class _Apart:
     def panel(self, title: str) -> Panel:
         """Return lengths as contours, and some of the vectors, the longest as long as they are apart."""
         lengths = np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
-        step = max(1, round(len(self.columns) / VECTORS_ACROSS))
+        step = max(1, round(len(self.columns) / ARROWS_ALONG_PICTURE))
         every = (slice(None, None, step), slice(None, None, step))
         places = np.stack(np.meshgrid(self.columns, self.rows), axis=-1)[every].reshape(-1, 2)
         vectors = self.vectors[every].reshape(-1, 2)
@@ -187,7 +187,7 @@ def _map(
     levels = steps_of_125(max(float(positive.min()), lowest * high), high)
     shades = Shades(float(levels[0]), float(levels[-1]), unit, log=True)
     shown = np.where(values > 0, values, np.nan)
-    contours = Contours(columns, rows, shown, levels, shades, steps=COLOURS_OF_LEVEL)
+    contours = Contours(columns, rows, shown, levels, shades, steps=COLOURS_PER_CONTOUR)
     return replace(panel, marks=[contours, *marks], shades=shades)
 
 
@@ -209,7 +209,7 @@ def _known(found: UncertaintyMap) -> list[Mark]:
 def _seen(corners: Floats, coverage: Floats) -> list[Mark]:
     if not len(corners):
         return []
-    step = -(-len(corners) // MAX_CORNERS)
+    step = -(-len(corners) // MAX_DOTS)
     return [
         Markers(corners[::step], ".", 2.5, "white", edge=0.0, opacity=0.6),
         Line(np.vstack([coverage, coverage[:1]]), VERMILION, 1.2),

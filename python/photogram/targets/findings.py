@@ -19,16 +19,14 @@ from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
 from photogram.targets.calibration_result import Calibrated, UnknownWeight, Worth, deviation_of_corners
-from photogram.targets.cross_validation import EXPLAINED, CrossValidation
+from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.picture_parts import PARTS, parts_of
 from photogram.targets.vision import rays
 from photogram.words import Phrase
 
-TILTED, FEWEST = 15.0, 3
-"""Degrees from which a view tells focal length and distance apart, and how many such views are enough."""
-FARTHER = 1.3
-"""How many times as far as the nearest the farthest view should be."""
+MIN_TILT_DEG, MIN_TILTED_VIEWS = 15.0, 3  # separate focal length and distance
+MIN_DISTANCE_RATIO = 1.3  # farthest over nearest view
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +59,9 @@ class Showing:
         found = []
         if self.empty:
             found.append(Phrase("advice.board-parts", {"camera": self.camera, "parts": list(self.empty)}))
-        if np.count_nonzero(self.tilts >= TILTED) < FEWEST:
+        if np.count_nonzero(self.tilts >= MIN_TILT_DEG) < MIN_TILTED_VIEWS:
             found.append(Phrase("advice.tilt", {"camera": self.camera}))
-        if self.distances.max() < FARTHER * self.distances.min():
+        if self.distances.max() < MIN_DISTANCE_RATIO * self.distances.min():
             distance = _rounded(np.median(self.distances))
             fields = {"camera": self.camera, "distance": distance, "unit": self.unit}
             found.append(Phrase("advice.distances", fields))
@@ -109,8 +107,7 @@ def _parts(calibrated: Calibrated, number: int) -> tuple[int, tuple[str, ...] | 
     return len(there), tuple(each.name.replace(",", "") for each in there if each.cell not in reached)
 
 
-FREER = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
-"""Lenses, and how many parameters of them are free."""
+FREE_PARAMETERS_OF_LENS = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
 
 
 @findings_of.register(UnknownWeight)
@@ -157,10 +154,16 @@ def _other_model(calibrated: Calibrated) -> list[Phrase]:
     corners = calibrated.calibration.corners
     free, wide = 0, False
     for number, each in enumerate(calibrated.cameras):
-        free = max(free, len(each.estimated) if each.camera.knots is None else FREER[KNOTTED])
+        free = max(
+            free, len(each.estimated) if each.camera.knots is None else FREE_PARAMETERS_OF_LENS[KNOTTED]
+        )
         seen = corners.xy[corners.use & (corners.cameras[corners.picture] == number)]
         wide = wide or (bool(len(seen)) and from_axis(each.camera, seen) >= WIDEST)
-    lenses = [name for name, count in FREER.items() if count > free and (name == KNOTTED or not wide)]
+    lenses = [
+        name
+        for name, count in FREE_PARAMETERS_OF_LENS.items()
+        if count > free and (name == KNOTTED or not wide)
+    ]
     ways = [Phrase("part.free-lens", {"models": lenses})] if lenses else []
     if calibrated.calibration.shape != "points":
         ways.append(Phrase("part.free-board", {"how": Phrase("how.board")}))
@@ -185,6 +188,6 @@ def _systematic(cross: CrossValidation) -> Systematic:
         dof=(float(test.dof),),
         value=test.chi2,
         probability=test.probability,
-        level=EXPLAINED / len(cross.tests),
+        level=MIN_PROBABILITY / len(cross.tests),
         large=cross.factor > LARGEST_FACTOR,
     )

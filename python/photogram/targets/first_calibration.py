@@ -17,20 +17,17 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, counted, listed
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
-from photogram.targets.corners import FEWEST, Corners
+from photogram.targets.corners import MIN_CORNERS_PER_VIEW, Corners
 from photogram.targets.first_camera import FAMILIES, NARROW, first_camera, picture_size, usual_models
 from photogram.targets.lens_fit import KNOTS, fitted, free_names, grid_of_pixels, lens_of
 from photogram.targets.orders import Pictures, rays_shown
-from photogram.targets.regularisation import WEAK
-from photogram.targets.sightings import LISTED, Listings, Sightings, frontal_tilts, nearest_rotations
+from photogram.targets.regularisation import WEAK_KNOT_SD
+from photogram.targets.sightings import CORNER_ORDERS, Listings, Sightings, frontal_tilts, nearest_rotations
 from photogram.targets.vision import composed, inverted
 
-WIDE = "fisheye"
-"""The family of lenses beyond the fields of perspective ones: equidistant."""
-SHARE = 0.1
-"""Of the width of a picture: what a free parameter of a nominal camera may move an image by."""
-RATIONAL = "k6"
-"""A term in the denominator, of models that have one."""
+WIDE_FAMILY = "fisheye"  # equidistant
+PRIOR_SHIFT_OF_WIDTH = 0.1  # sd of images by each free parameter of a nominal camera, in picture widths
+RATIONAL_TERM = "k6"  # a term in the denominator
 
 
 def nominal_camera(
@@ -72,13 +69,13 @@ def nominal_camera(
     if not 0 < angle <= 2 * math.pi:
         raise InputError(f"field is a number of degrees up to 360, not {math.degrees(angle):g}")
     if focal is None:
-        focal = size[0] * (1 / (2 * math.tan(angle / 2)) if angle < NARROW else FAMILIES[WIDE](angle))
+        focal = size[0] * (1 / (2 * math.tan(angle / 2)) if angle < NARROW else FAMILIES[WIDE_FAMILY](angle))
     half = math.hypot(*size) / (2 * focal)
     wanted = model or usual_models(angle, math.atan(half) if angle < NARROW else half)[0]
     centre = {"cx": (size[0] - 1) / 2, "cy": (size[1] - 1) / 2}
-    source = Camera(WIDE, {"fx": focal, "fy": focal, **centre}, unit="px", name="camera")
+    source = Camera(WIDE_FAMILY, {"fx": focal, "fy": focal, **centre}, unit="px", name="camera")
     lens = lens_of(wanted, source, size, knots)
-    flat = angle < NARROW and RATIONAL not in free_names(lens)
+    flat = angle < NARROW and RATIONAL_TERM not in free_names(lens)
     return fitted(source.replace(model="pinhole") if flat else source, wanted, size, knots=knots)
 
 
@@ -89,11 +86,11 @@ def weakly_known(camera: Camera, size: tuple[int, int]) -> Camera:
     they determine well. Knots have their usual weights.
     """
     if camera.knots is not None:
-        return camera.replace(knot_sd=WEAK) if camera.knot_unknowns else camera
+        return camera.replace(knot_sd=WEAK_KNOT_SD) if camera.knot_unknowns else camera
     partials = camera.partials(camera.rays(grid_of_pixels(size)))[2]
     reach = np.nanmax(np.linalg.norm(partials, axis=1), axis=0)
     sd = {
-        name: SHARE * size[0] / own if math.isinf(given) else given
+        name: PRIOR_SHIFT_OF_WIDTH * size[0] / own if math.isinf(given) else given
         for name, own, given in zip(camera.names, reach.tolist(), camera.deviations.tolist(), strict=True)
     }
     return camera.replace(sd=sd)
@@ -108,10 +105,8 @@ def _field(width: int, focal: float | None) -> float:
     return flat if flat < NARROW else width / given
 
 
-AGREE = 0.2
-"""Radians, or parts of the distance of boards: poses that are apart by less are of one sensor."""
-UNTURNED = 1e-3
-"""The same: what a pose without a turn of the board may be worse, to be taken before one with a turn."""
+MAX_SENSOR_DIFFERENCE = 0.2  # radians, and parts of the distance of the boards
+PREFERENCE_OF_UNTURNED = 1e-3  # misfit in the same units that a board without a turn may have more
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,13 +181,13 @@ def _relation(first: Floats, second: Floats, turns: dict[int, Floats]) -> tuple[
     scores = np.empty(poses.shape[:2])
     for board, turn in np.ndindex(*scores.shape):
         nearest = _apart(poses, poses[board, turn], far).min(axis=1)
-        scores[board, turn] = np.minimum(nearest, AGREE).mean()
-    scores[:, 1:] += UNTURNED
+        scores[board, turn] = np.minimum(nearest, MAX_SENSOR_DIFFERENCE).mean()
+    scores[:, 1:] += PREFERENCE_OF_UNTURNED
     best = poses[np.unravel_index(np.argmin(scores), scores.shape)]
     distances = _apart(poses, best, far)
-    chosen = np.argmin(distances + UNTURNED * (orders > 0), axis=1)
+    chosen = np.argmin(distances + PREFERENCE_OF_UNTURNED * (orders > 0), axis=1)
     rows = np.arange(len(poses))
-    agree = distances[rows, chosen] < AGREE
+    agree = distances[rows, chosen] < MAX_SENSOR_DIFFERENCE
     return mean_pose(poses[rows, chosen][agree]), orders[np.where(agree, chosen, 0)], ~agree
 
 
@@ -204,9 +199,8 @@ def _apart(poses: Floats, other: Floats, far: float) -> Floats:
 
 
 IN_A_PLANE = "all its points lie in one plane, but those of the board do not"
-HIDDEN = f"the lens shows fewer than {FEWEST} of its corners"
-FRONTAL = math.radians(3.0)
-"""Boards tilted by less say nothing of a focal length."""
+HIDDEN = f"the lens shows fewer than {MIN_CORNERS_PER_VIEW} of its corners"
+MIN_TILT_RAD = math.radians(3.0)  # less tilted boards do not determine a focal length
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +268,7 @@ def first_values(
     without |= corners.poor(board.places)
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
     cameras, remarks = _cameras(seen, corners, usable, without, model, knots)
-    hidden = usable & (rays_shown(seen, corners.cameras, cameras) < FEWEST)
+    hidden = usable & (rays_shown(seen, corners.cameras, cameras) < MIN_CORNERS_PER_VIEW)
     if (hidden == usable).all():
         raise InputError(
             f"model: the lens that was found, {cameras[0].model}, shows the corners of no picture"
@@ -341,7 +335,7 @@ def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
     told = [
         Message(
             f"picture {corners.pictures[row]}: its corners begin at another corner of the board than those of"
-            f" other cameras in this view: taken for listed {LISTED[rig.turned[row]]}"
+            f" other cameras in this view: taken for listed {CORNER_ORDERS[rig.turned[row]]}"
         )
         for row in np.flatnonzero(rig.turned).tolist()
     ]
@@ -366,7 +360,7 @@ def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
 
 def _frontal(made: Floats, corners: Corners) -> list[Message]:
     """Name the pictures whose boards are parallel to the image."""
-    names = [corners.pictures[row] for row in np.flatnonzero(frontal_tilts(made) < FRONTAL).tolist()]
+    names = [corners.pictures[row] for row in np.flatnonzero(frontal_tilts(made) < MIN_TILT_RAD).tolist()]
     if not names:
         return []
     return [

@@ -31,8 +31,7 @@ from photogram.targets.sightings import (
 )
 from photogram.targets.vision import photo_poses, vision_poses
 
-ROUGHLY = 1e-3
-"""Of a standard deviation: where steps end of what is only to be begun with."""
+ROUGH_TOLERANCE = 1e-3  # convergence limit of initial values, in standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +45,7 @@ class Adjusted:
 
 
 def adjusted_views(
-    camera: Camera, seen: Sightings, poses: Floats, tolerance: float = ROUGHLY
+    camera: Camera, seen: Sightings, poses: Floats, tolerance: float = ROUGH_TOLERANCE
 ) -> Adjusted | None:
     """Adjust a camera and the poses of views; with less of it free where they do not determine all.
 
@@ -98,23 +97,17 @@ def _less_and_less(camera: Camera) -> Sequence[list[str]]:
     return attempts
 
 
-FIELDS = np.linspace(60.0, 200.0, 15)
-"""Degrees of horizontal field that are tried; then what is between them is halved."""
-ENOUGH = 24
-"""Pictures that fields are tried by, at the most."""
-FINEST = 0.5
-"""Degrees of field to which the best is found."""
-RIVALS = 1.5
-"""Families whose misfits differ by a smaller factor are adjusted, each."""
-POOR = 5.0
-"""A view that fits so many times worse than the median view does not fit."""
-NO_FOCUS = 1.2
-"""Focal length over the width of the picture, where nothing says it."""
+FIELDS_DEG = np.linspace(60.0, 200.0, 15)  # horizontal fields that are tried first
+MAX_TRIAL_PICTURES = 24
+FIELD_TOLERANCE_DEG = 0.5
+RIVAL_MISFIT_RATIO = 1.5  # all families with misfits below this ratio are adjusted
+MAX_VIEW_MISFIT = 5.0  # misfit of a view over the median
+DEFAULT_FOCAL_LENGTH = 1.2  # in picture widths
 
+# Wide families: focal length in picture widths, by the horizontal field in radians
 FAMILIES: Mapping[str, Callable[[float], float]] = MappingProxyType(
     {"fisheye": lambda field: 1 / field, "stereographic": lambda field: 1 / (4 * math.tan(field / 4))}
 )
-"""Wide families: focal length over the width of the picture, of the horizontal field (rad)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +169,7 @@ def perspective(seen: Sightings, size: tuple[int, int]) -> Trial:
     found = homographies(seen.coordinates, seen.listed(first.orders).xy)
     fx, fy, f = focal_lengths(found, (np.array(size) - 1) / 2)
     if not (fx > 0 and fy > 0):
-        fx = fy = f if f > 0 else NO_FOCUS * size[0]
+        fx = fy = f if f > 0 else DEFAULT_FOCAL_LENGTH * size[0]
     return _tried(seen, _camera("pinhole", fx, fy, size))
 
 
@@ -187,9 +180,9 @@ def wide(seen: Sightings, size: tuple[int, int], family: str) -> Trial:
         f = FAMILIES[family](math.radians(field)) * size[0]
         return _tried(seen, _camera(family, f, f, size))
 
-    fields: dict[float, Trial] = {field: tried(field) for field in FIELDS.tolist()}
-    step = float(FIELDS[1] - FIELDS[0])
-    while step > FINEST:
+    fields: dict[float, Trial] = {field: tried(field) for field in FIELDS_DEG.tolist()}
+    step = float(FIELDS_DEG[1] - FIELDS_DEG[0])
+    while step > FIELD_TOLERANCE_DEG:
         step /= 2
         best = min(fields, key=lambda field: fields[field].angle)
         fields |= {field: tried(field) for field in (best - step, best + step)}
@@ -198,18 +191,18 @@ def wide(seen: Sightings, size: tuple[int, int], family: str) -> Trial:
 
 def trials(seen: Sightings, size: tuple[int, int]) -> list[Trial]:
     """Return the families that fit, the best first: those within a factor of it."""
-    some = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / ENOUGH)))
+    some = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MAX_TRIAL_PICTURES)))
     few = [perspective(some, size), *(wide(some, size, family) for family in FAMILIES)]
     found = [_tried(seen, trial.camera) for trial in few]
     found.sort(key=lambda trial: trial.pixels)
-    return [trial for trial in found if trial.pixels <= RIVALS * found[0].pixels]
+    return [trial for trial in found if trial.pixels <= RIVAL_MISFIT_RATIO * found[0].pixels]
 
 
 def adjusted_family(seen: Sightings, found: list[Trial]) -> tuple[Trial, Adjusted | None]:
     """Return the family whose adjustment ends lowest, by the views that fit; the best, if none can be."""
     ended = []
     for trial in found:
-        fit = trial.misfits <= POOR * trial.angle
+        fit = trial.misfits <= MAX_VIEW_MISFIT * trial.angle
         own = seen.of(fit).listed(trial.orders[fit])
         start = poses(ray_homographies(own.coordinates, rays_of(trial.camera, own.xy)))
         adjusted = adjusted_views(trial.camera, own, start)
@@ -220,18 +213,12 @@ def adjusted_family(seen: Sightings, found: list[Trial]) -> tuple[Trial, Adjuste
     return min(ended, key=lambda each: each[1].variance)
 
 
-MANY = 62
-"""Pictures that first values of a camera are adjusted by, at the most: the others would say the same."""
-NARROW, WIDEST = math.radians(90.0), math.radians(88.0)
-"""The horizontal field below which `opencv5` is usual, and how far from the axis `opencv8` may see."""
-TOLERANCE = 1e-5
-"""Of a standard deviation: where steps of an adjustment end that shows what corners determine."""
-TOO_STIFF = 4.0
-"""A lens whose variance is that of its family so many times, which has fewer terms, is not of this kind."""
-NO_WORSE = 1.5
-"""What a misfit may grow when one more view takes part."""
-MARGIN = 1.05
-"""Of the farthest corner from the middle of the picture: how far out the wanted lens is fitted."""
+MAX_PICTURES = 62  # of an adjustment of first values
+NARROW, WIDEST = math.radians(90.0), math.radians(88.0)  # field of `opencv5`, from the axis: `opencv8`
+TOLERANCE = 1e-5  # convergence limit of the adjustment, in standard deviations
+MAX_VARIANCE_RATIO = 4.0  # variance of a lens over the variance of the simplest lens of its family
+MAX_MISFIT_GROWTH = 1.5  # by one more view
+RADIUS_MARGIN = 1.05  # radius of the fit over the radius of the farthest corner
 
 
 def picture_size(seen: Sightings, given: tuple[int, int] | None) -> tuple[int, int]:
@@ -253,19 +240,23 @@ def first_camera(
     the usual one: many of them are where no corner is. InputError: a model that there is not, or one that
     cannot show corners that the camera sees.
     """
-    used = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MANY)))
+    used = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MAX_PICTURES)))
     trial, adjusted = adjusted_family(used, trials(used, size))
     family = (trial.camera if adjusted is None else adjusted.camera).replace(name=name)
     remarks = []
     if adjusted is None:
         remarks.append(Message(f"camera {name}: no trial lens could be adjusted; the first values are rough"))
-    reach = MARGIN * float(np.nanmax(np.linalg.norm(seen.xy - (np.array(size) - 1) / 2, axis=2)))
+    reach = RADIUS_MARGIN * float(np.nanmax(np.linalg.norm(seen.xy - (np.array(size) - 1) / 2, axis=2)))
     own = used.listed(trial.orders)
     splined = model == KNOTTED
     for wanted in _wanted(family, seen, size, None if splined else model):
         camera = fitted(family, wanted, size, radius=reach)
         done = _adjusted(own, trial, family, camera)
-        if done is not None and adjusted is not None and done.variance > TOO_STIFF * adjusted.variance:
+        if (
+            done is not None
+            and adjusted is not None
+            and done.variance > MAX_VARIANCE_RATIO * adjusted.variance
+        ):
             times = math.sqrt(done.variance / adjusted.variance)
             why = f"{wanted} fits its corners {times:.0f} times worse than a plain {family.model} lens does"
             remarks.append(Message(f"camera {name}: {why}: another lens is needed"))
@@ -284,7 +275,7 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
     there belongs to the others if the lens, adjusted with it, fits it, and these no worse than before.
     """
     start = poses(ray_homographies(seen.coordinates, rays_of(family, seen.xy)))
-    fits = trial.misfits <= POOR * trial.angle
+    fits = trial.misfits <= MAX_VIEW_MISFIT * trial.angle
     done = adjusted_views(camera, seen.of(fits), start[fits], TOLERANCE)
     if done is None:
         return None
@@ -295,7 +286,10 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
         if wider is None:
             break
         after = misfits(seen, rays_of(wider.camera, seen.xy))
-        if not (after[row] <= POOR * before and float(np.median(after[fits])) <= NO_WORSE * before):
+        if not (
+            after[row] <= MAX_VIEW_MISFIT * before
+            and float(np.median(after[fits])) <= MAX_MISFIT_GROWTH * before
+        ):
             break
         fits, done = more, wider
     return done

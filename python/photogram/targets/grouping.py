@@ -25,14 +25,10 @@ from photogram.targets.calibration import weighted_block
 from photogram.targets.calibration_result import Calibrated
 
 Groups = Literal["camera", "level", "point", "cell", "radius"]
-"""What residuals are summed up by."""
 
-CELLS = (12, 8)
-"""Of the picture of a camera, across and down."""
-RINGS = 10
-"""Of equal width about the middle of the picture."""
-NOTABLE = 3.3
-"""Test values beyond are marked: one in a thousand by chance."""
+CELLS_OF_PICTURE = (12, 8)  # across and down
+RINGS_OF_PICTURE = 10
+CRITICAL_TEST_VALUE = 3.3  # p = 0.001
 
 
 def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list[Quantity]:
@@ -82,12 +78,16 @@ def _grouped(calibrated: Calibrated, by: Groups, camera: int) -> tuple[list[str]
         return list(calibrated.calibration.board.names), corners.point[use]
     size = np.array(corners.sizes[camera] or block.image_xy[cameras == camera].max(axis=0) + 1)
     if by == "cell":
-        place = np.clip((block.image_xy + 0.5) / size * CELLS, 0, np.array(CELLS) - 1).astype(np.int64)
-        names = [f"{column} {row}" for row in range(CELLS[1]) for column in range(CELLS[0])]
-        return names, np.where(cameras == camera, place[:, 1] * CELLS[0] + place[:, 0], -1)
+        place = np.clip(
+            (block.image_xy + 0.5) / size * CELLS_OF_PICTURE, 0, np.array(CELLS_OF_PICTURE) - 1
+        ).astype(np.int64)
+        names = [
+            f"{column} {row}" for row in range(CELLS_OF_PICTURE[1]) for column in range(CELLS_OF_PICTURE[0])
+        ]
+        return names, np.where(cameras == camera, place[:, 1] * CELLS_OF_PICTURE[0] + place[:, 0], -1)
     radius = np.hypot(*(block.image_xy - (size - 1) / 2).T)
-    edges = np.linspace(0.0, float(np.hypot(*size)) / 2, RINGS + 1)
-    ring = np.clip(np.digitize(radius, edges) - 1, 0, RINGS - 1)
+    edges = np.linspace(0.0, float(np.hypot(*size)) / 2, RINGS_OF_PICTURE + 1)
+    ring = np.clip(np.digitize(radius, edges) - 1, 0, RINGS_OF_PICTURE - 1)
     names = [f"{low:.0f} to {high:.0f}" for low, high in pairwise(edges.tolist())]
     return names, np.where(cameras == camera, ring, -1)
 
@@ -129,7 +129,7 @@ def _table(calibrated: Calibrated, by: Groups, names: list[str], group: Indices)
             "t",
             head="t {}",
             figures=2,
-            marked=np.abs(np.nan_to_num(tests[kept])) > NOTABLE,
+            marked=np.abs(np.nan_to_num(tests[kept])) > CRITICAL_TEST_VALUE,
         ),
     ]
 

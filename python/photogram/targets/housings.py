@@ -33,14 +33,13 @@ def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
     return size
 
 
-_MADE: WeakKeyDictionary[Calibrated, dict[int, Housing]] = WeakKeyDictionary()
-"""Housings of results that are still there: each takes a solution for every unknown that views share."""
+_HOUSINGS: WeakKeyDictionary[Calibrated, dict[int, Housing]] = WeakKeyDictionary()
 
 
 def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
     """Return the housing of a camera, and the camera's number in it."""
     cameras = housed_with(calibrated, camera)
-    made = _MADE.setdefault(calibrated, {})
+    made = _HOUSINGS.setdefault(calibrated, {})
     if cameras[0] not in made:
         made[cameras[0]] = _housing(calibrated, cameras)
     return made[cameras[0]], cameras.index(camera)

@@ -24,14 +24,10 @@ from photogram.targets.housing import transformed
 from photogram.targets.maps import image_grid
 from photogram.targets.vision import TURNED, motion_partials, moved_by, rays, values_of
 
-STEPS, CLOSE, NEAR = 100, 1e-10, 1e-6
-"""Steps of a fit at the most, and the relative fall of the sum of squares with which it ends; of knots."""
-WEAKEST, FIRST, STRONGEST = 1e-14, 1e-6, 1e8
-"""Damping of steps, relative to the normal equations: least, first, and the one with which a fit gives up."""
-MANY = 100
-"""Unknowns beyond which equations are solved without looking for their rank."""
-HELD = slice(0, 0)
-"""Of the six steps (dt, w) of a motion: none."""
+MAX_STEPS, TOLERANCE, SPLINE_TOLERANCE = 100, 1e-10, 1e-6  # relative decrease of the sum of squares
+MIN_DAMPING, FIRST_DAMPING, MAX_DAMPING = 1e-14, 1e-6, 1e8
+MAX_UNKNOWNS_WITH_RANK = 100  # of more unknowns the rank is not tested
+NO_MOTION = slice(0, 0)  # of the six parameters (dt, w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,28 +83,28 @@ class Points:
     finite: bool = False
     roots: Floats | None = None
 
-    def least(self, start: Moved, free: Sequence[int], moving: slice = HELD) -> Moved:
+    def least(self, start: Moved, free: Sequence[int], moving: slice = NO_MOTION) -> Moved:
         """Return what has the least sum of squares (Levenberg-Marquardt), from where it begins.
 
         `free` are the numbers of free parameters; `moving` says which of the six steps (dt, w) of the motion
         are: `slice(3, 6)` rotations.
         """
         # Images are linear in knots: one step finds them.
-        at, damping, close = start, FIRST, CLOSE
-        if len(free) > MANY:
-            damping, close = WEAKEST, NEAR
+        at, damping, close = start, FIRST_DAMPING, TOLERANCE
+        if len(free) > MAX_UNKNOWNS_WITH_RANK:
+            damping, close = MIN_DAMPING, SPLINE_TOLERANCE
         cost, rows, misses = self.linearized(at, free, moving)
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             step = _damped(rows, misses, damping)
             trial = at.stepped(free, moving, step) if np.isfinite(step).all() else at
             found, *others = self.linearized(trial, free, moving)
             if not found < cost:
                 damping *= 10
-                if damping > STRONGEST:
+                if damping > MAX_DAMPING:
                     break
                 continue
             fall, at, cost, (rows, misses) = cost - found, trial, found, others
-            damping = max(damping / 10, WEAKEST)
+            damping = max(damping / 10, MIN_DAMPING)
             if fall <= close * cost:
                 break
         return at
@@ -142,28 +138,22 @@ def _damped(rows: Floats, misses: Floats, damping: float) -> Floats:
     normal[np.diag_indices(len(normal))] += damping
     right = scaled.T @ misses
     # Knots are many; damping keeps apart what the images of those at the edge do not.
-    many = len(normal) > MANY
+    many = len(normal) > MAX_UNKNOWNS_WITH_RANK
     found = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
     return np.asarray(found / scale)
 
 
+# `opencv_pinhole` with so many free lens terms
 LENS_TERMS: Mapping[str, int] = MappingProxyType({"opencv4": 4, "opencv5": 5, "opencv8": 8, "opencv12": 12})
-"""Names for `opencv_pinhole` with so many of its lens terms free."""
-GRID = (60, 40)
-"""Columns and rows of the pixels that a fit compares."""
-NEARLY_ACROSS = math.cos(math.radians(89.0))
-"""Rays further from the axis have no image in a perspective camera."""
+GRID = (60, 40)  # columns and rows of pixels
+MIN_AXIS_COSINE = math.cos(math.radians(89.0))  # of rays with an image in a perspective camera
 _FIRST = frozenset({"f", "fx", "fy", "cx", "cy"})
+# Terms in the order in which they become free, after focal lengths and principal point
 _STAGES = (frozenset({"k", "k0", "k1", "r1"}), frozenset({"k2", "r2"}), frozenset({"p0", "p1", "p2"}))
-"""Terms in the order in which they are freed, after these; the rest follow together."""
-_SCALES = frozenset({"r0"})
-"""Terms that are held: fx and fy do the same."""
-_STARTS = (("alpha", 0.5), ("beta", 1.0), ("omega", 0.5))
-"""Where terms begin that say nothing at 0."""
-KNOTS, ORDER = (30, 20), 3.0
-"""Knots along columns and rows of a splined lens, and its order, unless said."""
-BEYOND = 1.1
-"""The field of a splined lens over that of what it is to show."""
+_FIXED_TERMS = frozenset({"r0"})  # fx and fy have the same effect
+_INITIAL_TERMS = (("alpha", 0.5), ("beta", 1.0), ("omega", 0.5))  # terms whose partials vanish at 0
+KNOTS, ORDER = (30, 20), 3.0  # along columns and rows, and the order of a spline
+FIELD_MARGIN = 1.1  # field of a splined lens over the field of the data
 
 
 def grid_of_pixels(size: tuple[int, int], radius: float = math.inf) -> Floats:
@@ -207,7 +197,9 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
     start = _start(source, size, "w" in names)
     if splined:
         start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": _field(source, size, knots)}
-    free = {*()} if splined else {*names} - {"w", "h", *_SCALES} if count is None else {*names[: 4 + count]}
+    free = (
+        {*()} if splined else {*names} - {"w", "h", *_FIXED_TERMS} if count is None else {*names[: 4 + count]}
+    )
     return Camera(
         own,
         {name: value for name, value in start.items() if name in names},
@@ -226,7 +218,7 @@ def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str
             f"the camera {source.title}, {source.model}, has no focal length and principal point in pixels"
         )
     fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
-    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_STARTS)}
+    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_INITIAL_TERMS)}
     return start | _principal_point(source, from_middle, size)
 
 
@@ -234,7 +226,7 @@ def _field(source: Camera, size: tuple[int, int], knots: tuple[int, int]) -> flo
     """Return the fov_x_deg (degrees) with which knots lie over all that a camera shows, and a tenth more."""
     if min(knots) < ORDER + 1:
         raise InputError(f"knots: a spline of order {ORDER:g} has {ORDER + 1:g} or more along an axis")
-    return min(BEYOND * field_of(source.rays(grid_of_pixels(size)), knots), 359.0)
+    return min(FIELD_MARGIN * field_of(source.rays(grid_of_pixels(size)), knots), 359.0)
 
 
 def field_of(rays: Floats, knots: tuple[int, int], order: float = ORDER) -> float:
@@ -311,7 +303,7 @@ def shows(camera: Camera, points: Floats) -> Bools:
     """Return (m,) whether a camera can show (m, 3) directions in vision axes; NaN cannot be shown."""
     there = np.isfinite(points).all(axis=1)
     if is_perspective(camera):
-        there = there & (points[:, 2] > NEARLY_ACROSS * np.linalg.norm(points, axis=1))
+        there = there & (points[:, 2] > MIN_AXIS_COSINE * np.linalg.norm(points, axis=1))
     return np.asarray(there)
 
 
@@ -321,14 +313,14 @@ def free_names(camera: Camera) -> list[str]:
     return own + list(camera.knot_names if np.any(camera.knot_sd) else ())
 
 
-def fitted_in_stages(start: Moved, points: Points, free: Sequence[str], moving: slice = HELD) -> Moved:
+def fitted_in_stages(start: Moved, points: Points, free: Sequence[str], moving: slice = NO_MOTION) -> Moved:
     """Return a lens, and at last its motion, fitted with more and more of its parameters free."""
     at = start
     numbers = {name: k for k, name in enumerate(at.names)}
     stages = _stages(list(free))
     for stage in stages:
         at = points.least(at, [numbers[name] for name in stage])
-    if moving != HELD:
+    if moving != NO_MOTION:
         at = points.least(at, [numbers[name] for name in free], moving)
     return at
 

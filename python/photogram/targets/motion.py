@@ -22,11 +22,9 @@ from photogram.network.unknowns import Sensor
 from photogram.targets.corners import Corners
 from photogram.targets.vision import FLIP, composed, photo_poses
 
-NEAR = 0.2
-"""Seconds: views that are farther from each other say nothing of how the board moves between them."""
+MAX_GAP_SECONDS = 0.2  # between views that determine the motion of the board
 EACH_SIDE = 2
-POWERS = 2 * EACH_SIDE
-"""Of time, at the most: views on both sides, as many on one as on the other."""
+POWERS = 2 * EACH_SIDE  # of time
 
 
 def dated(corners: Corners, tied: Bools) -> Floats:
@@ -82,7 +80,7 @@ def _neighbours(times: Floats, references: Indices) -> Iterator[tuple[int, Indic
             sides = [
                 n
                 for n in range(1, min(EACH_SIDE, k, len(gaps) - k) + 1)
-                if (gaps[k - n : k + n] < NEAR).all()
+                if (gaps[k - n : k + n] < MAX_GAP_SECONDS).all()
             ]
             if sides:
                 yield row, rows[[*range(k - sides[-1], k), *range(k + 1, k + sides[-1] + 1)]]

@@ -17,16 +17,12 @@ from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
 from photogram.targets.vision import imaged, motion_partials, moved_by, rays
 
-Criterion = Literal["pixels", "mrcal"]
-"""What is least: squares of the differences in pixels, or fourth powers of angles as mrcal 2 has it."""
+Criterion = Literal["pixels", "mrcal"]  # squares of pixel differences, or mrcal 2: fourth powers of angles
 
 STEPS = 200
-CLOSE = 1e-11
-"""Radians, and of the shortest distance: a motion that changes by less is found."""
-FEWEST = 10
-"""Pixels that a motion is fitted to."""
-HUBER = np.radians(5.0) ** 2
-"""theta^2 beyond which mrcal's criterion grows more slowly."""
+TOLERANCE = 1e-11  # radians, and parts of the shortest distance
+MIN_PIXELS = 10
+HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases more slowly beyond
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +79,7 @@ def fitted_motion(
         weights = np.tile(np.eye(2), (len(towards), 1, 1)) if criterion == "pixels" else np.ones(len(towards))
     numbers = np.column_stack([towards, aims, weights.reshape(len(towards), -1)])
     usable = np.isfinite(numbers).all(axis=1)
-    if (count := int(np.count_nonzero(usable))) < FEWEST:
+    if (count := int(np.count_nonzero(usable))) < MIN_PIXELS:
         raise InputError(f"the two cameras both see {count} of the pixels: too few to compare them")
     towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
     motion, free = np.eye(4), slice(0 if finite else 3, 6)
@@ -99,7 +95,7 @@ def fitted_motion(
         step = np.zeros(6)
         step[free] = np.linalg.solve(normal, right)
         motion = moved_by(motion, step)
-        if np.abs(step[3:]).max() < CLOSE and np.abs(step[:3]).max() < CLOSE * np.min(distances):
+        if np.abs(step[3:]).max() < TOLERANCE and np.abs(step[:3]).max() < TOLERANCE * np.min(distances):
             break
     return Fitted(motion, finite, count)
 
@@ -129,8 +125,8 @@ def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats)
     apart = unit - aims
     e = (apart**2).sum(axis=1)
     slope = np.einsum("nij,ni->nj", turned, apart)
-    inside = e < HUBER
-    level = weights * np.where(inside, e, HUBER)
+    inside = e < HUBER_THETA_SQUARED
+    level = weights * np.where(inside, e, HUBER_THETA_SQUARED)
     normal = 2 * np.einsum("n,ni,nj->ij", weights * inside, slope, slope)
     normal += np.einsum("n,nki,nkj->ij", level, turned, turned)
     return normal, -np.einsum("n,ni->i", level, slope)

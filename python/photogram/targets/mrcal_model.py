@@ -30,13 +30,13 @@ from photogram.targets.vision import inverted, of_vectors
 
 PREFIX = "LENSMODEL_"
 CORE = ("fx", "fy", "cx", "cy")
+# Models by the names of mrcal, with the number of their parameters
 LENSES = {
     "PINHOLE": ("pinhole", 4),
     "STEREOGRAPHIC": ("stereographic", 4),
     **{f"OPENCV{terms}": ("opencv_pinhole", 4 + terms) for terms in (4, 5, 8, 12)},
     "CAHVOR": ("cahvor", 9),
 }
-"""Models by the name here, with as many of its parameters."""
 SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x_deg=([\d.]+)")
 
 

@@ -22,14 +22,10 @@ from photogram.targets.maps import distance_text
 from photogram.targets.projection import of_functions, worst
 from photogram.targets.vision import TURNED, motion_partials, rays
 
-FEWEST = 12
-"""Corners that a picture must have to count."""
-MARGIN = 5.0
-"""Pixels about a corner that must be in the picture for a detector to find it."""
-EXACTLY = 24
-"""Views that are tried to the last digit: those that are likely the best."""
-STRAIGHT = 1e-6
-"""By how much the ray of an image may miss the point that it is of: more, and the lens has folded."""
+MIN_CORNERS_PER_PICTURE = 12
+CORNER_MARGIN_PX = 5.0  # about a corner, for its detection
+EXACT_VIEWS = 24  # the likely best views, whose gain is computed exactly
+MAX_RAY_ERROR = 1e-6  # of an image that is projected back; beyond it the distortion is not invertible
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,11 +167,13 @@ def shown_of(camera: Camera, size: Floats, places: Floats) -> tuple[Indices, Flo
     """
     xy = camera.project(places * TURNED)
     with np.errstate(invalid="ignore"):
-        inside: Bools = np.asarray(((xy >= MARGIN) & (xy <= size - 1 - MARGIN)).all(axis=1))
+        inside: Bools = np.asarray(
+            ((xy >= CORNER_MARGIN_PX) & (xy <= size - 1 - CORNER_MARGIN_PX)).all(axis=1)
+        )
         back = rays(camera, np.where(inside[:, np.newaxis], xy, np.nan))
         towards = places / np.linalg.norm(places, axis=1)[:, np.newaxis]
-        own = np.flatnonzero(inside & (np.linalg.norm(back - towards, axis=1) < STRAIGHT))
-    own = own if len(own) >= FEWEST else own[:0]
+        own = np.flatnonzero(inside & (np.linalg.norm(back - towards, axis=1) < MAX_RAY_ERROR))
+    own = own if len(own) >= MIN_CORNERS_PER_PICTURE else own[:0]
     return own, xy[own]
 
 
@@ -245,7 +243,7 @@ def best_views(
             return worst(of_functions(partials, own - gain))
 
         likely = [badness(after(added.likely_gain(cofactors, rows))) for _, added in left]
-        few = sorted(range(len(left)), key=likely.__getitem__)[:EXACTLY]
+        few = sorted(range(len(left)), key=likely.__getitem__)[:EXACT_VIEWS]
         tried = {row: after(left[row][1].gain(cofactors, rows)) for row in sorted(few)}
         best = min(tried, key=lambda row: badness(tried[row]))
         candidate, added = left.pop(best)

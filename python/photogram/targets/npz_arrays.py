@@ -18,7 +18,6 @@ from photogram.io.archives import UNPACKABLE, check_unpacked_size
 from photogram.memory import require
 
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-"""What reads the header of an array, by the version of the format."""
 
 
 class Arrays:

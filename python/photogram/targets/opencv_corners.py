@@ -20,17 +20,15 @@ from photogram.targets.corner_views import Measured
 from photogram.targets.npz_arrays import read_arrays
 
 POINTS = "image_points"
-BEGIN = 1 << 20
-"""Bytes in which a name that tells a format is looked for."""
-NEAR = 1e-6
-"""Of the spacing: what points may be off a grid to be those of one."""
+BEGIN_BYTES = 1 << 20  # of a file, with a name that identifies the format
+MAX_GRID_ERROR = 1e-6  # of points of a grid, in spacings
 
 
 def is_storage(path: Path) -> bool:
     """Return whether a file of OpenCV holds corners: by the name of their matrix."""
     if path.suffix.lower() not in (".yml", ".yaml", ".xml", ".json"):
         return False
-    return POINTS in read_beginning(path, BEGIN)
+    return POINTS in read_beginning(path, BEGIN_BYTES)
 
 
 def is_npz(path: Path) -> bool:
@@ -76,7 +74,7 @@ def _check_grid(tree: Tree, board: Board, grid: Floats) -> None:
     places = grid.reshape(-1, 3) if grid.shape[-1] == 3 else None
     if places is None or places.shape != board.places.shape:
         raise tree.error(f"are not the points of the board, {board.described}")
-    if np.abs(places - board.places).max() > NEAR * min(board.pitch):
+    if np.abs(places - board.places).max() > MAX_GRID_ERROR * min(board.pitch):
         raise tree.error(
             f"lie elsewhere than those of the board, {board.described}: write them to a table for a"
             " board.toml of the kind points"
@@ -196,6 +194,6 @@ def _gridded(path: Path, places: Floats) -> Board:
     far = np.inf
     if board is not None and len(board.places) == len(first):
         far = float(np.abs(places - first[0] - board.places).max())
-    if board is None or far > NEAR * min(spacing):
+    if board is None or far > MAX_GRID_ERROR * min(spacing):
         raise InputError("objpoints are no grid, row by row, alike in all views: give the board", file=path)
     return board

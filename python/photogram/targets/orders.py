@@ -8,13 +8,18 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, listed
 from photogram.network.cameras import Camera
-from photogram.targets.first_camera import POOR, adjusted_views, rays_of
-from photogram.targets.sightings import LISTED, Sightings, angles_apart, centres, poses, ray_homographies
+from photogram.targets.first_camera import MAX_VIEW_MISFIT, adjusted_views, rays_of
+from photogram.targets.sightings import (
+    CORNER_ORDERS,
+    Sightings,
+    angles_apart,
+    centres,
+    poses,
+    ray_homographies,
+)
 
-ROUNDING = 1e-6
-"""Radians: pictures that fit to this fit."""
-CLEAR = 1.5
-"""What the misfit of an order may be over that of the best, to be taken for as good."""
+MIN_MISFIT_RAD = 1e-6
+EQUAL_MISFIT_RATIO = 1.5  # misfit over the best misfit of an order that is as good
 
 
 def rays_shown(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Indices:
@@ -72,7 +77,7 @@ class Pictures:
         misfit, front = self._tried()
         best = misfit.min(axis=1, keepdims=True)
         limit = self._limit(misfit)
-        fits = (misfit <= limit) & (misfit <= np.maximum(CLEAR * best, ROUNDING))
+        fits = (misfit <= limit) & (misfit <= np.maximum(EQUAL_MISFIT_RATIO * best, MIN_MISFIT_RAD))
         fits[:, 0] |= misfit[:, 0] <= limit
         side = 1.0 if front[fits[:, 0], 0].sum() > 0 else -1.0
         right = fits & (front == side)
@@ -112,7 +117,7 @@ class Pictures:
     @staticmethod
     def _limit(misfit: Floats) -> float:
         """Return the misfit beyond which a picture does not fit."""
-        return max(POOR * float(np.median(misfit.min(axis=1))), ROUNDING)
+        return max(MAX_VIEW_MISFIT * float(np.median(misfit.min(axis=1))), MIN_MISFIT_RAD)
 
     def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:
         """Return what is to be said of pictures whose corners are not listed as the board's are."""
@@ -123,19 +128,20 @@ class Pictures:
         told = []
         if (bad := ~fits.any(axis=1)).any():
             told.append(
-                f"corners of {listed(names[bad].tolist())} fit the board more than {POOR:g} times worse than"
-                " those of most pictures, in whatever order: some are probably not where they should be"
+                f"corners of {listed(names[bad].tolist())} fit the board more than {MAX_VIEW_MISFIT:g} times"
+                " worse than those of most pictures, in whatever order: some are probably not where they"
+                " should be"
             )
         for order in np.unique(own[mirrored]).tolist():
             those = listed(names[mirrored & (own == order)].tolist())
             told.append(
                 f"corners of {those} are mirrored, which those of a board that is seen cannot be; their rows"
                 " or columns stand in a wrong order"
-                + (f": taken for listed {LISTED[order]}" if order else "")
+                + (f": taken for listed {CORNER_ORDERS[order]}" if order else "")
             )
         for order in np.unique(own[other & (own > 0)]).tolist():
             those = listed(names[other & (own == order)].tolist())
-            told.append(f"corners of {those} were listed in another order: {LISTED[order]}")
+            told.append(f"corners of {those} were listed in another order: {CORNER_ORDERS[order]}")
         if len(own) > 1 and other.all() and (own > 0).all():
             told.append("no picture lists its corners as the board does: are its columns its rows?")
         return [Message(each) for each in told]

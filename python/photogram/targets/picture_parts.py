@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 from photogram.lazy_dataclasses import dataclass
 
-PARTS = (5, 4)
-"""Across and down."""
+PARTS = (5, 4)  # across and down
 ACROSS = ("left", "left of the middle", "", "right of the middle", "right")
 DOWN = ("upper", "above the middle", "below the middle", "lower")
 

@@ -16,7 +16,7 @@ from photogram.targets.view_plan_result import ViewPlan
 
 __all__ = ["plot_planned_views"]
 
-ACROSS, PANEL = 4, 2.2  # Panels side by side, and the width of a panel in inches
+PANELS_PER_ROW, PANEL_INCHES = 4, 2.2
 
 
 def plot_planned_views(plan: ViewPlan) -> Plot:
@@ -29,10 +29,12 @@ def plot_planned_views(plan: ViewPlan) -> Plot:
     """
     (size,) = plan.calibrated.calibration.corners.sizes
     assert size is not None
-    rows = -(-len(plan.views) // ACROSS)
+    rows = -(-len(plan.views) // PANELS_PER_ROW)
     panels = [_view(plan, number, size) for number in range(len(plan.views))]
-    every = [*panels, *[None] * (rows * ACROSS - len(panels))]
-    return Plot(PANEL * ACROSS, rows * (0.3 + PANEL * size[1] / size[0]), every, ACROSS)
+    every = [*panels, *[None] * (rows * PANELS_PER_ROW - len(panels))]
+    return Plot(
+        PANEL_INCHES * PANELS_PER_ROW, rows * (0.3 + PANEL_INCHES * size[1] / size[0]), every, PANELS_PER_ROW
+    )
 
 
 def _view(plan: ViewPlan, number: int, size: tuple[int, int]) -> Panel:

@@ -27,12 +27,10 @@ from photogram.targets.vision import (
     unknown_of,
 )
 
+# Fixed: the corners of the camera, the mean of the boards, rays of the image, the axes of the camera
 DatumName = Literal["corners", "mean-frames", "image", "axes"]
-"""What holds still: the corners that the camera saw, the mean of the boards, rays of the whole image, or the
-axes of the camera themselves."""
 
-POINTS_TOGETHER = 4096
-"""Points whose partials are in memory at a time."""
+POINTS_PER_BATCH = 4096
 
 
 def datum_rows(
@@ -60,13 +58,12 @@ def datum_rows(
     return found
 
 
-_MADE: WeakKeyDictionary[Housing, dict[int, Floats]] = WeakKeyDictionary()
-"""Of housings that are still there: what the corners of each camera hold."""
+_FIXED_CORNERS: WeakKeyDictionary[Housing, dict[int, Floats]] = WeakKeyDictionary()
 
 
 def _fixed_corners(housing: Housing, camera: int) -> Floats:
     """Return (6, p) T by which the corners that a camera saw stand still: the same for any map."""
-    made = _MADE.setdefault(housing, {})
+    made = _FIXED_CORNERS.setdefault(housing, {})
     if camera not in made:
         places, sd = housing.places(camera)
         made[camera] = fixed_points(
@@ -82,8 +79,8 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
     images. At infinity, not `finite`, there is no translation to find.
     """
     normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
-    for start in range(0, len(points), POINTS_TOGETHER):
-        part = slice(start, start + POINTS_TOGETHER)
+    for start in range(0, len(points), POINTS_PER_BATCH):
+        part = slice(start, start + POINTS_PER_BATCH)
         images = (touched if has_unknown_knots(camera) else imaged)(camera, points[part])
         by_motion = images.by_point @ motion_partials(points[part], finite)
         weighted = weights[part] @ by_motion
@@ -109,8 +106,8 @@ def housing_rows(housing: Housing) -> Floats:
     for number, camera in enumerate(housing.cameras):
         places, sd = housing.places(number)
         turn, shift = housing.sensors[number, :3, :3], housing.sensors[number, :3, 3]
-        for start in range(0, len(places), POINTS_TOGETHER):
-            part = slice(start, start + POINTS_TOGETHER)
+        for start in range(0, len(places), POINTS_PER_BATCH):
+            part = slice(start, start + POINTS_PER_BATCH)
             images = imaged(camera, places[part])
             by_point = images.by_point / sd[part, np.newaxis, np.newaxis]
             turned = places[part] - shift  # R_s p
@@ -132,8 +129,7 @@ def _moved_back(normal: Floats, right: Floats, finite: bool) -> Floats:
     return found
 
 
-TOGETHER = 2048
-"""Pixels whose partials are in memory at a time."""
+PIXELS_PER_BATCH = 2048
 
 
 def projection_cofactors(
@@ -146,13 +142,13 @@ def projection_cofactors(
     """
     cofactors, own = with_motion(housing, camera, rows), housing.cameras[camera]
     found = np.empty((len(pixels), 2, 2))
-    for start in range(0, len(pixels), TOGETHER):
-        part = pixels[start : start + TOGETHER]
+    for start in range(0, len(pixels), PIXELS_PER_BATCH):
+        part = pixels[start : start + PIXELS_PER_BATCH]
         if has_unknown_knots(own):
             values = _of_touched(own, part, distance, cofactors)
         else:
             values = of_functions(image_partials(own, part, distance), cofactors)
-        found[start : start + TOGETHER] = values
+        found[start : start + PIXELS_PER_BATCH] = values
     return found
 
 

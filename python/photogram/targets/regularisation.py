@@ -84,8 +84,7 @@ def _free(camera: Camera, name: str) -> bool:
     return float(camera.deviations[camera.names.index(name)]) > 0
 
 
-WEAK = (1.0, 0.1)
-"""Along the radius and across, in units of the stereographic image: 1 is 53 degrees off the axis."""
+WEAK_KNOT_SD = (1.0, 0.1)  # radial, tangential in the stereographic image; 1 is 53 degrees off the axis
 
 
 def with_knot_sd(
@@ -93,9 +92,9 @@ def with_knot_sd(
 ) -> list[Camera]:
     """Return cameras whose free knots are observed as zero, radially and tangentially.
 
-    Along the radius and across with `knot_sd`, by default `WEAK`, unless `regularise` says whose priors
-    cameras have. InputError: standard deviations of knots that there are not, or that are said twice; such
-    that are not positive.
+    Along the radius and across with `knot_sd`, by default `WEAK_KNOT_SD`, unless `regularise` names whose
+    priors cameras have. InputError: standard deviations of knots that are absent, are given twice or are
+    not positive.
     """
     if knot_sd is not None:
         if not all(0 < each < np.inf for each in knot_sd):
@@ -106,5 +105,5 @@ def with_knot_sd(
             raise InputError(f"knot_sd: {cameras[0].model} has no knots; {KNOTTED} has")
     if regularise is not None:
         return list(cameras)
-    own = WEAK if knot_sd is None else knot_sd
+    own = WEAK_KNOT_SD if knot_sd is None else knot_sd
     return [each.replace(knot_sd=own) if each.knot_unknowns else each for each in cameras]

@@ -19,8 +19,7 @@ from photogram.targets.board import Board
 from photogram.targets.corners import Corners
 from photogram.targets.vision import composed
 
-_DEGENERATE = 1e-9
-"""The length of a column of a homography over the length of the other one, if corners are on one line."""
+_MIN_COLUMN_RATIO = 1e-9  # of a homography of corners that are not on one line
 
 
 def homographies(places: Floats, xy: Floats) -> Floats:
@@ -75,7 +74,7 @@ def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
         return _of_matrices(own[:, :, :3])
     lengths = np.linalg.norm(own[:, :, :2], axis=1)
     # Corners on one line determine one of both columns alone.
-    own = own[lengths.min(axis=1) > _DEGENERATE * lengths.max(axis=1)]
+    own = own[lengths.min(axis=1) > _MIN_COLUMN_RATIO * lengths.max(axis=1)]
     a, b = own[:, :, 0], own[:, :, 1]
     weight = 1 / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))[:, np.newaxis]
     rows = np.concatenate([a * b * weight, (a * a - b * b) * weight])
@@ -169,7 +168,7 @@ def _smallest(rows: Floats, seen: Bools) -> Floats:
     return np.where(finite, vectors[:, :, 0].reshape(len(rows), 3, -1), np.nan)
 
 
-LISTED = (
+CORNER_ORDERS = (
     "as they are numbered",
     "rows from the last to the first",
     "columns from the last to the first",
@@ -179,13 +178,9 @@ LISTED = (
     "column by column, from the last column",
     "column by column, from the last corner",
 )
-"""In which order a file or a detector may list corners."""
-FLAT = 0.05
-"""Of the extent of a board: what its points may be off a plane to be taken for one."""
-UPRIGHT = 1e3
-"""Weight of an axis that stays where it is, over those that turn."""
-_SAME = 1e-6
-"""Of the size of a board: two orders differ by more than this."""
+MAX_DEPTH_OF_PLANE = 0.05  # of a plane board, in extents of the board
+WEIGHT_OF_FIXED_AXIS = 1e3  # relative to axes that turn
+_MIN_ORDER_DIFFERENCE = 1e-6  # in extents of the board
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +216,10 @@ class Listings:
         turns: dict[int, Floats] = {}
         for own, listed in enumerate(points):
             turn = _turn(places, places[listed])
-            if np.abs(places @ turn[:3, :3].T + turn[:3, 3] - places[listed]).max() < _SAME * size:
+            if (
+                np.abs(places @ turn[:3, :3].T + turn[:3, 3] - places[listed]).max()
+                < _MIN_ORDER_DIFFERENCE * size
+            ):
                 turns[own] = turn
             with_one = np.column_stack([places[:, :2], np.ones(len(places))])
             known = [with_one[points[other]] for other in shapes]
@@ -240,7 +238,7 @@ def _turn(places: Floats, listed: Floats) -> Floats:
     """Return the (4, 4) motion that takes places nearest to others, their z kept upright."""
     middles = places.mean(axis=0), listed.mean(axis=0)
     products = (listed - middles[1]).T @ (places - middles[0])
-    products[2, 2] += UPRIGHT * np.abs(products).max()
+    products[2, 2] += WEIGHT_OF_FIXED_AXIS * np.abs(products).max()
     rotation = nearest_rotations(products[np.newaxis])[0]
     return composed(rotation, middles[1] - rotation @ middles[0])
 
@@ -254,7 +252,7 @@ def _principal(places: Floats) -> Floats:
 
 
 def _is_affine(a: Floats, b: Floats, size: float) -> bool:
-    return bool(np.abs(a @ np.linalg.lstsq(a, b, rcond=None)[0] - b).max() < _SAME * size)
+    return bool(np.abs(a @ np.linalg.lstsq(a, b, rcond=None)[0] - b).max() < _MIN_ORDER_DIFFERENCE * size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,7 +283,7 @@ class Sightings:
     def is_flat(self) -> bool:
         """Whether the board is about a plane."""
         low, _, high = np.sort(np.ptp(self.places, axis=0))
-        return bool(low <= FLAT * high)
+        return bool(low <= MAX_DEPTH_OF_PLANE * high)
 
     @property
     def coordinates(self) -> Floats:
@@ -300,7 +298,7 @@ class Sightings:
         parts = [self.places[own] - self.places[own].mean(axis=0) for own in seen if own.any()]
         spans = [np.linalg.svd(own, compute_uv=False) for own in parts]
         found = np.ones(len(seen), dtype=bool)
-        found[seen.any(axis=1)] = [span[-1] <= FLAT * span[0] for span in spans]
+        found[seen.any(axis=1)] = [span[-1] <= MAX_DEPTH_OF_PLANE * span[0] for span in spans]
         return found
 
     def of(self, rows: Indices | Bools) -> Self:

@@ -24,16 +24,14 @@ from photogram.network.unknowns import Sensor
 from photogram.show.summary import Brief, Rows, few
 from photogram.targets.board import Board, Shape
 from photogram.targets.corners import Corners
-from photogram.targets.motion import NEAR, POWERS, dated, moved, moving, pictures_in_motion
+from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.vision import FLIP, photo_poses
 
 Synchronisation = Literal["known", "none", "offset"]
 Regularisation = Literal["mrcal"]
 
-BOARD = "board"
-"""What the bend of the board is called among the common unknowns."""
-CLOCK = "of "
-"""What the offset of a camera is called there, with the name of the camera behind it."""
+BOARD = "board"  # name of the bend among the common unknowns
+CLOCK = "of "  # before the camera in the name of its clock offset
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -111,7 +109,7 @@ class Start(Valued, Brief):
         if not (tied & ~lost).any():
             raise InputError(
                 "no picture tells an offset between cameras: views need a picture by the reference camera,"
-                f" and others of it within {NEAR:g} s before and after"
+                f" and others of it within {MAX_GAP_SECONDS:g} s before and after"
             )
         if lost.any():
             names = [corners.pictures[row] for row in np.flatnonzero(lost).tolist()]

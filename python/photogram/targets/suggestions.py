@@ -23,22 +23,18 @@ from photogram.targets.projection import common_partials, datum_rows, worst
 from photogram.targets.uncertainty import checked_distance
 from photogram.targets.vision import composed, inverted, rays
 
-DISTANCES = (0.1, 0.5, 0.9)
-"""Quantiles of how far boards were, which are the distances of candidates."""
-TILT, TURN = 30.0, 90.0
-"""Degrees."""
+DISTANCE_QUANTILES = (0.1, 0.5, 0.9)  # of the boards
+TILT_DEG, TURN_DEG = 30.0, 90.0
 TILTS = {
     "": (0.0, 0.0),
-    f"tilted {TILT:g} degrees about x": (TILT, 0.0),
-    f"tilted {-TILT:g} degrees about x": (-TILT, 0.0),
-    f"tilted {TILT:g} degrees about y": (0.0, TILT),
-    f"tilted {-TILT:g} degrees about y": (0.0, -TILT),
+    f"tilted {TILT_DEG:g} degrees about x": (TILT_DEG, 0.0),
+    f"tilted {-TILT_DEG:g} degrees about x": (-TILT_DEG, 0.0),
+    f"tilted {TILT_DEG:g} degrees about y": (0.0, TILT_DEG),
+    f"tilted {-TILT_DEG:g} degrees about y": (0.0, -TILT_DEG),
 }
-TURNS = {"": 0.0, f"turned by {TURN:g} degrees": TURN}
-INWARDS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
-"""Of the way to the middle of the picture: where a board is tried that must be seen as a whole."""
-GRID = (12, 8)
-"""Pixels whose uncertainty is compared."""
+TURNS = {"": 0.0, f"turned by {TURN_DEG:g} degrees": TURN_DEG}
+STEPS_TO_MIDDLE = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # parts of the way to the middle of the picture
+GRID = (12, 8)  # pixels across and down
 
 
 def suggest_views(
@@ -109,7 +105,7 @@ def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board:
     to_camera = housing.sensors[camera]
     own = np.unique(housing.seen.views[housing.seen.cameras == camera])
     places = (to_camera @ housing.poses[own] @ [*middle_of(housing.points), 1.0])[:, :3]
-    away = np.quantile(np.linalg.norm(places, axis=1), DISTANCES).tolist()
+    away = np.quantile(np.linalg.norm(places, axis=1), DISTANCE_QUANTILES).tolist()
     to_first = inverted(to_camera)
     counts = np.unique(housing.seen.views[housing.seen.cameras == camera], return_counts=True)[1]
     whole = board.found_whole and np.median(counts) == len(housing.points)
@@ -132,7 +128,7 @@ def views_over_picture(
         Whether it is found as a whole, or not at all: it is held as near there as all of it is shown.
     """
     found = []
-    steps = INWARDS if whole else INWARDS[:1]
+    steps = STEPS_TO_MIDDLE if whole else STEPS_TO_MIDDLE[:1]
     centre = (np.array(size) - 1) / 2
     for part in parts_of(size):
         tried = rays(camera, np.array([part.middle + step * (centre - part.middle) for step in steps]))

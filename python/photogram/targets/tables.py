@@ -22,10 +22,8 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.lens_fit import field_of, grid_of_pixels
 from photogram.targets.vision import TURNED
 
-LISTED = 10
-"""Points of the board that a report names at most: those that fit worst."""
-NOTABLE = 3.0
-"""Standardized differences beyond are named."""
+MAX_POINTS_LISTED = 10
+CRITICAL_TEST_VALUE = 3.0
 _PIXELS = (Axis.of("px", "px"),)
 
 
@@ -50,7 +48,9 @@ def views(calibrated: Calibrated) -> list[Quantity]:
         _of_views("rms_px", rms, "rms", axes=_PIXELS, kind="value"),
         _of_views("redundancy", _sums(view, result.redundancy, count), "Redundancy"),
         _of_views("chi2", _sums(view, weighted, count), "chi²", figures=4),
-        _of_views("largest_standardized", largest, "Largest standardized", marked=largest > NOTABLE),
+        _of_views(
+            "largest_standardized", largest, "Largest standardized", marked=largest > CRITICAL_TEST_VALUE
+        ),
     ]
 
 
@@ -90,7 +90,7 @@ def board_facts(calibrated: Calibrated) -> list[Fact]:
         return found
     found.append(Fact("Out of its plane, rms", significant(fit.rms_out_of_plane, 3), unit))
     for name, value, sd in zip(STRETCHES, fit.stretch.tolist(), fit.sd.tolist(), strict=True):
-        tone: Tone = "look" if abs(value) > NOTABLE * sd else ""
+        tone: Tone = "look" if abs(value) > CRITICAL_TEST_VALUE * sd else ""
         found.append(Fact(f"Spacing, {name}", f"{value:.0f}", "ppm", f"sd {sd:.0f} ppm", tone))
     return found
 
@@ -109,8 +109,10 @@ def worst_points(calibrated: Calibrated) -> list[str]:
     if calibrated.calibration.shape != "points":
         return []
     tests = np.nan_to_num(np.abs(result.point_standardized))
-    worst = np.argsort(-tests.max(axis=1), kind="stable")[:LISTED]
-    return [_told(calibrated, row, tests[row]) for row in worst.tolist() if tests[row].max() > NOTABLE]
+    worst = np.argsort(-tests.max(axis=1), kind="stable")[:MAX_POINTS_LISTED]
+    return [
+        _told(calibrated, row, tests[row]) for row in worst.tolist() if tests[row].max() > CRITICAL_TEST_VALUE
+    ]
 
 
 def _told(calibrated: Calibrated, row: int, tests: Floats) -> str:
@@ -122,7 +124,6 @@ def _told(calibrated: Calibrated, row: int, tests: Floats) -> str:
 
 
 STRETCHES = ("scale x", "scale y", "shear")
-"""The affine part of the spacing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,8 +168,7 @@ def board_fit(calibrated: Calibrated) -> BoardFit | None:
     return BoardFit(plane, float(np.sqrt(np.mean(away**2))), 1e6 * stretch, 1e6 * sd)
 
 
-MOVED = 0.2
-"""Of a standard deviation: what moves less is no matter."""
+MIN_SHIFT_SD = 0.2  # smaller shifts by priors are not listed
 
 
 def prior_shift(calibrated: Calibrated) -> list[Quantity]:
@@ -196,8 +196,7 @@ def prior_shift(calibrated: Calibrated) -> list[Quantity]:
     ]
 
 
-HANGS = 0.05
-"""Redundancy of a prior below which what it is of comes from it."""
+MIN_PRIOR_REDUNDANCY = 0.05  # the value of a knot with less comes from its prior
 
 
 @dataclass(frozen=True)
@@ -230,7 +229,7 @@ class Spline:
         """The same in sentences."""
         found = [
             f"{self.camera}: {self.from_prior} of {self.knots} knots are from their prior (redundancy below"
-            f" {HANGS:g}); {self.untouched} of them no image touches"
+            f" {MIN_PRIOR_REDUNDANCY:g}); {self.untouched} of them no image touches"
             if self.knots
             else f"{self.camera}: its knots are held"
         ]
@@ -273,7 +272,7 @@ def _from_prior(calibrated: Calibrated, number: int) -> int:
             if not (isinstance(observation, Prior) and isinstance(observation.unknown, Knot)):
                 continue
             if id(observation.unknown) in of_knots:
-                hang += bool(np.nansum(own) / 2 < HANGS)
+                hang += bool(np.nansum(own) / 2 < MIN_PRIOR_REDUNDANCY)
     return hang
 
 

@@ -30,8 +30,7 @@ from photogram.targets.projection import housing_rows
 from photogram.targets.vision import imaged, motion_partials, rays
 
 STEPS = 30
-CLOSE = 1e-12
-"""Of the distance: a point that moves by less has arrived."""
+TOLERANCE = 1e-12  # in distances of the point
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +122,9 @@ def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: F
         points = points + step
         with np.errstate(invalid="ignore"):
             moved = np.linalg.norm(step, axis=1) / np.linalg.norm(points, axis=1)
-        if not (moved > CLOSE).any():
+        if not (moved > TOLERANCE).any():
             break
-    return np.asarray(np.where((moved <= 1e3 * CLOSE)[:, np.newaxis], points, np.nan))
+    return np.asarray(np.where((moved <= 1e3 * TOLERANCE)[:, np.newaxis], points, np.nan))
 
 
 def _rows(

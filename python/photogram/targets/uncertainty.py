@@ -21,8 +21,7 @@ from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
 from photogram.targets.motion_fit import Criterion, points_at
 from photogram.targets.projection import DatumName, datum_rows, projection_cofactors, worst
 
-IMAGE = (60, 40)
-"""Rays of the whole picture that hold still in the datum `image`."""
+IMAGE_GRID = (60, 40)  # rays that define the datum `image`
 
 
 def projection_uncertainty(
@@ -175,7 +174,7 @@ def _rows(
     """Return the datum of a camera; `image`: rays of the whole picture hold still at the distance."""
     if datum != "image":
         return datum_rows(housing, own, datum)
-    points = points_at(housing.cameras[own], image_grid(size_of(result, camera), IMAGE)[2], [distance])
+    points = points_at(housing.cameras[own], image_grid(size_of(result, camera), IMAGE_GRID)[2], [distance])
     points = points[np.isfinite(points).all(axis=1)]
     equal = np.broadcast_to(np.eye(2), (len(points), 2, 2))
     return datum_rows(housing, own, datum, (points, equal, bool(np.isfinite(distance))))

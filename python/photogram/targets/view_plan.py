@@ -28,12 +28,9 @@ from photogram.targets.vision import rays
 
 __all__ = ["plan_views"]
 
-FILLS = (0.9, 0.6, 0.4)
-"""Of the shorter side of the picture: what the longer side of a board takes at the distances of a plan."""
-TILTED = tuple(name for name in TILTS if name)
-"""How the board is held in the first views."""
-MODEL = "planned: the lens is taken for one of this model"
-"""What is known of it in the titles of maps."""
+BOARD_OF_PICTURE = (0.9, 0.6, 0.4)  # longer side of the board over the shorter side of the picture
+FIRST_TILTS = tuple(name for name in TILTS if name)
+MODEL = "planned: the lens is taken for one of this model"  # in titles of maps
 
 
 def plan_views(
@@ -80,8 +77,8 @@ def plan_views(
     InputError
         Fewer than four views, values that are none, a board that the picture cannot show.
     """
-    if whole_number("views", views) < len(TILTED):
-        raise InputError(f"a plan has {len(TILTED)} views or more, not {views}")
+    if whole_number("views", views) < len(FIRST_TILTS):
+        raise InputError(f"a plan has {len(FIRST_TILTS)} views or more, not {views}")
     for each in (*distances, *away):
         checked_distance(each)
     told = progress or (lambda _: None)
@@ -89,9 +86,9 @@ def plan_views(
     held = sorted(away or _filling(camera, board, size))
     middle = rays(camera, (np.array([size]) - 1) / 2)[0]
     first = [held[len(held) // 2]]
-    taken = views_towards(middle, "middle of the picture", board, first, TILTED, [""])
+    taken = views_towards(middle, "middle of the picture", board, first, FIRST_TILTS, [""])
     candidates = views_over_picture(camera, size, board, held, whole=board.found_whole)
-    worst, largest = (distances or (math.inf,))[0], [math.nan] * (len(TILTED) - 1)
+    worst, largest = (distances or (math.inf,))[0], [math.nan] * (len(FIRST_TILTS) - 1)
     known = weakly_known(camera, size)
     while True:
         found = _predicted(known, board, size, sd0, taken)
@@ -119,7 +116,7 @@ def _filling(camera: Camera, board: Board, size: tuple[int, int]) -> list[float]
     ahead, beside = rays(camera, np.stack([middle, middle + np.array([1.0, 0.0])]))
     pixels = 1 / float(np.linalg.norm(beside - ahead))
     longer = float(np.ptp(board.places, axis=0).max())
-    return [longer * pixels / (share * min(size)) for share in FILLS]
+    return [longer * pixels / (share * min(size)) for share in BOARD_OF_PICTURE]
 
 
 def _predicted(

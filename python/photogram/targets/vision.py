@@ -94,8 +94,7 @@ def _steps(pose: Floats, turned: Floats) -> Floats:
     return found
 
 
-TURNED: Floats = np.diag(FLIP)
-"""From axes of vision to those of a photo, x right, y up, z back, and the other way."""
+TURNED: Floats = np.diag(FLIP)  # vision axes to photo axes (x right, y up, z back) and back
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,6 @@ CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyTy
         "mrcal": mrcal_models,
     }
 )
-"""What makes the files of each, by their names."""
 
 
 def camera_files(calibrated: Calibrated, to: str, need: float | None = None) -> dict[str, bytes]:

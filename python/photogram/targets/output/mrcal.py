@@ -21,12 +21,9 @@ from photogram.targets.output.rig import TERMS, Rig, terms_of
 
 TITLE = "a .cameramodel of mrcal"
 CORE = frozenset({"f", "fx", "fy", "cx", "cy"})
-COUNTS = (0, 4, 5, 8, 12)
-"""Terms of the models PINHOLE, OPENCV4, OPENCV5 ..."""
-LATTICES = ("chessboard", "charuco")
-"""Boards whose corners lie on a grid of rows and columns, one spacing apart."""
-ABSENT = -1.0
-"""The weight of a corner that is not there."""
+OPENCV_TERMS = (0, 4, 5, 8, 12)  # of the models PINHOLE, OPENCV4, OPENCV5 ...
+GRID_BOARDS = ("chessboard", "charuco")  # corners at one spacing in rows and columns
+WEIGHT_OF_ABSENT = -1.0
 
 
 def mrcal_models(rig: Rig, valid: dict[int, Floats] | None = None) -> dict[str, bytes]:
@@ -74,7 +71,9 @@ def _lens(rig: Rig, row: int) -> tuple[str, Floats]:
         raise rig.refusal(row, TITLE, ["opencv8", "opencv5", "opencv12", "cahvor", KNOTTED])
     free = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     # Terms that were free are there, be they 0.
-    count = next(each for each in COUNTS if not any(lens.terms.get(k) or free.get(k) for k in TERMS[each:]))
+    count = next(
+        each for each in OPENCV_TERMS if not any(lens.terms.get(k) or free.get(k) for k in TERMS[each:])
+    )
     values = [*lens.focal, *lens.centre, *(lens.first(count) or ())]
     return f"OPENCV{count}" if count else "PINHOLE", np.array(values)
 
@@ -89,7 +88,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     calibration, count = calibrated.calibration, len(rig.cameras)
     board = calibration.board
     fits = (
-        board.kind in LATTICES
+        board.kind in GRID_BOARDS
         and calibration.shape in ("held", "bend")
         and board.pitch[0] == board.pitch[1]
         and len({name for name, _ in lenses}) == 1
@@ -141,7 +140,7 @@ def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:
     """Return (P, rows, columns, 3) x, y, weight of corners, (P, 3) view, camera, sensor of pictures."""
     corners, board = calibrated.calibration.corners, calibrated.calibration.board
     found = np.zeros((len(corners.pictures), board.rows * board.columns, 3))
-    found[..., 2] = ABSENT
+    found[..., 2] = WEIGHT_OF_ABSENT
     found[corners.picture, corners.point, :2] = corners.xy
     # What does not count has a weight below 0.
     found[corners.picture, corners.point, 2] = np.where(corners.use, 1.0, -1.0) / corners.sd
@@ -157,8 +156,7 @@ def _freed(calibrated: Calibrated) -> tuple[bool, bool]:
     return bool(free & CORE), bool(free - CORE) or knots
 
 
-DIRECTIONS, STEPS = 90, 400
-"""In which an outline is looked for about the best known pixel, and steps along each."""
+OUTLINE_DIRECTIONS, OUTLINE_STEPS = 90, 400  # about the best known pixel
 
 
 def valid_region(found: UncertaintyMap, largest: float) -> Floats:
@@ -175,16 +173,16 @@ def valid_region(found: UncertaintyMap, largest: float) -> Floats:
             f" {sd[row, column]:.3g} px"
         )
     middle = np.array([found.columns[column], found.rows[row]])
-    angles = np.linspace(0, 2 * np.pi, DIRECTIONS + 1)
+    angles = np.linspace(0, 2 * np.pi, OUTLINE_DIRECTIONS + 1)
     # Down to the farthest corner, and cut where the picture ends.
-    lengths = np.linspace(0, float(np.hypot(*found.size)), STEPS)
+    lengths = np.linspace(0, float(np.hypot(*found.size)), OUTLINE_STEPS)
     places = (
         middle + lengths[:, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=1)[:, np.newaxis]
     )
     last = np.array(found.size) - 1.0
     inside = ((places >= 0) & (places <= last)).all(axis=2)
     good = inside & (_between(found, sd, np.clip(places, 0, last)) <= largest)
-    steps = np.where(good.all(axis=1), STEPS, np.argmin(good, axis=1)) - 1
+    steps = np.where(good.all(axis=1), OUTLINE_STEPS, np.argmin(good, axis=1)) - 1
     return np.asarray(places[np.arange(len(angles)), steps])
 
 

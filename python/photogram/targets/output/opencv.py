@@ -16,10 +16,8 @@ from photogram.targets.vision import cross_matrices
 TITLE = "YAML of OpenCV"
 _matrix = partial(matrix_lines, opencv=True)
 COUNTS = (4, 5, 8, 12)
-FEWEST = 5
-"""Terms that OpenCV writes at the least, where they are not those of a fisheye."""
-DEVIATIONS = ("fx", "fy", "cx", "cy", *TERMS, "tx", "ty")
-"""The order of `std_deviations_intrinsics`."""
+MIN_PINHOLE_TERMS = 5
+DEVIATIONS = ("fx", "fy", "cx", "cy", *TERMS, "tx", "ty")  # order of `std_deviations_intrinsics`
 
 
 def opencv_yaml(rig: Rig) -> dict[str, bytes]:
@@ -44,7 +42,7 @@ def _lens(rig: Rig, row: int) -> Terms:
 
 def _camera(rig: Rig, row: int, lenses: list[Terms]) -> list[str]:
     lens, (width, height) = lenses[row], rig.size(row)
-    terms = lens.first(4) if lens.fisheye else lens.fewest(COUNTS[COUNTS.index(FEWEST) :])
+    terms = lens.first(4) if lens.fisheye else lens.fewest(COUNTS[COUNTS.index(MIN_PINHOLE_TERMS) :])
     lines = [f"image_width: {width}", f"image_height: {height}"]
     lines += ["fisheye_model: 1"] if lens.fisheye else []
     lines += _matrix("camera_matrix", lens.matrix)

@@ -17,10 +17,9 @@ from photogram.network.cameras import Camera
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.vision import inverted
 
+# Pinhole, in the order of OpenCV; k4, k5, k6 are in the denominator
 TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
-"""Of a pinhole, in the order of OpenCV; k4, k5, k6 are of the denominator."""
 FISHEYE_TERMS = ("k1", "k2", "k3", "k4")
-"""Of an equidistant camera."""
 PINHOLES = frozenset(
     {"simple_pinhole", "pinhole", "simple_radial", "radial", "opencv", "full_opencv", "opencv_pinhole"}
 )

@@ -10,8 +10,7 @@ from photogram.io.yaml_text import matrix_lines
 from photogram.targets.output.rig import Rig, Terms, terms_of
 
 TITLE = "camera_info of ROS"
-PLUMB_BOB, RATIONAL, EQUIDISTANT = 5, 8, 4
-"""Terms of the models `plumb_bob`, `rational_polynomial` and `equidistant`."""
+PLUMB_BOB_TERMS, RATIONAL_TERMS, EQUIDISTANT_TERMS = 5, 8, 4
 
 
 def ros_camera_info(rig: Rig) -> dict[str, bytes]:
@@ -54,10 +53,10 @@ def _lens(rig: Rig, row: int) -> Terms:
 def _distortion(lens: Terms) -> tuple[str, list[float]]:
     """Return the model and its terms; none where no model has them."""
     if lens.fisheye:
-        return "equidistant", lens.first(EQUIDISTANT) or []
-    if (terms := lens.first(PLUMB_BOB)) is not None:
+        return "equidistant", lens.first(EQUIDISTANT_TERMS) or []
+    if (terms := lens.first(PLUMB_BOB_TERMS)) is not None:
         return "plumb_bob", terms
-    return "rational_polynomial", lens.first(RATIONAL) or []
+    return "rational_polynomial", lens.first(RATIONAL_TERMS) or []
 
 
 def _rectified(sensor: Floats, lenses: list[Terms]) -> list[tuple[Floats, Floats]]:
