@@ -122,8 +122,12 @@ class Calibration(Start):
                 result = adjust(
                     weighted_block(start), **how, covariance="verdict", tolerance=SPLINE_TOLERANCE
                 )
+            elif start.regularise is None:
+                result = free
             else:
-                result = _with_priors(start, free, threads)
+                again = adjusted_again(weighted_block(start), free.options, free.state, threads=threads)
+                assert isinstance(again, Result)
+                result = again
             worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
             if worse.any() and result.converged:
                 start = start.without(worse)
@@ -131,7 +135,14 @@ class Calibration(Start):
                 start, rounds = better, rounds + 1
             else:
                 break
-        return _ended(start, result, free if start.regularise else None)
+        messages = [*start.messages, *result.messages]
+        if start.sync == "offset":
+            messages += checked_clocks(Calibrated(calibration=start, result=result))
+        told = replace(result, messages=messages)
+        if start.sd0 is None:
+            told = with_unknown_weight(told)
+        before = free if start.regularise else None
+        return judged(Calibrated(calibration=start, result=told, unregularised=before))
 
     def snoop(self, **options: Any) -> Calibrated:
         """Take gross errors out one after the other, and adjust what is left.
@@ -164,22 +175,14 @@ CHANGE = 0.01
 SPLINE_TOLERANCE = 1e-6  # convergence limit of splined lenses, in standard deviations
 
 
-def _ended(start: Start, result: Result, unregularised: Result | None) -> Calibrated:
-    """Return a calibration that was adjusted, with all that is to be said of it."""
-    messages = [*start.messages, *result.messages]
-    if start.sync == "offset":
-        messages += checked_clocks(Calibrated(calibration=start, result=result))
-    told = replace(result, messages=messages)
-    if start.sd0 is None:
-        told = with_unknown_weight(told)
-    return judged(Calibrated(calibration=start, result=told, unregularised=unregularised))
-
-
 def _better(start: Start, result: Result) -> Start | None:
     """Return what to adjust again: other sd of corners, or motion of the board; None where all is as held."""
     found = start if start.sync != "offset" or not result.converged else _in_motion(start, result)
-    if (sd := _sd_to_assume(start, result)) is not None:
-        found = found.replace(assumed=sd)
+    if start.sd0 is None and start.shape == "points" and result.converged:
+        change = deviation_of_corners(result)
+        sd = start.assumed * change
+        if abs(change - 1) > CHANGE and sd > 1e-6:  # corners that fit to the last digit are simulated
+            found = found.replace(assumed=sd)
     return None if found is start else found
 
 
@@ -197,15 +200,6 @@ def _in_motion(start: Start, result: Result) -> Start:
     return start if (gaps <= CHANGE * result.photo_sd[pictures, :3]).all() else again
 
 
-def _sd_to_assume(start: Start, result: Result) -> float | None:
-    """Return another standard deviation of corners to weigh the board against; None where none is asked."""
-    if start.sd0 is not None or start.shape != "points" or not result.converged:
-        return None
-    found = deviation_of_corners(result)
-    # Corners that fit to the last digit are made, not measured.
-    return start.assumed * found if abs(found - 1) > CHANGE and start.assumed * found > 1e-6 else None
-
-
 def _has_knots(start: Start) -> bool:
     return any(each.knot_unknowns for each in start.cameras)
 
@@ -216,15 +210,6 @@ def weighted_block(start: Start) -> Block:
         return start.block()
     observed = 2 * len(start.board.places) * len(start.corners.pictures)
     return start.block(regularised(start.cameras, start.corners.sizes, observed))
-
-
-def _with_priors(start: Start, free: Result, threads: int | None) -> Result:
-    """Return the adjustment with the priors of cameras, from where that without them has ended."""
-    if start.regularise is None:
-        return free
-    found = adjusted_again(weighted_block(start), free.options, free.state, threads=threads)
-    assert isinstance(found, Result)
-    return found
 
 
 NOTABLE_POSE_ERROR, MAX_POSE_ERROR = 0.01, 0.2  # shares of the motion: remark, error if an offset is free

@@ -51,17 +51,12 @@ def _first_line(path: Path) -> str:
     return next((line for line in lines if line and line[0] != "#"), "")
 
 
-def _header(path: Path) -> list[str]:
-    """Return the columns of the first line that has any."""
-    cells = _first_line(path).replace(";", ",").split(",")
-    return _spelled([cell.strip('" ').lower() for cell in cells])
-
-
 def is_table(path: Path) -> bool:
     """Return whether a file is a table of corners by its columns."""
     if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
         return False
-    found = {*_header(path)}
+    cells = _first_line(path).replace(";", ",").split(",")
+    found = {*_spelled([cell.strip('" ').lower() for cell in cells])}
     return {"x", "y"} <= found and bool(found & {"image", "time"}) and bool(found & {"point", "i", "tag"})
 
 
@@ -90,12 +85,17 @@ def read_vnl(path: Path, board: Board | None) -> Measured:
     table = read_columns(path, known=("filename",), spelling=lambda names: names[:4])
     table.require("filename", "x", "y")
     images = table.names("filename")
-    within = _within(images.rows, len(images.names))
     counts = np.bincount(images.rows, minlength=len(images.names))
+    order = np.argsort(images.rows, kind="stable")
+    within = np.empty(len(order), dtype=np.int64)  # which row of its image each row is
+    within[order] = np.arange(len(order)) - (np.cumsum(counts) - counts)[images.rows[order]]
     missing = np.array([cell == MISSING for cell in table.texts("x")], dtype=bool)
     none = np.bincount(images.rows[~missing], minlength=len(counts)) == 0
-    if board is not None:
-        _check_counts(table, images.rows, counts, none, len(board.places))
+    points = counts if board is None else len(board.places)
+    wrong = np.flatnonzero((counts != points) & ~none)
+    if len(wrong):
+        row = int(np.flatnonzero(images.rows == wrong[0])[0])
+        raise table.error(row, f"the image has {counts[wrong[0]]} rows, but the board {points} points")
     there = ~missing
     xy = table.vectors(("x", "y"), read=_dashed)
     table.check_given(np.where(there[:, np.newaxis], xy, 0.0), ("x", "y"))
@@ -109,22 +109,6 @@ def read_vnl(path: Path, board: Board | None) -> Measured:
         sd=sd[there],
         use=use[there],
     )
-
-
-def _within(rows: Indices, count: int) -> Indices:
-    """Return which of its image's rows each row is."""
-    order = np.argsort(rows, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))[:-1]])
-    found = np.empty(len(rows), dtype=np.int64)
-    found[order] = np.arange(len(rows)) - starts[rows[order]]
-    return found
-
-
-def _check_counts(table: ColumnTable, rows: Indices, counts: Indices, none: Bools, points: int) -> None:
-    wrong = np.flatnonzero((counts != points) & ~none)
-    if len(wrong):
-        row = int(np.flatnonzero(rows == wrong[0])[0])
-        raise table.error(row, f"the image has {counts[wrong[0]]} rows, but the board {points} points")
 
 
 def _dashed(cell: str) -> float:
@@ -187,7 +171,13 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
     place: dict[str, int] = {}
     image = np.array([place.setdefault(key, len(place)) for key in whole], dtype=np.int64)
     first = np.unique(image, return_index=True)[1].tolist()
-    times = table.numbers("time") if "time" in table else None
+    times = None
+    if "time" in table:
+        times = table.numbers("time")[first]
+        missing = np.flatnonzero(np.isnan(times))
+        if len(missing):
+            raise table.error(first[int(missing[0])], "column time: is empty")
+        times = times * (1e-9 if times.max(initial=0.0) > MIN_NANOSECONDS else 1.0)
     return Measured(
         path=table.path,
         images=[keys[row] for row in first],
@@ -198,7 +188,7 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
         use=use & table.flags("use"),
         cameras=None if cameras is None else [cameras[row] for row in first],
         views=_of_images(table, image, first),
-        times=None if times is None else _seconds(table, times, first),
+        times=times,
     )
 
 
@@ -212,14 +202,6 @@ def _of_images(table: ColumnTable, image: Indices, first: list[int]) -> list[str
         if views[row] != found[own]:
             raise table.error(row, "column view: the image had another view before")
     return found
-
-
-def _seconds(table: ColumnTable, times: Floats, first: list[int]) -> Floats:
-    own = times[first]
-    missing = np.flatnonzero(np.isnan(own))
-    if len(missing):
-        raise table.error(first[int(missing[0])], "column time: is empty")
-    return np.asarray(own * (1e-9 if own.max(initial=0.0) > MIN_NANOSECONDS else 1.0))
 
 
 def _points(table: ColumnTable, board: Board | None) -> Indices:

@@ -68,13 +68,17 @@ def grouped(measured: Measured, how: Grouping) -> tuple[Corners, list[Message]]:
         raise InputError("holds no corners of a board", file=measured.path)
     rows = np.flatnonzero(keep)
     kept = rows.tolist()
-    camera_names = list(dict.fromkeys(names[row] for row in _in_order(names, kept, how)))
+    patterns = [_name_of(each, k) for k, each in enumerate(how.cameras)]
+    camera_names = list(dict.fromkeys(names[row] for row in kept))
+    if patterns:
+        camera_names.sort(key=patterns.index)
     if how.apart:
         views = np.arange(len(rows))
     elif how.views == "time":
         views = _by_time(measured, rows, [names[row] for row in kept], how.within)
     else:
-        views = _numbered([keys[row] for row in kept])
+        order: dict[str, int] = {}
+        views = np.array([order.setdefault(keys[row], len(order)) for row in kept], dtype=np.int64)
     place = np.full(len(keep), -1)
     place[rows] = np.arange(len(rows))
     own = keep[measured.image]
@@ -119,14 +123,6 @@ def _sizes_of_pictures(
     return found
 
 
-def _in_order(names: Sequence[str], rows: list[int], how: Grouping) -> list[int]:
-    """Return rows in the order of their cameras: that of the patterns, else that of the file."""
-    if not how.cameras:
-        return rows
-    order = [_name_of(each, k) for k, each in enumerate(how.cameras)]
-    return sorted(rows, key=lambda row: order.index(names[row]))
-
-
 def _cameras_and_views(
     measured: Measured, how: Grouping
 ) -> tuple[list[str], list[str], Bools, list[Message]]:
@@ -151,20 +147,15 @@ def _cameras_and_views(
         return ["camera"] * len(images), _views_or(measured, images), keep, []
     names = list(measured.cameras)
     several = len(set(names)) > 1
-    keys = [
-        _digits(image.replace(name, "", 1)) if several else image
-        for image, name in zip(images, names, strict=True)
-    ]
+    keys = list(images)
+    if several:  # the digits of a name, or all of it without digits
+        rests = [image.replace(name, "", 1) for image, name in zip(images, names, strict=True)]
+        keys = ["-".join(re.findall(r"\d+", rest)) or rest for rest in rests]
     return names, _views_or(measured, keys), keep, []
 
 
 def _views_or(measured: Measured, keys: Sequence[str]) -> list[str]:
     return list(keys if measured.views is None else measured.views)
-
-
-def _digits(text: str) -> str:
-    """Return the digits of a name, or all of it where it has none."""
-    return "-".join(re.findall(r"\d+", text)) or text
 
 
 def _with_groups(pattern: str) -> str:
@@ -182,11 +173,6 @@ def _name_of(pattern: str, number: int) -> str:
     """Return what a camera is called: what its pattern says beside its marks."""
     bare = re.sub(r"\*|\?|\[[^]]*\]", "", pattern.rpartition(".")[0] or pattern).strip(" ._-/")
     return bare or f"camera {number}"
-
-
-def _numbered(keys: Sequence[str]) -> Indices:
-    place: dict[str, int] = {}
-    return np.array([place.setdefault(key, len(place)) for key in keys], dtype=np.int64)
 
 
 def _by_time(measured: Measured, rows: Indices, names: Sequence[str], within: float) -> Indices:

@@ -31,22 +31,12 @@ MIN_PROBABILITY = 0.01  # calibrations with a larger p agree
 
 @dataclass(frozen=True)
 class DifferenceTest:
-    """The test of a difference of two calibrations.
+    """The test of a difference of two calibrations."""
 
-    Attributes
-    ----------
-    name
-        What differs.
-    chi2, dof
-        dk' cov(dk)^-1 dk over the variance of unit weight, and how many unknowns.
-    probability
-        Of a difference as large.
-    """
-
-    name: str
-    chi2: float
+    name: str  # of the difference
+    chi2: float  # dk' cov(dk)^-1 dk over the variance of unit weight
     dof: int
-    probability: float
+    probability: float  # of a difference as large
 
     @classmethod
     def of(cls, name: str, chi2: float, dof: int, freedom: float = math.inf) -> Self:
@@ -62,7 +52,7 @@ class DifferenceTest:
 
     @property
     def factor(self) -> float:
-        """By which the they differ more than their standard deviations say, in the mean."""
+        """Mean ratio of the differences to their standard deviations."""
         return math.sqrt(self.chi2 / self.dof)
 
 
@@ -73,18 +63,10 @@ RANK_TOLERANCE = 1e-6  # smaller relative cofactors of a change are due to the c
 
 @dataclass(frozen=True, eq=False)
 class CrossMap:
-    """Where a camera of the two parts images the same points.
+    """Where a camera of the two parts images the same points."""
 
-    Attributes
-    ----------
-    differences
-        (n, 2) images by part b less those by part a, pixels, in the datum of the whole.
-    covariances
-        (n, 2, 2) what they should have.
-    """
-
-    differences: Floats
-    covariances: Floats
+    differences: Floats  # (n, 2) images by part b less images by part a, pixels, in the datum of the whole
+    covariances: Floats  # (n, 2, 2) expected covariances of the differences
 
     @property
     def chi2(self) -> Floats:

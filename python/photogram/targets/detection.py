@@ -57,7 +57,11 @@ def settled(
     corner, over the distance between the nearest points of the board.
     """
     own = places[points]
-    sides = half * _scales(own, xy)
+    apart = np.linalg.norm(own[:, np.newaxis] - own, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    scales = np.linalg.norm(xy - xy[apart.argmin(axis=1)], axis=1)
+    # The distance of two misplaced corners is not their scale: the median limits windows
+    sides = half * np.minimum(scales, np.median(scales))
     found = refined(cv2, picture, xy, sides)
     expected = _by_neighbours(cv2, own, found)
     away = ~(np.linalg.norm(found - expected, axis=1) < MAX_PREDICTION_ERROR_PX)
@@ -67,16 +71,6 @@ def settled(
         expected = _by_neighbours(cv2, own, found)
         away = ~(np.linalg.norm(found - expected, axis=1) < MAX_PREDICTION_ERROR_PX)
     return points[~away], found[~away]
-
-
-def _scales(places: Floats, xy: Floats) -> Floats:
-    """Return (n,) pixels between a point and the one nearest to it on the board."""
-    apart = np.linalg.norm(places[:, np.newaxis] - places, axis=2)
-    np.fill_diagonal(apart, np.inf)
-    nearest = apart.argmin(axis=1)
-    found: Floats = np.linalg.norm(xy - xy[nearest], axis=1)
-    # Of two that are misplaced the distance says little: no window is larger than that of the middle one.
-    return np.minimum(found, np.median(found))
 
 
 def _by_neighbours(cv2: Any, places: Floats, xy: Floats) -> Floats:
@@ -146,15 +140,15 @@ class Tags:
         if len(ids) < MIN_TAGS_OF_HOMOGRAPHY:
             return None
         pitch = float(np.abs(np.diff(np.unique(centres.round(9)))).min())
-        plane, fits = self.cv2.findHomography(
-            _centres(tags), centres[ids], self.cv2.RANSAC, MAX_TAG_ERROR * pitch
-        )
+        # Diagonals of tags meet in the images of the centres of squares
+        a, b, c, d = np.concatenate([tags, np.ones((*tags.shape[:2], 1))], axis=2).transpose(1, 0, 2)
+        meet = np.cross(np.cross(a, c), np.cross(b, d))
+        images = meet[:, :2] / meet[:, 2:]
+        plane, fits = self.cv2.findHomography(images, centres[ids], self.cv2.RANSAC, MAX_TAG_ERROR * pitch)
         own = np.zeros(0, dtype=bool) if plane is None else fits.ravel().astype(bool)
-        return (
-            (ids[own], tags[own], np.asarray(plane))
-            if np.count_nonzero(own) >= MIN_TAGS_OF_HOMOGRAPHY
-            else None
-        )
+        if np.count_nonzero(own) < MIN_TAGS_OF_HOMOGRAPHY:
+            return None
+        return ids[own], tags[own], np.asarray(plane)
 
 
 def charuco_tags(cv2: Any, board: Board) -> Tags:
@@ -216,13 +210,6 @@ def grid_tags(cv2: Any, board: Board) -> Tags:
     return Tags(ways, corners_of, board.places[:, :2], cv2)
 
 
-def _centres(tags: Floats) -> Floats:
-    """Return (n, 2) where the diagonals of (n, 4, 2) corners meet: images of the centres of squares."""
-    a, b, c, d = np.concatenate([tags, np.ones((*tags.shape[:2], 1))], axis=2).transpose(1, 0, 2)
-    meet = np.cross(np.cross(a, c), np.cross(b, d))
-    return np.asarray(meet[:, :2] / meet[:, 2:])
-
-
 def _mapped(plane: Floats, xy: Floats) -> Floats:
     """Return (..., 2) places behind a homography."""
     found = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1) @ plane.T
@@ -244,7 +231,12 @@ def detected(
     is absent, a board whose targets nobody knows by their look, a file that is no picture, a board that no
     picture shows.
     """
-    cv2 = _opencv(path)
+    try:
+        import cv2
+    except ModuleNotFoundError:
+        raise InputError(
+            "corners of a board in photographs need OpenCV: pip install 'photogram[targets]'", file=path
+        ) from None
     find = _finder(cv2, board, path)
     found: list[tuple[Path, tuple[int, int], Found]] = []
     without = []
@@ -265,16 +257,6 @@ def detected(
         )
     told = [Message(f"no board is found in {listed(without)}")] if without else []
     return _measured(path, found, told)
-
-
-def _opencv(path: Path) -> Any:
-    try:
-        import cv2
-    except ModuleNotFoundError:
-        raise InputError(
-            "corners of a board in photographs need OpenCV: pip install 'photogram[targets]'", file=path
-        ) from None
-    return cv2
 
 
 def _picture(cv2: Any, file: Path) -> Picture:

@@ -22,7 +22,7 @@ from photogram.targets.first_camera import FAMILIES, NARROW, first_camera, pictu
 from photogram.targets.lens_fit import KNOTS, fitted, free_names, grid_of_pixels, lens_of
 from photogram.targets.orders import Pictures, rays_shown
 from photogram.targets.regularisation import WEAK_KNOT_SD
-from photogram.targets.sightings import CORNER_ORDERS, Listings, Sightings, frontal_tilts, nearest_rotations
+from photogram.targets.sightings import CORNER_ORDERS, Sightings, frontal_tilts, nearest_rotations
 from photogram.targets.vision import composed, inverted
 
 WIDE_FAMILY = "fisheye"  # equidistant
@@ -65,7 +65,14 @@ def nominal_camera(
         raise InputError(
             "a nominal camera has a field of view (field) or a focal length (focal): one of both"
         )
-    angle = _field(size[0], focal) if field is None else math.radians(number("field", field))
+    if field is None:
+        focal = number("focal", focal)
+        if not 0 < focal < math.inf:
+            raise InputError(f"focal is a positive number of pixels, not {focal:g}")
+        flat = 2 * math.atan(size[0] / (2 * focal))
+        angle = flat if flat < NARROW else size[0] / focal
+    else:
+        angle = math.radians(number("field", field))
     if not 0 < angle <= 2 * math.pi:
         raise InputError(f"field is a number of degrees up to 360, not {math.degrees(angle):g}")
     if focal is None:
@@ -75,8 +82,9 @@ def nominal_camera(
     centre = {"cx": (size[0] - 1) / 2, "cy": (size[1] - 1) / 2}
     source = Camera(WIDE_FAMILY, {"fx": focal, "fy": focal, **centre}, unit="px", name="camera")
     lens = lens_of(wanted, source, size, knots)
-    flat = angle < NARROW and RATIONAL_TERM not in free_names(lens)
-    return fitted(source.replace(model="pinhole") if flat else source, wanted, size, knots=knots)
+    if angle < NARROW and RATIONAL_TERM not in free_names(lens):
+        source = source.replace(model="pinhole")
+    return fitted(source, wanted, size, knots=knots)
 
 
 def weakly_known(camera: Camera, size: tuple[int, int]) -> Camera:
@@ -96,39 +104,18 @@ def weakly_known(camera: Camera, size: tuple[int, int]) -> Camera:
     return camera.replace(sd=sd)
 
 
-def _field(width: int, focal: float | None) -> float:
-    """Return the horizontal field of view (radians) of a focal length in pixels."""
-    given = number("focal", focal)
-    if not 0 < given < math.inf:
-        raise InputError(f"focal is a positive number of pixels, not {given:g}")
-    flat = 2 * math.atan(width / (2 * given))
-    return flat if flat < NARROW else width / given
-
-
 MAX_SENSOR_DIFFERENCE = 0.2  # radians, and parts of the distance of the boards
 PREFERENCE_OF_UNTURNED = 1e-3  # misfit in the same units that a board without a turn may have more
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """K cameras, as far as they have views in common.
+    """K cameras, as far as they have views in common."""
 
-    Attributes
-    ----------
-    sensors
-        (K, 4, 4) from the reference of a camera to the camera.
-    references
-        (K,) which camera that is: the first of those that hang together.
-    turned
-        (P,) the order of `turns` in which corners of each picture were listed; 0 where they were not.
-    apart
-        (P,) whether a picture agrees with no pose of its camera on the rig.
-    """
-
-    sensors: Floats
-    references: Indices
-    turned: Indices
-    apart: Bools
+    sensors: Floats  # (K, 4, 4) from the reference of a camera to the camera
+    references: Indices  # (K,) the first of the cameras that have views in common
+    turned: Indices  # (P,) the order of `turns` in which a picture lists its corners; 0: as numbered
+    apart: Bools  # (P,) whether a picture disagrees with the pose of its camera on the rig
 
 
 def connected(poses: Floats, cameras: Indices, views: Indices, count: int, turns: dict[int, Floats]) -> Rig:
@@ -278,16 +265,18 @@ def first_values(
     orders, fits, of_orders = pictures.ordered()
     made = pictures.adjusted(orders, fits)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
-    made = _turned(made, rig, seen.listings)
+    for order, turn in seen.listings.turns.items():
+        made[rig.turned == order] = made[rig.turned == order] @ inverted(turn)
     remarks += [*of_orders, *_of_rig(rig, corners), *(_frontal(made, corners) if seen.is_flat else ())]
-    made = made @ seen.axes
+    made, numbers = made @ seen.axes, seen.listings.points
+    point = numbers[rig.turned[corners.picture], numbers[orders[corners.picture], corners.point]]
     return FirstCalibration(
         cameras=cameras,
         sensors=rig.sensors,
         references=rig.references,
         poses=_of_views(made, rig, corners),
         picture_poses=made,
-        corners=_renumbered(corners, seen.listings, orders, rig.turned),
+        corners=corners.replace(point=point),
         without=without,
         remarks=remarks,
     )
@@ -306,7 +295,9 @@ def _cameras(
     for k, name in enumerate(corners.camera_names):
         own = seen.of((corners.cameras == k) & usable)
         if not len(own.xy):
-            raise InputError(f"camera {name}: no picture has enough corners: {_reasons(corners, without, k)}")
+            pictures = [corners.pictures[row] for row in np.flatnonzero(corners.cameras == k).tolist()]
+            why = listed([f"{each} ({without[each]})" for each in pictures]) or "it has none"
+            raise InputError(f"camera {name}: no picture has enough corners: {why}")
         size = picture_size(own, corners.sizes[k])
         if corners.sizes[k] is None:
             said = f"taken for {size[0]} x {size[1]} px, about whose middle the corners lie"
@@ -315,19 +306,6 @@ def _cameras(
         cameras.append(camera)
         remarks += told
     return cameras, remarks
-
-
-def _reasons(corners: Corners, without: dict[str, str], camera: int) -> str:
-    own = [name for name, k in zip(corners.pictures, corners.cameras.tolist(), strict=True) if k == camera]
-    return listed([f"{name} ({without[name]})" for name in own]) or "it has none"
-
-
-def _turned(made: Floats, rig: Rig, listings: Listings) -> Floats:
-    """Return the poses of pictures, the boards turned as the rig has shown."""
-    found = made.copy()
-    for order, turn in listings.turns.items():
-        found[rig.turned == order] = made[rig.turned == order] @ inverted(turn)
-    return found
 
 
 def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
@@ -383,12 +361,6 @@ def _of_views(made: Floats, rig: Rig, corners: Corners) -> Floats:
             agreeing = own & ~rig.apart if (own & ~rig.apart).any() else own
             found[view] = mean_pose(to_reference[agreeing & (of == of[agreeing].min())])
     return found
-
-
-def _renumbered(corners: Corners, listings: Listings, orders: Indices, turned: Indices) -> Corners:
-    """Return the corners with the numbers that points have in the orders that were found."""
-    first = listings.points[orders[corners.picture], corners.point]
-    return corners.replace(point=listings.points[turned[corners.picture], first])
 
 
 check_arguments(globals(), ["nominal_camera"])

@@ -6,7 +6,7 @@ Families and fields of view are tried without any start value.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
@@ -67,7 +67,13 @@ def adjusted_views(
         cameras=[camera],
         photo_cameras=0,
     )
-    attempts = _less_and_less(camera)
+    # All free parameters, then without the terms of the lens, then without the principal point
+    names = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
+    attempts: list[list[str]] = []
+    for kept in ({*names}, {"f", "fx", "fy", "cx", "cy"}, {"f", "fx", "fy"}):
+        free = [name for name in names if name in kept]
+        if free not in attempts and (free or not names):
+            attempts.append(free)
     for free in attempts:
         own = camera.replace(sd=dict.fromkeys(free, math.inf))
         try:
@@ -84,17 +90,6 @@ def adjusted_views(
         whole = free == attempts[0] and result.converged and not weak
         return Adjusted(adjusted, found, squares / max(freedom, 1.0), whole)
     return None
-
-
-def _less_and_less(camera: Camera) -> Sequence[list[str]]:
-    """Return what is free in one attempt after the other: all, then no lens, then no principal point."""
-    free = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
-    attempts: list[list[str]] = []
-    for kept in ({*free}, {"f", "fx", "fy", "cx", "cy"}, {"f", "fx", "fy"}):
-        own = [name for name in free if name in kept]
-        if own not in attempts and (own or not free):
-            attempts.append(own)
-    return attempts
 
 
 FIELDS_DEG = np.linspace(60.0, 200.0, 15)  # horizontal fields that are tried first
@@ -249,7 +244,19 @@ def first_camera(
     reach = RADIUS_MARGIN * float(np.nanmax(np.linalg.norm(seen.xy - (np.array(size) - 1) / 2, axis=2)))
     own = used.listed(trial.orders)
     splined = model == KNOTTED
-    for wanted in _wanted(family, seen, size, None if splined else model):
+    farthest = from_axis(family, seen.xy.reshape(-1, 2))
+    if model is None or splined:
+        ends = np.array([[0.0, (size[1] - 1) / 2], [size[0] - 1.0, (size[1] - 1) / 2]])
+        field = float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1)))
+        models = usual_models(field, farthest)
+    elif farthest >= math.pi / 2 and is_perspective(lens_of(model, family, size)):
+        raise InputError(
+            f"camera {family.name}: it sees corners {math.degrees(farthest):.0f} degrees off its axis, which"
+            f" {model} cannot show; opencv_fisheye can"
+        )
+    else:
+        models = [model]
+    for wanted in models:
         camera = fitted(family, wanted, size, radius=reach)
         done = _adjusted(own, trial, family, camera)
         if (
@@ -293,22 +300,6 @@ def _adjusted(seen: Sightings, trial: Trial, family: Camera, camera: Camera) -> 
             break
         fits, done = more, wider
     return done
-
-
-def _wanted(family: Camera, seen: Sightings, size: tuple[int, int], model: str | None) -> Sequence[str]:
-    """Return the model that was asked for, if it can show all corners; else the usual ones, in order."""
-    farthest = from_axis(family, seen.xy.reshape(-1, 2))
-    if model is None:
-        ends = np.array([[0.0, (size[1] - 1) / 2], [size[0] - 1.0, (size[1] - 1) / 2]])
-        return usual_models(
-            float(np.arccos(np.clip(np.prod(family.rays(ends), axis=0).sum(), -1, 1))), farthest
-        )
-    if farthest >= math.pi / 2 and is_perspective(lens_of(model, family, size)):
-        raise InputError(
-            f"camera {family.name}: it sees corners {math.degrees(farthest):.0f} degrees off its axis, which"
-            f" {model} cannot show; opencv_fisheye can"
-        )
-    return [model]
 
 
 def usual_models(field: float, farthest: float) -> list[str]:

@@ -18,25 +18,14 @@ from photogram.targets.vision import cross_matrices, imaged, motion_partials, un
 
 @dataclass(frozen=True, eq=False)
 class SeenCorners:
-    """The m corners that took part.
+    """The m corners that took part."""
 
-    Attributes
-    ----------
-    cameras, views, points
-        (m,) which camera saw which point of the board in which view.
-    xy
-        (m, 2) where, pixels.
-    sd
-        (m,) their standard deviations a priori, pixels.
-    poses
-        (m, 4, 4) board -> camera, at the time of each. None: the pose of the view, by all cameras.
-    """
-
-    cameras: Indices
+    cameras: Indices  # (m,) which camera saw which point of the board in which view
     views: Indices
     points: Indices
-    xy: Floats
-    sd: Floats
+    xy: Floats  # (m, 2) pixels
+    sd: Floats  # (m,) standard deviations a priori, pixels
+    # (m, 4, 4) board -> camera at the time of each corner; None: all cameras have the pose of the view
     poses: Floats | None = None
 
     def __getitem__(self, which: Bools) -> SeenCorners:
@@ -54,43 +43,23 @@ class Housing:
     The c common unknowns are, in this order: of each camera its parameters, and knots of its lens, with a
     standard deviation that is not zero, of each but the first its sensor (dt, w), and what is unknown of the
     board.
-
-    Attributes
-    ----------
-    cameras
-        As adjusted; their `sd` say which parameters were unknown.
-    sensors
-        (K, 4, 4) camera 0 -> camera k; the first is the identity.
-    poses
-        (V, 4, 4) board -> camera 0, of each view.
-    points
-        (n, 3) the points of the board, adjusted.
-    points_by_board
-        (n, 3, b) their partials by what is unknown of the board.
-    seen
-        The corners.
-    cofactors
-        (c + 6, c + 6) of the common unknowns and of the mean motion of the boards (:func:`mean_motion`), for
-        a priori unit weight.
-    weights
-        (c, c) of what was known of the common unknowns before: inverse covariances, 0 without.
-    variance
-        Of unit weight, by which cofactors become covariances.
     """
 
-    cameras: tuple[Camera, ...]
-    sensors: Floats
-    poses: Floats
-    points: Floats
-    points_by_board: Floats
+    cameras: tuple[Camera, ...]  # adjusted; parameters with a standard deviation were unknown
+    sensors: Floats  # (K, 4, 4) camera 0 -> camera k; the first is the identity
+    poses: Floats  # (V, 4, 4) board -> camera 0, of each view
+    points: Floats  # (n, 3) adjusted points of the board
+    points_by_board: Floats  # (n, 3, b) their partials by the unknowns of the board
     seen: SeenCorners
+    # (c + 6, c + 6) of the common unknowns and of the mean motion of the boards (:func:`mean_motion`), for
+    # a priori unit weight
     cofactors: Floats
-    weights: Floats
-    variance: float = 1.0
+    weights: Floats  # (c, c) prior weights of the common unknowns: inverse covariances, 0 without
+    variance: float = 1.0  # of unit weight: covariances are cofactors times this
 
     @property
     def common(self) -> int:
-        """How many unknowns the views have in common."""
+        """Number of unknowns that the views have in common."""
         return len(self.weights)
 
     @property

@@ -64,24 +64,12 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points with the pixels where a lens is to image them.
+    """Points with the pixels where a lens is to image them."""
 
-    Attributes
-    ----------
-    points
-        (m, 3) in axes of the other lens; directions where they are not finite.
-    xy
-        (m, 2) pixels.
-    finite
-        Whether the points are at finite distances.
-    roots
-        (m, 2, 2) W with W'W the weights of pixels; None: equal ones.
-    """
-
-    points: Floats
-    xy: Floats
-    finite: bool = False
-    roots: Floats | None = None
+    points: Floats  # (m, 3) in axes of the other lens; directions if the points are not finite
+    xy: Floats  # (m, 2) pixels
+    finite: bool = False  # whether the points are at finite distances
+    roots: Floats | None = None  # (m, 2, 2) W with W'W the weights of pixels; None: equal weights
 
     def least(self, start: Moved, free: Sequence[int], moving: slice = NO_MOTION) -> Moved:
         """Return what has the least sum of squares (Levenberg-Marquardt), from where it begins.
@@ -195,11 +183,13 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
             + "".join(f", and a constant {each} that nothing says" for each in sorted(constants))
         )
     start = _start(source, size, "w" in names)
+    free = {*names} - {"w", "h", *_FIXED_TERMS} if count is None else {*names[: 4 + count]}
     if splined:
-        start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": _field(source, size, knots)}
-    free = (
-        {*()} if splined else {*names} - {"w", "h", *_FIXED_TERMS} if count is None else {*names[: 4 + count]}
-    )
+        if min(knots) < ORDER + 1:
+            raise InputError(f"knots: a spline of order {ORDER:g} has {ORDER + 1:g} or more along an axis")
+        field = min(FIELD_MARGIN * field_of(source.rays(grid_of_pixels(size)), knots), 359.0)
+        start |= {"order": ORDER, "nx": knots[0], "ny": knots[1], "fov_x_deg": field}
+        free = set()
     return Camera(
         own,
         {name: value for name, value in start.items() if name in names},
@@ -219,14 +209,9 @@ def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str
         )
     fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
     start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_INITIAL_TERMS)}
-    return start | _principal_point(source, from_middle, size)
-
-
-def _field(source: Camera, size: tuple[int, int], knots: tuple[int, int]) -> float:
-    """Return the fov_x_deg (degrees) with which knots lie over all that a camera shows, and a tenth more."""
-    if min(knots) < ORDER + 1:
-        raise InputError(f"knots: a spline of order {ORDER:g} has {ORDER + 1:g} or more along an axis")
-    return min(FIELD_MARGIN * field_of(source.rays(grid_of_pixels(size)), knots), 359.0)
+    # cx and cy count from the first pixel, or in models with w and h from the middle of the picture
+    shifts = ("w" in source.names) - from_middle
+    return start | {"cx": given["cx"] + shifts * size[0] / 2, "cy": given["cy"] + shifts * size[1] / 2}
 
 
 def field_of(rays: Floats, knots: tuple[int, int], order: float = ORDER) -> float:
@@ -235,15 +220,6 @@ def field_of(rays: Floats, knots: tuple[int, int], order: float = ORDER) -> floa
     inner = np.array(knots) - order
     reach = float(np.nanmax(np.nanmax(np.abs(places), axis=0) * inner[0] / inner))
     return math.degrees(4 * math.atan(reach / 2))
-
-
-def _principal_point(source: Camera, from_middle: bool, size: tuple[int, int]) -> dict[str, float]:
-    """Return cx and cy as a model counts them: from the first pixel, or from the middle of w by h."""
-    shift = [0.0, 0.0]
-    for on, sign in (("w" in source.names, 1), (from_middle, -1)):
-        if on:
-            shift = [own + sign * side / 2 for own, side in zip(shift, size, strict=True)]
-    return {name: source.parameters[name] + own for name, own in zip(("cx", "cy"), shift, strict=True)}
 
 
 def fitted(
@@ -255,35 +231,14 @@ def fitted(
     radius: float = math.inf,
     knots: tuple[int, int] = KNOTS,
 ) -> Camera:
-    """Return the camera of another model that shows the rays of a camera where this shows them.
+    """Return the camera of another model whose images agree best with the images of a camera.
 
-    The sum of squares of what both images of a ray are apart, over 60 x 40 pixels of the source, is made
-    least: first by focal length and principal point, then with the terms of the lens in the order k1, k2, p,
-    all others.
-
-    Parameters
-    ----------
-    source
-        The camera; what of its image has no ray does not count.
-    model
-        A model of `docs/cameras.md`, or `opencv4`, `opencv5`, `opencv8`, `opencv12`.
-    size
-        Width and height of the pictures, pixels.
-    held
-        Parameters that stay: focal length and principal point those of the source, terms of the lens 0.
-    radius
-        Pixels farther from the middle of the picture do not count.
-    knots
-        Along columns and rows, of a splined model.
-
-    Returns
-    -------
-    The camera; what was fitted is free in it.
-
-    Raises
-    ------
-    InputError
-        A model that there is not, terms that it has not, or nothing of the picture that it can show.
+    The sum of squares of the differences over 60 x 40 pixels of the source, within `radius` of the middle of
+    the picture, is minimized: first by focal length and principal point, then with the terms of the lens in
+    the order k1, k2, p, all others. `model` and `knots` are those of :func:`lens_of`. Parameters in
+    `held` are fixed: focal length and principal point have the values of the source, terms of the lens
+    are 0. The others are free in the result. InputError: an unknown model or parameter, or a model that
+    shows no pixel.
     """
     start = lens_of(model, source, size, knots)
     if unknown := sorted({*held} - {*start.names}):
@@ -317,21 +272,12 @@ def fitted_in_stages(start: Moved, points: Points, free: Sequence[str], moving: 
     """Return a lens, and at last its motion, fitted with more and more of its parameters free."""
     at = start
     numbers = {name: k for k, name in enumerate(at.names)}
-    stages = _stages(list(free))
-    for stage in stages:
-        at = points.least(at, [numbers[name] for name in stage])
+    allowed, before = set(_FIRST), list[str]()
+    for more in ({*()}, *_STAGES, {*free}):
+        allowed |= more
+        stage = [name for name in free if name in allowed]
+        if stage != before:
+            at, before = points.least(at, [numbers[name] for name in stage]), stage
     if moving != NO_MOTION:
         at = points.least(at, [numbers[name] for name in free], moving)
     return at
-
-
-def _stages(free: list[str]) -> list[list[str]]:
-    """Return what is free in each fit: more and more of it."""
-    allowed = set(_FIRST)
-    found = []
-    for more in ({*()}, *_STAGES, {*free}):
-        allowed |= more
-        own = [name for name in free if name in allowed]
-        if own and own not in found:
-            found.append(own)
-    return found

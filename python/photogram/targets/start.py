@@ -249,14 +249,10 @@ class Start(Valued, Brief):
             mounts=self._mounts(names, photo) if self.sync == "known" else [],
             timed=self._timed() if self.sync == "offset" else [],
             linear_unit=self.board.unit,
-            passages=self._passages(),
+            passages=[Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
+            if self.shape == "bend"
+            else [],
         )
-
-    def _passages(self) -> list[Figure]:
-        """Return what the points of the board follow from, where it is bent by an unknown amount."""
-        if self.shape != "bend":
-            return []
-        return [Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
 
     def references_of_views(self) -> Indices:
         """Return (V,) the camera that the pose of each view is of."""

@@ -93,15 +93,7 @@ def suggest_views(
 
 
 def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board: Board) -> list[Candidate]:
-    """Return views of the board all over the picture of a camera, at three distances, tilted and turned.
-
-    Parameters
-    ----------
-    housing, camera
-        The cameras, and the number of the one to which the board is shown.
-    size, board
-        Width and height of its pictures, and the board.
-    """
+    """Return views of the board all over the picture of a camera, at three distances, tilted and turned."""
     to_camera = housing.sensors[camera]
     own = np.unique(housing.seen.views[housing.seen.cameras == camera])
     places = (to_camera @ housing.poses[own] @ [*middle_of(housing.points), 1.0])[:, :3]
@@ -118,14 +110,8 @@ def views_over_picture(
 ) -> list[Candidate]:
     """Return views, board -> camera, with the middle of the board in each part of the picture.
 
-    Parameters
-    ----------
-    camera, size
-        The camera, and width and height of its pictures.
-    board, distances
-        The board, and how far its middle is from the camera.
-    whole
-        Whether it is found as a whole, or not at all: it is held as near there as all of it is shown.
+    `distances` are between the middle of the board and the camera. A board that detectors find only as a
+    `whole` is moved towards the middle of the picture until the picture shows all of it.
     """
     found = []
     steps = STEPS_TO_MIDDLE if whole else STEPS_TO_MIDDLE[:1]
@@ -161,16 +147,9 @@ def views_towards(
     tilts: Collection[str] = TILTS,
     turns: Collection[str] = TURNS,
 ) -> list[Candidate]:
-    """Return views, board -> camera, with the middle of the board in one direction.
+    """Return views, board -> camera, with the middle of the board in a direction (3,), called `place`.
 
-    Parameters
-    ----------
-    towards, place
-        (3,) the direction, and what it is called.
-    board, distances
-        As of :func:`views_over_picture`; distances in two figures.
-    tilts, turns
-        Names of `TILTS` and `TURNS`.
+    Distances are rounded to two figures; tilts and turns are names of `TILTS` and `TURNS`.
     """
     found, middle = [], middle_of(board.places)
     for distance, tilt, turn in product(
