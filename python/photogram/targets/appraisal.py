@@ -15,7 +15,6 @@ from photogram.adjustment.adjustment import adjust, adjusted_again
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.types import Bools
 from photogram.errors import InputError, RankError
-from photogram.network.cameras import Camera
 from photogram.targets.calibration_result import Calibrated, Worth, WorthOptions
 from photogram.targets.cross_validation import CrossValidation, Into, parts_agree, splits
 from photogram.targets.housings import camera_number, housed_with, housing_of
@@ -78,7 +77,9 @@ def cross_validate(
             adjusted.append(_adjusted(result, mine & np.isin(corners.views, views[part]), cameras))
         a, b = (housing_of(each)[0] for each in adjusted)
         parts.append((tuple(views[pair[0]].tolist()), tuple(views[pair[1]].tolist())))
-        tests.append(tuple(parts_agree(a, b, names, _unit(adjusted))))
+        sums, freedoms = zip(*(each.result.sum_and_freedom for each in adjusted), strict=True)
+        pooled = sum(sums) / sum(freedoms), sum(freedoms)  # variance of unit weight, degrees of freedom
+        tests.append(tuple(parts_agree(a, b, names, pooled)))
         housings.append((a, b))
     return CrossValidation(
         into=str(into),
@@ -95,6 +96,10 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     given, restarted, priors = whole.calibration, whole.restarted(), whole.result.block.cameras
     corners = given.corners.of_pictures(pictures)
     views = np.unique(given.corners.views[pictures])
+    free = []  # unknown parameters are free until the first adjustment ends: then the priors follow
+    for camera in (whole.cameras[each].camera for each in cameras):
+        unknown = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
+        free.append(camera.replace(sd=dict.fromkeys(unknown, np.inf), covariance=None))
     part = given.replace(
         board=given.board.replace(shape=given.shape),
         corners=corners.replace(
@@ -102,7 +107,7 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
             camera_names=[given.corners.camera_names[each] for each in cameras],
             sizes=[given.corners.sizes[each] for each in cameras],
         ),
-        cameras=[_freed(whole.cameras[each].camera) for each in cameras],
+        cameras=free,
         sensors=np.asarray(restarted.sensors)[cameras],
         poses=whole.poses[views],
         references=None,
@@ -115,26 +120,10 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     )
     result = adjust(part.block(), loss=cast("Loss | None", whole.result.options.loss))
     own = [priors[each] for each in cameras]
-    if any(_is_weighted(each) for each in own):
+    sd = np.concatenate([each.deviations for each in own])
+    if (np.isfinite(sd) & (sd > 0)).any():
         result = cast("Result", adjusted_again(part.block(own), result.options, result.state, threads=None))
     return Calibrated(calibration=part, result=result)
-
-
-def _freed(camera: Camera) -> Camera:
-    """Return a camera whose unknown parameters are free: priors come once it has arrived."""
-    unknown = [name for name, sd in zip(camera.names, camera.deviations, strict=True) if sd > 0]
-    return camera.replace(sd=dict.fromkeys(unknown, np.inf), covariance=None)
-
-
-def _is_weighted(camera: Camera) -> bool:
-    sd = camera.deviations
-    return bool((np.isfinite(sd) & (sd > 0)).any())
-
-
-def _unit(parts: list[Calibrated]) -> tuple[float, float]:
-    """Return the pooled variance of unit weight of parts, and its degrees of freedom."""
-    sums, freedoms = zip(*(each.result.sum_and_freedom for each in parts), strict=True)
-    return sum(sums) / sum(freedoms), sum(freedoms)
 
 
 DISTANCE_FIGURES = 2  # significant, of the median distance of boards
@@ -164,7 +153,14 @@ def appraise(
     asked = asked or WorthOptions()
     told = progress or (lambda _: None)
     remarks: list[str] = []
-    cross = _cross_validated(calibrated, asked, told, remarks)
+    cross: list[CrossValidation] = []
+    for number, camera in enumerate(calibrated.cameras):
+        if asked.cross_validate is None or housed_with(calibrated, number)[0] != number:
+            continue
+        try:
+            cross.append(cross_validate(calibrated, asked.cross_validate, number, progress=told))
+        except (InputError, RankError) as error:
+            remarks.append(f"{camera.name}: no cross-validation: {error}")
     maps: list[UncertaintyMap] = []
     for number, camera in enumerate(calibrated.cameras):
         if calibrated.calibration.corners.sizes[number] is None:
@@ -190,23 +186,6 @@ def appraise(
         at = maps[0].distance
         suggestions.append(suggest_views(calibrated, at, camera=maps[0].camera, views=asked.suggest))
     return Worth(maps=tuple(maps), cross=tuple(cross), suggestions=tuple(suggestions), remarks=tuple(remarks))
-
-
-def _cross_validated(
-    calibrated: Calibrated, asked: WorthOptions, told: Callable[[str], None], remarks: list[str]
-) -> list[CrossValidation]:
-    """Return the cross-validation of each housing; what cannot be is told."""
-    if asked.cross_validate is None:
-        return []
-    found = []
-    for number, camera in enumerate(calibrated.cameras):
-        if housed_with(calibrated, number)[0] != number:
-            continue
-        try:
-            found.append(cross_validate(calibrated, asked.cross_validate, number, progress=told))
-        except (InputError, RankError) as error:
-            remarks.append(f"{camera.name}: no cross-validation: {error}")
-    return found
 
 
 def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossValidation]) -> str:

@@ -202,7 +202,9 @@ def compared(
     vectors = np.stack([differences_at(a.camera, b.camera, fitted, pixels, each) for each in distances])
     expected = _Expected(a, b, fitted, near, distances) if known else None
     shape = (len(distances), len(rows), len(columns), 2)
-    shared = _shared(a.corners, b.corners)
+    others, shared = set(map(tuple, b.corners.tolist())), 0.0
+    if len(a.corners):
+        shared = sum(each in others for each in map(tuple, a.corners.tolist())) / len(a.corners)
     return CameraDifference(
         cameras=(a.name, b.name),
         size=size,
@@ -239,14 +241,6 @@ def _inverted(covariances: Floats) -> Floats:
     found = np.full_like(covariances, np.nan)
     found[known] = np.linalg.inv(covariances[known])
     return found
-
-
-def _shared(a: Floats, b: Floats) -> float:
-    """Return the share of the corners of a that b has, too."""
-    if not len(a) or not len(b):
-        return 0.0
-    others = set(map(tuple, b.tolist()))
-    return sum(each in others for each in map(tuple, a.tolist())) / len(a)
 
 
 class _Expected:

@@ -362,5 +362,4 @@ class Calibrated(Brief, Judged, Documented):
 
 
 def _count(partials: Floats | int) -> int:
-    """Return how many unknowns partials are of."""
     return partials if isinstance(partials, int) else len(partials)

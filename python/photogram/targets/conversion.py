@@ -221,9 +221,11 @@ def convert_lens(
     images[~shows(start, points)] = np.nan
     shape = (len(apart), len(rows), len(columns))
     passed = None if known is None else _passed_on(source, known, shown, found, free, moving)
+    # Knots and singular covariances cannot be observed: such a camera is fixed
+    can = passed is not None and start.knots is None and is_covariance(passed)
     return Conversion(
         source=source,
-        camera=_camera(found.camera, free, passed),
+        camera=found.camera.replace(sd=0.0, knot_sd=None, covariance=(free, passed) if can else None),
         difference=CameraDifference(
             cameras=(source.title, found.camera.model),
             size=size,
@@ -308,10 +310,3 @@ def _passed_on(
     jacobian = (solved / scale[:, np.newaxis])[: len(free)]
     passed: Floats = jacobian @ matrix @ jacobian.T
     return (passed + passed.T) / 2
-
-
-def _camera(camera: Camera, free: Sequence[str], covariance: Floats | None) -> Camera:
-    """Return the fitted camera: with the covariance where it can be observed with it, held else."""
-    can = covariance is not None and camera.knots is None and is_covariance(covariance)
-    observed = (list(free), covariance) if can else None
-    return camera.replace(sd=0.0, knot_sd=None, covariance=observed)

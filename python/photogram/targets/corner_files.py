@@ -193,7 +193,6 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
 
 
 def _of_images(table: ColumnTable, image: Indices, first: list[int]) -> list[str] | None:
-    """Return the views of images; None where the table does not say them."""
     if "view" not in table:
         return None
     views = table.texts("view")
@@ -205,7 +204,6 @@ def _of_images(table: ColumnTable, image: Indices, first: list[int]) -> list[str
 
 
 def _points(table: ColumnTable, board: Board | None) -> Indices:
-    """Return the number of the board's point of each row."""
     if "point" in table:
         names = {name: k for k, name in enumerate(board.names)} if board is not None else None
         found = np.empty(table.count, dtype=np.int64)

@@ -176,7 +176,6 @@ def _name_of(pattern: str, number: int) -> str:
 
 
 def _by_time(measured: Measured, rows: Indices, names: Sequence[str], within: float) -> Indices:
-    """Return views of images whose times are near each other, no two of one camera."""
     if measured.times is None:
         raise InputError("has no times, by which --views time goes", file=measured.path)
     times = measured.times[rows]

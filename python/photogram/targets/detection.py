@@ -276,7 +276,6 @@ def _name(path: Path, file: Path) -> str:
 def _measured(
     path: Path, found: Sequence[tuple[Path, tuple[int, int], Found]], told: list[Message]
 ) -> Measured:
-    """Return what was found as the corners of a file."""
     folders = [file.parent.name for file, _, _ in found]
     several = len({file.parent for file, _, _ in found}) > 1
     counts = [len(points) for _, _, (points, _) in found]
@@ -296,7 +295,6 @@ def _measured(
 
 
 def _finder(cv2: Any, board: Board, path: Path) -> Callable[[Picture], Found | None]:
-    """Return what looks for a board in a picture."""
     if board.kind == "points":
         raise InputError(
             "targets that lie anywhere are not looked for in photographs: give their corners", file=path
@@ -321,19 +319,14 @@ def _chessboard(cv2: Any, board: Board, picture: Picture) -> Floats | None:
     how = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     there, xy = cv2.findChessboardCorners(picture, board.grid, flags=how)
     start = _flat(xy) if there else None
-    for times in _reductions(picture) if start is None else ():
+    if start is None:
+        times = math.ceil(max(picture.shape) / MAX_FIRST_SIDE_PX)
         start = _by_sectors(cv2, board, picture, times)
-        if start is not None:
-            break
+        if start is None and times > 1:
+            start = _by_sectors(cv2, board, picture, 1)
     if start is None:
         return None
     return refined(cv2, picture, start, WINDOW_OF_SPACING * _nearest(start.reshape(*board.grid[::-1], 2)))
-
-
-def _reductions(picture: Picture) -> list[int]:
-    """Return how many times smaller a picture is searched, one after the other."""
-    times = math.ceil(max(picture.shape) / MAX_FIRST_SIDE_PX)
-    return [times, 1] if times > 1 else [1]
 
 
 def _by_sectors(cv2: Any, board: Board, picture: Picture, times: int) -> Floats | None:

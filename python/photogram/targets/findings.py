@@ -128,14 +128,16 @@ def judged(calibrated: Calibrated, worth: Worth | None = None) -> Calibrated:
 
 
 def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
-    """Return the tests of the block, with what is said of calibrations in the place of control."""
     found = findings_of(calibrated.result)
     shown = showings(calibrated)
     cross = () if worth is None else worth.cross
     wrong = [_systematic(each) for each in cross if not each.explained]
     stiff = bool(wrong) or any(each.significant for each in found.systematic)
     other = _other_model(calibrated) if stiff else []
-    unknown = [_deviation_asked(calibrated)] if isinstance(calibrated.result, UnknownWeight) else []
+    unknown = []
+    if isinstance(calibrated.result, UnknownWeight):
+        sd = calibrated.calibration.assumed * deviation_of_corners(calibrated.result)
+        unknown.append(Phrase("advice.corner-sd", {"sd": float(sd)}))
     missing = [line for each in shown for line in each.next]
     agreeing = [f"{', '.join(each.cameras)}: {each.verdict}" for each in cross if each.explained]
     return replace(
@@ -168,12 +170,6 @@ def _other_model(calibrated: Calibrated) -> list[Phrase]:
     if calibrated.calibration.shape != "points":
         ways.append(Phrase("part.free-board", {"how": Phrase("how.board")}))
     return [Phrase("advice.try", {"ways": ways})] if ways else []
-
-
-def _deviation_asked(calibrated: Calibrated) -> Phrase:
-    """Ask for the standard deviation of corners, and give that of their residuals."""
-    sd = calibrated.calibration.assumed * deviation_of_corners(calibrated.result)
-    return Phrase("advice.corner-sd", {"sd": float(sd)})
 
 
 def _systematic(cross: CrossValidation) -> Systematic:

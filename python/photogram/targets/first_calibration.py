@@ -290,7 +290,6 @@ def _cameras(
     model: str | None,
     knots: tuple[int, int],
 ) -> tuple[list[Camera], list[Message]]:
-    """Return the first values of each camera by its usable pictures, and remarks."""
     cameras, remarks = [], []
     for k, name in enumerate(corners.camera_names):
         own = seen.of((corners.cameras == k) & usable)
@@ -309,7 +308,6 @@ def _cameras(
 
 
 def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
-    """Return what is to be said of cameras on a rig."""
     told = [
         Message(
             f"picture {corners.pictures[row]}: its corners begin at another corner of the board than those of"
@@ -337,7 +335,6 @@ def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
 
 
 def _frontal(made: Floats, corners: Corners) -> list[Message]:
-    """Name the pictures whose boards are parallel to the image."""
     names = [corners.pictures[row] for row in np.flatnonzero(frontal_tilts(made) < MIN_TILT_RAD).tolist()]
     if not names:
         return []

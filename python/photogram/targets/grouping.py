@@ -20,7 +20,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.results.components import VarianceComponents
 from photogram.results.grouping import GroupsArgument
-from photogram.show.quantity import Axis, Quantity
+from photogram.show.quantity import Axis, Quantity, chosen
 from photogram.targets.calibration import weighted_block
 from photogram.targets.calibration_result import Calibrated
 
@@ -46,7 +46,28 @@ def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list
     """
     one_of("by", by, get_args(Groups))
     names, group = _grouped(calibrated, by, camera)
-    return _table(calibrated, by, names, group)
+    result, count = calibrated.result, len(names)
+    own = group >= 0
+    used = np.bincount(group[own], minlength=count)
+    weighted = (result.residuals / result.image_given_sd) ** 2
+    mean, tests = mean_residuals(calibrated, group, count)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rms = np.sqrt(_sums(group[own], result.residuals[own] ** 2, count).sum(axis=1) / (2 * used))
+        redundancy = _sums(group[own], result.redundancy[own], count).sum(axis=1)
+        sigma = np.sqrt(_sums(group[own], weighted[own], count).sum(axis=1) / redundancy)
+    kept, marked = used > 0, np.abs(np.nan_to_num(tests)) > CRITICAL_TEST_VALUE
+    pixels = (Axis.of("px", "px"),)
+    axes = (Axis.of("x", "px"), Axis.of("y", "px"))
+    columns = [
+        Quantity(np.array(names, dtype=object), (), "name", by, by, head=_HEADS[by]),
+        Quantity(used, name="corners", member="corners", head="Corners"),
+        Quantity(rms, pixels, "value", "rms", "rms_px", head="rms", figures=3),
+        Quantity(redundancy, name="redundancy", member="redundancy", head="Redundancy"),
+        Quantity(sigma, name="sigma", member="sigma", head="Sigma", figures=3),
+        Quantity(mean, axes, "value", "mean_", "mean_px", head="Mean {}", figures=2),
+        Quantity(tests, axes, "number", "t_", "t", head="t {}", figures=2, marked=marked),
+    ]
+    return chosen(columns, np.flatnonzero(kept))
 
 
 def mean_residuals(calibrated: Calibrated, group: Indices, count: int) -> tuple[Floats, Floats]:
@@ -101,41 +122,7 @@ _HEADS = {
 }
 
 
-def _table(calibrated: Calibrated, by: Groups, names: list[str], group: Indices) -> list[Quantity]:
-    result, count = calibrated.result, len(names)
-    own = group >= 0
-    used = np.bincount(group[own], minlength=count)
-    weighted = (result.residuals / result.image_given_sd) ** 2
-    mean, tests = mean_residuals(calibrated, group, count)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        rms = np.sqrt(_sums(group[own], result.residuals[own] ** 2, count).sum(axis=1) / (2 * used))
-        redundancy = _sums(group[own], result.redundancy[own], count).sum(axis=1)
-        sigma = np.sqrt(_sums(group[own], weighted[own], count).sum(axis=1) / redundancy)
-    kept = used > 0
-    pixels = Axis.of("px", "px")
-    axes = (Axis.of("x", "px"), Axis.of("y", "px"))
-    return [
-        Quantity(np.array(names, dtype=object)[kept], (), "name", by, by, head=_HEADS[by]),
-        Quantity(used[kept], (), "number", "corners", "corners", head="Corners"),
-        Quantity(rms[kept], (pixels,), "value", "rms", "rms_px", head="rms", figures=3),
-        Quantity(redundancy[kept], (), "number", "redundancy", "redundancy", head="Redundancy"),
-        Quantity(sigma[kept], (), "number", "sigma", "sigma", head="Sigma", figures=3),
-        Quantity(mean[kept], axes, "value", "mean_", "mean_px", head="Mean {}", figures=2),
-        Quantity(
-            tests[kept],
-            axes,
-            "number",
-            "t_",
-            "t",
-            head="t {}",
-            figures=2,
-            marked=np.abs(np.nan_to_num(tests[kept])) > CRITICAL_TEST_VALUE,
-        ),
-    ]
-
-
 def _sums(group: Indices, values: Floats, count: int) -> Floats:
-    """Return (count, 2) sums of (m, 2) values."""
     return np.stack([np.bincount(group, weights=column, minlength=count) for column in values.T], axis=1)
 
 

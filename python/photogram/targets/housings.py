@@ -41,7 +41,20 @@ def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
     cameras = housed_with(calibrated, camera)
     made = _HOUSINGS.setdefault(calibrated, {})
     if cameras[0] not in made:
-        made[cameras[0]] = _housing(calibrated, cameras)
+        corners = calibrated.calibration.corners
+        views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
+        poses, by_board = calibrated.poses[views], _points_by_board(calibrated)
+        made[cameras[0]] = Housing(
+            cameras=tuple(calibrated.cameras[each].camera for each in cameras),
+            sensors=calibrated.sensors[cameras],
+            poses=poses,
+            points=calibrated.points,
+            points_by_board=by_board,
+            seen=_seen(calibrated, cameras, views),
+            cofactors=_cofactors(calibrated, cameras, views, poses, by_board.shape[2]),
+            weights=_weights(calibrated, cameras),
+            variance=calibrated.result.covariance_scale,
+        )
     return made[cameras[0]], cameras.index(camera)
 
 
@@ -51,23 +64,6 @@ def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
     reference = int(references[camera])
     others = np.flatnonzero((references == reference) & (np.arange(len(references)) != reference))
     return [reference, *others.tolist()]
-
-
-def _housing(calibrated: Calibrated, cameras: list[int]) -> Housing:
-    corners = calibrated.calibration.corners
-    views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
-    poses, by_board = calibrated.poses[views], _points_by_board(calibrated)
-    return Housing(
-        cameras=tuple(calibrated.cameras[each].camera for each in cameras),
-        sensors=calibrated.sensors[cameras],
-        poses=poses,
-        points=calibrated.points,
-        points_by_board=by_board,
-        seen=_seen(calibrated, cameras, views),
-        cofactors=_cofactors(calibrated, cameras, views, poses, by_board.shape[2]),
-        weights=_weights(calibrated, cameras),
-        variance=calibrated.result.covariance_scale,
-    )
 
 
 def _board_rows(calibrated: Calibrated) -> list[int]:
@@ -124,13 +120,6 @@ def _cofactors(
     return calibrated.combined(partials, parts)
 
 
-def _weight_of_sensor(calibrated: Calibrated, camera: int) -> Floats:
-    """Return (6, 6) of the observation of a sensor, by its steps dt, w."""
-    back = np.linalg.inv(sensor_steps(calibrated.sensors[camera]))
-    sd = np.asarray(calibrated.calibration.sd_sensors)[camera]
-    return np.asarray(back.T @ np.diag(1 / sd**2) @ back)
-
-
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
     """Return the inverse covariances of what was known before: of cameras, sensors, points and the bend."""
     block, rows = calibrated.result.block, _board_rows(calibrated)
@@ -145,7 +134,10 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
             own[np.ix_(weighted, weighted)] = np.linalg.inv(covariance)
         knots = [knot.covariance for knot in camera.knot_unknowns if np.any(knot.sd)]
         blocks += [own, *(np.zeros((2, 2)) if each is None else np.linalg.inv(each) for each in knots)]
-    blocks += [_weight_of_sensor(calibrated, each) for each in cameras[1:]]
+    for number in cameras[1:]:  # observations of sensors, by their steps dt, w
+        back = np.linalg.inv(sensor_steps(calibrated.sensors[number]))
+        weights = np.diag(1 / np.asarray(calibrated.calibration.sd_sensors)[number] ** 2)
+        blocks.append(back.T @ weights @ back)
     points = np.diag(1 / block.point_sd[rows].ravel() ** 2)
     bend = np.diag(1 / np.asarray(calibrated.calibration.sd_bend) ** 2)
     blocks.append(points if calibrated.bend is None else bend)

@@ -201,7 +201,6 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
 
 
 def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str, float]:
-    """Return where parameters begin: what the source says, and terms that say nothing."""
     given = source.parameters
     if "cx" not in given or not ({"f", "fx"} & {*given}):
         raise InputError(

@@ -15,6 +15,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.housing import transformed
+from photogram.targets.sightings import nearest_rotations
 from photogram.targets.vision import imaged, motion_partials, moved_by, rays
 
 Criterion = Literal["pixels", "mrcal"]  # squares of pixel differences, or mrcal 2: fourth powers of angles
@@ -27,21 +28,11 @@ HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases m
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """The motion between the axes of two cameras.
+    """The motion between the axes of two cameras."""
 
-    Attributes
-    ----------
-    motion
-        (4, 4) axes of camera a -> axes of camera b.
-    finite
-        Whether the translation was fitted: all distances are finite.
-    points
-        How many pixels took part, counted at every distance.
-    """
-
-    motion: Floats
-    finite: bool
-    points: int
+    motion: Floats  # (4, 4) axes of camera a -> axes of camera b
+    finite: bool  # whether the translation was fitted: all distances are finite
+    points: int  # number of pixels of the fit, counted at every distance
 
 
 def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Floats:
@@ -84,7 +75,7 @@ def fitted_motion(
     towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
     motion, free = np.eye(4), slice(0 if finite else 3, 6)
     unit = towards / np.linalg.norm(towards, axis=1)[:, np.newaxis]
-    motion[:3, :3] = _turned_onto(unit, aims)
+    motion[:3, :3] = nearest_rotations((aims.T @ unit)[np.newaxis])[0]
     for _ in range(STEPS):
         moved = transformed(motion, towards)
         by_motion = motion_partials(moved, finite)[:, :, free]
@@ -130,9 +121,3 @@ def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats)
     normal = 2 * np.einsum("n,ni,nj->ij", weights * inside, slope, slope)
     normal += np.einsum("n,nki,nkj->ij", level, turned, turned)
     return normal, -np.einsum("n,ni->i", level, slope)
-
-
-def _turned_onto(vectors: Floats, onto: Floats) -> Floats:
-    """Return the rotation that turns vectors nearest onto others (Kabsch)."""
-    u, _, v = np.linalg.svd(onto.T @ vectors)
-    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)

@@ -91,7 +91,14 @@ def read_model(path: Path) -> Calibration:
     InputError: the file is no such text, holds no corners, or what is not taken: lenses that there are not,
     points that were observed one by one, cameras that moved, values that were held.
     """
-    arrays = read_arrays(path, _packed(path))
+    packed = _content(path).get(KEY)
+    if not isinstance(packed, bytes):
+        raise InputError(f"holds a camera, but no corners: it has no {KEY}", file=path)
+    try:
+        archive = base64.b85decode(packed)
+    except ValueError as error:
+        raise InputError(f"its {KEY} are damaged: {error}", file=path) from None
+    arrays = read_arrays(path, archive)
     for name in ("observations_point", "observations_point_triangulated"):
         if name in arrays:
             raise arrays.error(name, "is not taken: corners of a board are")
@@ -100,15 +107,17 @@ def read_model(path: Path) -> Calibration:
         raise InputError(f"its {KEY} hold no corners of a board", file=path)
     observed = arrays.numbers("observations_board", None, None, None, 3)
     indices = _indices(arrays, len(observed))
-    core, lens, warped = _freed(arrays)
-    cameras = _cameras(arrays, core, lens)
+    for held in ("do_optimize_frames", "do_optimize_extrinsics"):
+        if held in arrays and not arrays.says(held):
+            raise arrays.error(held, "is false: poses that were held are not taken")
+    cameras = _cameras(arrays)
     sensors, poses = _poses(arrays, indices, len(cameras))
     warp = arrays.numbers("calobject_warp", 2) if "calobject_warp" in arrays else np.zeros(2)
     board = Board(
         columns=observed.shape[2],
         rows=observed.shape[1],
         spacing=float(arrays.numbers("calibration_object_spacing")),
-        shape="bend" if warped else "held",
+        shape="bend" if arrays.says("do_optimize_calobject_warp") else "held",
     )
     sizes = arrays.numbers("imagersizes", len(cameras), 2).astype(int).tolist()
     return Calibration(
@@ -156,16 +165,6 @@ def _content(path: Path) -> dict[str, Any]:
     return content
 
 
-def _packed(path: Path) -> bytes:
-    packed = _content(path).get(KEY)
-    if not isinstance(packed, bytes):
-        raise InputError(f"holds a camera, but no corners: it has no {KEY}", file=path)
-    try:
-        return base64.b85decode(packed)
-    except ValueError as error:
-        raise InputError(f"its {KEY} are damaged: {error}", file=path) from None
-
-
 def _indices(arrays: Arrays, count: int) -> Indices:
     """Return (P, 3) view, camera and sensor of each picture; sensor -1 is at the reference."""
     if INDICES not in arrays:
@@ -176,23 +175,15 @@ def _indices(arrays: Arrays, count: int) -> Indices:
     return found
 
 
-def _freed(arrays: Arrays) -> tuple[bool, bool, bool]:
-    """Return whether cores, terms of lenses or knots, and the bend of the board were optimized."""
+def _cameras(arrays: Arrays) -> list[Camera]:
     core = arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core")
     lens = arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
-    for held in ("do_optimize_frames", "do_optimize_extrinsics"):
-        if held in arrays and not arrays.says(held):
-            raise arrays.error(held, "is false: poses that were held are not taken")
-    return arrays.says(core), arrays.says(lens), arrays.says("do_optimize_calobject_warp")
-
-
-def _cameras(arrays: Arrays, core: bool, lens: bool) -> list[Camera]:
     model, rows = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None)
     try:
         own = [lens_of_mrcal(model, row, f"camera {number}") for number, row in enumerate(rows.tolist())]
     except InputError as error:
         raise InputError(error.message, file=arrays.path) from None
-    return [freed(each, model, core, lens) for each in own]
+    return [freed(each, model, arrays.says(core), arrays.says(lens)) for each in own]
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:

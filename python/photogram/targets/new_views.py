@@ -191,15 +191,11 @@ def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added 
     return Added(
         touched=touched,
         by_cameras=by_cameras[:, touched],
-        places=before + 3 * points[:, np.newaxis] * _has_unknown_points(housing) + np.arange(3),
+        places=before + 3 * points[:, np.newaxis] * (housing.points_by_board.shape[2] > 0) + np.arange(3),
         by_place=by_place / sd,
         by_pose=by_pose.reshape(-1, 6) / sd,
         corners=np.bincount(cameras, minlength=len(housing.cameras)),
     )
-
-
-def _has_unknown_points(housing: Housing) -> bool:
-    return bool(housing.points_by_board.shape[2])
 
 
 def placed_cofactors(housing: Housing) -> Floats:
@@ -208,7 +204,7 @@ def placed_cofactors(housing: Housing) -> Floats:
     All points of a fixed board have the same three rows, which are zero.
     """
     before, own = housing.board.start, housing.cofactors[: housing.common, : housing.common]
-    points = len(housing.points) if _has_unknown_points(housing) else 1
+    points = len(housing.points) if housing.points_by_board.shape[2] else 1
     by_board = housing.points_by_board[:points].reshape(3 * points, housing.common - before)
     across = own[:before, before:] @ by_board.T
     return np.block(

@@ -53,32 +53,23 @@ def read_storage(path: Path, board: Board | None) -> Measured:
     sizes = {}
     if "image_width" in content and "image_height" in content:
         sizes[""] = content["image_width"].whole(1), content["image_height"].whole(1)
-    own = _board(content) if board is None else board
     grid = _matrix(content["grid_points"]) if "grid_points" in content else None
-    if own is not None and grid is not None and board is None:
-        _check_grid(content["grid_points"], own, grid)
-    return _measured(path, xy, own, sizes)
-
-
-def _board(content: Tree) -> Board | None:
-    if not ("board_width" in content and "board_height" in content and "square_size" in content):
-        return None
-    return Board(
-        columns=content["board_width"].whole(),
-        rows=content["board_height"].whole(),
-        spacing=content["square_size"].number(),
-    )
-
-
-def _check_grid(tree: Tree, board: Board, grid: Floats) -> None:
-    places = grid.reshape(-1, 3) if grid.shape[-1] == 3 else None
-    if places is None or places.shape != board.places.shape:
-        raise tree.error(f"are not the points of the board, {board.described}")
-    if np.abs(places - board.places).max() > MAX_GRID_ERROR * min(board.pitch):
-        raise tree.error(
-            f"lie elsewhere than those of the board, {board.described}: write them to a table for a"
-            " board.toml of the kind points"
+    if board is None and all(key in content for key in ("board_width", "board_height", "square_size")):
+        board = Board(
+            columns=content["board_width"].whole(),
+            rows=content["board_height"].whole(),
+            spacing=content["square_size"].number(),
         )
+        if grid is not None:
+            places, points = grid.reshape(-1, grid.shape[-1]), content["grid_points"]
+            if places.shape != board.places.shape:
+                raise points.error(f"are not the points of the board, {board.described}")
+            if np.abs(places - board.places).max() > MAX_GRID_ERROR * min(board.pitch):
+                raise points.error(
+                    f"lie elsewhere than those of the board, {board.described}: write them to a table for a"
+                    " board.toml of the kind points"
+                )
+    return _measured(path, xy, board, sizes)
 
 
 def _measured(

@@ -116,7 +116,6 @@ class Pictures:
 
     @staticmethod
     def _limit(misfit: Floats) -> float:
-        """Return the misfit beyond which a picture does not fit."""
         return max(MAX_VIEW_MISFIT * float(np.median(misfit.min(axis=1))), MIN_MISFIT_RAD)
 
     def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:

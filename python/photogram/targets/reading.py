@@ -143,7 +143,6 @@ def read(
 
 
 def _not_used(corners: Corners) -> list[Message]:
-    """Return what is to be said of corners that whoever measured them has left out."""
     left = int(np.count_nonzero(~corners.use))
     return [Message(f"{counted(left, 'corner')} not used, as the file says")] if left else []
 
@@ -178,7 +177,6 @@ def _given(
 
 
 def _measured(path: Path, corners: dict[Form, list[Path]], board: Board | None) -> Measured:
-    """Return the corners of all files of the one format that lies there."""
     if not corners:
         raise InputError(
             "holds no corners of a board in any format that is known (docs/targets.md)", file=path

@@ -20,7 +20,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
@@ -58,25 +57,16 @@ def regularised(
         values = {name: value for name, (value, _) in priors.items()}
         sd = {name: each for name, (_, each) in priors.items()}
         given = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
+        knot_sd = camera.knot_sd
+        if camera.knot_unknowns and camera.knots is not None:
+            firm = math.sqrt(SHARE * observed / (ROUGH_KNOTS * knots))
+            rows, columns, _ = camera.knots.shape
+            knot_sd = np.tile([1 / firm, 1 / (ACROSS * firm)], (rows, columns, 1))
+            if rows % 2 and columns % 2:  # the knot in the middle has no radial direction
+                knot_sd[rows // 2, columns // 2] = 1 / firm
         found.append(
-            camera.replace(
-                parameters={**camera.parameters, **values},
-                sd={**given, **sd},
-                knot_sd=_of_knots(camera, math.sqrt(SHARE * observed / (ROUGH_KNOTS * knots)))
-                if camera.knot_unknowns
-                else camera.knot_sd,
-            )
+            camera.replace(parameters={**camera.parameters, **values}, sd={**given, **sd}, knot_sd=knot_sd)
         )
-    return found
-
-
-def _of_knots(camera: Camera, firm: float) -> Floats:
-    """Return (ny, nx, 2) standard deviations of knots, radial and tangential; alike in the very middle."""
-    assert camera.knots is not None
-    rows, columns, _ = camera.knots.shape
-    found = np.tile([1 / firm, 1 / (ACROSS * firm)], (rows, columns, 1))
-    if rows % 2 and columns % 2:
-        found[rows // 2, columns // 2] = 1 / firm
     return found
 
 

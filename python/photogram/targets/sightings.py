@@ -71,7 +71,13 @@ def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
     own = found.copy()
     own[:, :2] -= middle[:, np.newaxis] * found[:, 2:]
     if own.shape[2] == 4:
-        return _of_matrices(own[:, :, :3])
+        # Medians by the rows a, b, c of K R: a'a/c'c = fx^2 + cx^2
+        matrices = own[:, :, :3]
+        norms = np.sum(matrices[:, 2] ** 2, axis=1)[:, np.newaxis]
+        squares = np.sum(matrices[:, :2] ** 2, axis=2) / norms
+        centre = matrices[:, :2] @ matrices[:, 2, :, np.newaxis]
+        fx, fy = np.sqrt(np.median(squares - (centre[..., 0] / norms) ** 2, axis=0)).tolist()
+        return fx, fy, (fx + fy) / 2
     lengths = np.linalg.norm(own[:, :, :2], axis=1)
     # Corners on one line determine one of both columns alone.
     own = own[lengths.min(axis=1) > _MIN_COLUMN_RATIO * lengths.max(axis=1)]
@@ -82,15 +88,6 @@ def focal_lengths(found: Floats, middle: Floats) -> tuple[float, float, float]:
     one = np.linalg.lstsq(rows[:, :2].sum(axis=1, keepdims=True), -rows[:, 2], rcond=None)[0]
     fx, fy, f = (1 / math.sqrt(each) if each > 0 else math.nan for each in [*both.tolist(), float(one[0])])
     return fx, fy, f
-
-
-def _of_matrices(matrices: Floats) -> tuple[float, float, float]:
-    """Return fx, fy and their mean by (P, 3, 3) K R with rows a, b, c: a'a/c'c = fx^2 + cx^2; medians."""
-    lengths = np.sum(matrices[:, 2] ** 2, axis=1)[:, np.newaxis]
-    squares = np.sum(matrices[:, :2] ** 2, axis=2) / lengths
-    centre = matrices[:, :2] @ matrices[:, 2, :, np.newaxis]
-    fx, fy = np.sqrt(np.median(squares - (centre[..., 0] / lengths) ** 2, axis=0)).tolist()
-    return fx, fy, (fx + fy) / 2
 
 
 def poses(found: Floats) -> Floats:
@@ -205,25 +202,18 @@ class Listings:
             points = _listed(k % columns, k // columns, columns, rows)
         if board.kind in ("chessboard", "circles"):
             points += _listed(k // rows, k % rows, columns, rows)
-        return cls._compared(board, points)
-
-    @classmethod
-    def _compared(cls, board: Board, points: list[Indices]) -> Self:
-        """Return orders with what one can tell of them: which are symmetries, which are turns."""
         places = board.places
-        size = float(np.ptp(places, axis=0).max())
+        tolerance = _MIN_ORDER_DIFFERENCE * float(np.ptp(places, axis=0).max())
         shapes: list[int] = []
         turns: dict[int, Floats] = {}
         for own, listed in enumerate(points):
             turn = _turn(places, places[listed])
-            if (
-                np.abs(places @ turn[:3, :3].T + turn[:3, 3] - places[listed]).max()
-                < _MIN_ORDER_DIFFERENCE * size
-            ):
+            if np.abs(places @ turn[:3, :3].T + turn[:3, 3] - places[listed]).max() < tolerance:
                 turns[own] = turn
             with_one = np.column_stack([places[:, :2], np.ones(len(places))])
             known = [with_one[points[other]] for other in shapes]
-            if not any(_is_affine(each, with_one[listed], size) for each in known):
+            affine = [each @ np.linalg.lstsq(each, with_one[listed], rcond=None)[0] for each in known]
+            if not any(np.abs(each - with_one[listed]).max() < tolerance for each in affine):
                 shapes.append(own)
         return cls(np.array(points), tuple(shapes), turns, one_sided=board.kind != "points")
 
@@ -241,18 +231,6 @@ def _turn(places: Floats, listed: Floats) -> Floats:
     products[2, 2] += WEIGHT_OF_FIXED_AXIS * np.abs(products).max()
     rotation = nearest_rotations(products[np.newaxis])[0]
     return composed(rotation, middles[1] - rotation @ middles[0])
-
-
-def _principal(places: Floats) -> Floats:
-    """Return (4, 4) what takes places to the axes of their least-squares plane, from their centroid."""
-    middle = places.mean(axis=0)
-    axes = np.linalg.svd(places - middle)[2]
-    axes[2] *= np.sign(np.linalg.det(axes))
-    return composed(axes, -axes @ middle)
-
-
-def _is_affine(a: Floats, b: Floats, size: float) -> bool:
-    return bool(np.abs(a @ np.linalg.lstsq(a, b, rcond=None)[0] - b).max() < _MIN_ORDER_DIFFERENCE * size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +251,12 @@ class Sightings:
         if beyond.any():
             row = int(np.argmax(beyond))
             raise InputError(f"{corners.title(row)}: the board has {len(places)} points, {board.described}")
-        axes = _principal(places) if board.kind == "points" else np.eye(4)
+        axes = np.eye(4)
+        if board.kind == "points":  # axes of the least-squares plane, from the centroid
+            middle = places.mean(axis=0)
+            turn = np.linalg.svd(places - middle)[2]
+            turn[2] *= np.sign(np.linalg.det(turn))
+            axes = composed(turn, -turn @ middle)
         xy, sd = (np.full((len(corners.pictures), len(places), *more), np.nan) for more in ((2,), ()))
         at = corners.picture[corners.use], corners.point[corners.use]
         xy[at], sd[at] = corners.xy[corners.use], corners.sd[corners.use]

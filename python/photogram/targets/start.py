@@ -118,7 +118,6 @@ class Start(Valued, Brief):
             self._set("messages", (*self.messages, told))
 
     def _keep(self, pictures: Bools) -> None:
-        """Keep some pictures (P,) alone, and their views."""
         views = np.unique(self.corners.views[pictures])
         for name in ("poses", "motion"):
             if (own := getattr(self, name)) is not None:

@@ -120,23 +120,13 @@ def views_over_picture(
         tried = rays(camera, np.array([part.middle + step * (centre - part.middle) for step in steps]))
         tried = tried[np.isfinite(tried).all(axis=1)]
         held = zip(*(views_towards(each, part.name, board, distances) for each in tried), strict=True)
-        if whole:
-            found += [
-                own for way in held if (own := _first_whole(camera, size, board.places, way)) is not None
-            ]
-        else:
-            found += [way[0] for way in held]
+        for way in held:
+            for view in way:
+                places = transformed(view.pose, board.places)
+                if not whole or len(shown_of(camera, np.array(size), places)[0]) == len(places):
+                    found.append(view)
+                    break
     return found
-
-
-def _first_whole(
-    camera: Camera, size: tuple[int, int], points: Floats, ways: Sequence[Candidate]
-) -> Candidate | None:
-    """Return the first of some views in which a picture shows all of (n, 3) points; None where none does."""
-    for each in ways:
-        if len(shown_of(camera, np.array(size), transformed(each.pose, points))[0]) == len(points):
-            return each
-    return None
 
 
 def views_towards(
@@ -152,10 +142,17 @@ def views_towards(
     Distances are rounded to two figures; tilts and turns are names of `TILTS` and `TURNS`.
     """
     found, middle = [], middle_of(board.places)
+    # The shortest rotation that turns z, the normal of the board, to the direction
+    axis = np.cross([0.0, 0.0, 1.0], towards)
+    sine = float(np.linalg.norm(axis))
+    vector = axis * np.arctan2(sine, towards[2]) / sine if sine > 0 else axis
+    facing = _photocore.vector_rotations(vector[np.newaxis])[0]
     for distance, tilt, turn in product(
         dict.fromkeys(f"{float(f'{each:.2g}'):g}" for each in distances), tilts, turns
     ):
-        rotation = _facing(towards) @ _turned(*TILTS[tilt], TURNS[turn])
+        angles = np.radians([[*TILTS[tilt], 0.0], [0.0, 0.0, TURNS[turn]]])
+        tilted, turned = _photocore.vector_rotations(angles)
+        rotation = facing @ tilted @ turned
         pose = composed(rotation, float(distance) * towards - rotation @ middle)
         words = (place, f"{distance} {board.unit}", tilt, turn)
         found.append(Candidate(", ".join(filter(None, words)), pose))
@@ -165,21 +162,6 @@ def views_towards(
 def middle_of(points: Floats) -> Floats:
     """Return (3,) the middle of (n, 3) points of a board."""
     return np.asarray((points.max(axis=0) + points.min(axis=0)) / 2)
-
-
-def _facing(towards: Floats) -> Floats:
-    """Return the shortest rotation that turns z to a direction: a board whose normal it is."""
-    axis = np.cross([0.0, 0.0, 1.0], towards)
-    sine = float(np.linalg.norm(axis))
-    angle = np.arctan2(sine, towards[2])
-    vector = axis * angle / sine if sine > 0 else axis
-    return np.asarray(_photocore.vector_rotations(vector[np.newaxis])[0])
-
-
-def _turned(about_x: float, about_y: float, about_z: float) -> Floats:
-    """Return a tilt about x or y behind a turn about z (degrees)."""
-    tilt, turn = _photocore.vector_rotations(np.radians([[about_x, about_y, 0.0], [0.0, 0.0, about_z]]))
-    return np.asarray(tilt @ turn)
 
 
 check_arguments(globals(), ["suggest_views"])

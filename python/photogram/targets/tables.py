@@ -6,7 +6,6 @@ Of splined lenses what is to be said of knots that hang on their priors, and of 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -65,7 +64,6 @@ def view_rms(view: Indices, residuals: Floats, count: int) -> Floats:
 
 
 def _sums(view: Indices, values: Floats, count: int) -> Floats:
-    """Return the sums of (m, 2) values over the corners of each view."""
     return np.asarray(np.bincount(view, weights=values.sum(axis=1), minlength=count).astype(float))
 
 
@@ -110,17 +108,14 @@ def worst_points(calibrated: Calibrated) -> list[str]:
         return []
     tests = np.nan_to_num(np.abs(result.point_standardized))
     worst = np.argsort(-tests.max(axis=1), kind="stable")[:MAX_POINTS_LISTED]
-    return [
-        _told(calibrated, row, tests[row]) for row in worst.tolist() if tests[row].max() > CRITICAL_TEST_VALUE
-    ]
-
-
-def _told(calibrated: Calibrated, row: int, tests: Floats) -> str:
-    result, unit = calibrated.result, calibrated.calibration.board.unit
-    off: Sequence[float] = result.point_differences[row].tolist()
-    apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in zip("xyz", off, strict=True))
-    name, much = result.block.point_ids[row], f"{tests.max():.1f} standard deviations"
-    return f"point {name}: {apart} {unit} off its place, {much}"
+    unit, lines = calibrated.calibration.board.unit, []
+    for row in worst.tolist():
+        if (largest := tests[row].max()) > CRITICAL_TEST_VALUE:
+            differences = zip("xyz", result.point_differences[row].tolist(), strict=True)
+            apart = ", ".join(f"{axis} {value:+.2g}" for axis, value in differences)
+            name = result.block.point_ids[row]
+            lines.append(f"point {name}: {apart} {unit} off its place, {largest:.1f} standard deviations")
+    return lines
 
 
 STRETCHES = ("scale x", "scale y", "shear")
@@ -201,28 +196,14 @@ MIN_PRIOR_REDUNDANCY = 0.05  # the value of a knot with less comes from its prio
 
 @dataclass(frozen=True)
 class Spline:
-    """What is to be said of the knots of a splined lens.
-
-    Attributes
-    ----------
-    camera
-        Its name.
-    knots
-        How many are unknown.
-    from_prior, untouched
-        Of these, how many come from their prior, and how many no image touches.
-    beyond
-        The share of the picture beyond the knots; None where its size is not known.
-    fov_x_deg
-        With which no pixel would be beyond; None where none is.
-    """
+    """What is to be said of the knots of a splined lens."""
 
     camera: str
-    knots: int
-    from_prior: int
-    untouched: int
-    beyond: float | None
-    fov_x_deg: int | None
+    knots: int  # number of unknown knots
+    from_prior: int  # number of unknown knots whose values come from their priors
+    untouched: int  # number of unknown knots without an image
+    beyond: float | None  # the share of the picture beyond the knots; None if its size is unknown
+    fov_x_deg: int | None  # the field with which no pixel is beyond; None if no pixel is
 
     @property
     def lines(self) -> list[str]:
@@ -262,7 +243,6 @@ def spline_lines(calibrated: Calibrated) -> list[str]:
 
 
 def _from_prior(calibrated: Calibrated, number: int) -> int:
-    """Return how many knots of a camera come from their priors."""
     of_knots = {id(each) for each in calibrated.cameras[number].given.knot_unknowns}
     hang = 0
     block = calibrated.result.block

@@ -89,7 +89,7 @@ def triangulated(
     points = _settled(housing, cameras, pixels, _met(housing, cameras, pixels))
     residuals, by_point, by_common = _rows(housing, cameras, pixels, points)
     with np.errstate(invalid="ignore"):
-        inverse = _inverses(by_point)
+        inverse = _inverted(by_point.transpose(0, 2, 1) @ by_point)
         effects = -inverse @ by_point.transpose(0, 2, 1) @ by_common
     if still is not None:
         effects = effects - motion_partials(points) @ still[:, : housing.common]
@@ -117,8 +117,9 @@ def _settled(housing: Housing, cameras: Sequence[int], pixels: Floats, points: F
     moved = np.full(len(points), np.inf)
     for _ in range(STEPS):
         residuals, by_point, _ = _rows(housing, cameras, pixels, points)
-        right = by_point.transpose(0, 2, 1) @ residuals[:, :, np.newaxis]
-        step = (_inverses(by_point) @ right)[:, :, 0]
+        transposed = by_point.transpose(0, 2, 1)
+        right = transposed @ residuals[:, :, np.newaxis]
+        step = (_inverted(transposed @ by_point) @ right)[:, :, 0]
         points = points + step
         with np.errstate(invalid="ignore"):
             moved = np.linalg.norm(step, axis=1) / np.linalg.norm(points, axis=1)
@@ -139,11 +140,6 @@ def _rows(
         by_point.reshape(*shape, 3),
         by_common.reshape(*shape, housing.common),
     )
-
-
-def _inverses(by_point: Floats) -> Floats:
-    """Return (n, 3, 3) (J'J)^-1."""
-    return _inverted(by_point.transpose(0, 2, 1) @ by_point)
 
 
 def _inverted(matrices: Floats) -> Floats:
@@ -223,24 +219,20 @@ def distance_uncertainty(
     looking = rays(housing.cameras[numbers[0]], pixels)
     ahead = looking[:, 2] > 0
     points = looking[ahead] * (depth / looking[ahead, 2:])
-    images = _images(housing, numbers, points)
+    to_first = np.linalg.inv(housing.sensors[numbers[0]])
+    images = np.stack(
+        [
+            imaged(housing.cameras[each], transformed(housing.sensors[each] @ to_first, points)).xy
+            for each in numbers
+        ],
+        axis=1,
+    )
     with np.errstate(invalid="ignore"):
         seen = ((images >= 0) & (images <= np.array(sizes) - 1)).all(axis=(1, 2))
     return pixels[ahead][seen], triangulated(housing, numbers, images[seen], pixel_sd)
 
 
-def _images(housing: Housing, cameras: Sequence[int], points: Floats) -> Floats:
-    """Return (n, k, 2) images of points in the axes of the first of k cameras."""
-    to_first = np.linalg.inv(housing.sensors[cameras[0]])
-    found = [
-        imaged(housing.cameras[each], transformed(housing.sensors[each] @ to_first, points)).xy
-        for each in cameras[1:]
-    ]
-    return np.stack([imaged(housing.cameras[cameras[0]], points).xy, *found], axis=1)
-
-
 def _of_rig(result: Calibrated, cameras: Sequence[int | str]) -> tuple[Housing, list[int]]:
-    """Return the housing of some cameras, and their numbers in it."""
     numbers = [camera_number(result, each) for each in cameras]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise InputError("points are triangulated by two cameras or more, each of them once")

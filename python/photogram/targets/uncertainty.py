@@ -15,7 +15,6 @@ from photogram.network.cameras import Camera
 from photogram.network.knots import beyond_knots
 from photogram.targets.calibration_difference import CameraDifference, Side, compared
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.housing import Housing
 from photogram.targets.housings import camera_number, housing_of, size_of
 from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, image_grid
 from photogram.targets.motion_fit import Criterion, points_at
@@ -64,7 +63,12 @@ def projection_uncertainty(
     housing, own = housing_of(result, number)
     if noise_only:
         housing = housing.noise_only()
-    rows = _rows(result, number, housing, own, datum, checked_distance(distance))
+    away, fixed = checked_distance(distance), None
+    if datum == "image":
+        points = points_at(housing.cameras[own], image_grid(size_of(result, number), IMAGE_GRID)[2], [away])
+        points = points[np.isfinite(points).all(axis=1)]
+        fixed = points, np.broadcast_to(np.eye(2), (len(points), 2, 2)), bool(np.isfinite(away))
+    rows = datum_rows(housing, own, datum, fixed)
     found = housing.variance * projection_cofactors(housing, own, where, distance, rows)
     seen = result.cameras[number].camera
     if seen.knots is not None:
@@ -166,18 +170,6 @@ def checked_distance(distance: float) -> float:
     if not distance > 0:
         raise InputError(f"a distance from the camera is positive, or infinite, not {distance:g}")
     return float(distance)
-
-
-def _rows(
-    result: Calibrated, camera: int, housing: Housing, own: int, datum: DatumName, distance: float
-) -> Floats:
-    """Return the datum of a camera; `image`: rays of the whole picture hold still at the distance."""
-    if datum != "image":
-        return datum_rows(housing, own, datum)
-    points = points_at(housing.cameras[own], image_grid(size_of(result, camera), IMAGE_GRID)[2], [distance])
-    points = points[np.isfinite(points).all(axis=1)]
-    equal = np.broadcast_to(np.eye(2), (len(points), 2, 2))
-    return datum_rows(housing, own, datum, (points, equal, bool(np.isfinite(distance))))
 
 
 def difference(

@@ -12,7 +12,6 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.network.knots import KNOTTED
-from photogram.results.cameras import AdjustedCamera
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corner_files import KEY
 from photogram.targets.maps import UncertaintyMap
@@ -87,12 +86,17 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     """Return the archive of a calibration between letters; None where mrcal could not have made it."""
     calibration, count = calibrated.calibration, len(rig.cameras)
     board = calibration.board
+    free = [{each.names[k] for k in each.estimated} for each in calibrated.cameras]
+    knots = [each.given.knots is not None for each in calibrated.cameras]
     fits = (
         board.kind in GRID_BOARDS
         and calibration.shape in ("held", "bend")
         and board.pitch[0] == board.pitch[1]
         and len({name for name, _ in lenses}) == 1
-        and all(map(_whole, calibrated.cameras, (values for _, values in lenses)))
+        and all(
+            splined or len(names - CORE) in (0, len(values) - 4)
+            for splined, names, (_, values) in zip(knots, free, lenses, strict=True)
+        )
         and calibration.sync != "offset"
         and (count == 1 or all(rig.tied(row) for row in range(1, count)))
     )
@@ -101,7 +105,8 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     bend = calibrated.bend
     variance = calibrated.result.variance_of_unit_weight or 1.0
     observed, indices = _observations(calibrated)
-    core, terms = _freed(calibrated)
+    estimated = set().union(*free)
+    terms = bool(estimated - CORE) or any(each.given.knot_unknowns for each in calibrated.cameras)
     arrays: dict[str, Any] = {
         "intrinsics": np.array([values for _, values in lenses]),
         "extrinsics_rt_fromref": _vectors(rig.sensors[1:]) if count > 1 else np.zeros((0, 6)),
@@ -114,7 +119,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         "lensmodel": PREFIX + lenses[0][0],
         "imagersizes": np.array([rig.size(row) for row in range(count)], dtype=np.int32),
         "calobject_warp": np.array(calibration.bend if bend is None else bend.position[:2]),
-        "do_optimize_intrinsics_core": core,
+        "do_optimize_intrinsics_core": bool(estimated & CORE),
         "do_optimize_intrinsics_distortions": terms,
         "do_optimize_extrinsics": True,
         "do_optimize_frames": True,
@@ -130,12 +135,6 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     return base64.b85encode(file.getvalue())
 
 
-def _whole(camera: AdjustedCamera, values: Floats) -> bool:
-    """Return whether all terms of a lens, behind fx, fy, cx, cy in its values, were free, or none."""
-    free = {camera.names[k] for k in camera.estimated} - CORE
-    return camera.given.knots is not None or len(free) in (0, len(values) - 4)
-
-
 def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:
     """Return (P, rows, columns, 3) x, y, weight of corners, (P, 3) view, camera, sensor of pictures."""
     corners, board = calibrated.calibration.corners, calibrated.calibration.board
@@ -147,13 +146,6 @@ def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:
     order = np.lexsort([corners.cameras, corners.views])
     indices = np.column_stack([corners.views, corners.cameras, corners.cameras - 1]).astype(np.int32)
     return found.reshape(-1, board.rows, board.columns, 3)[order], indices[order]
-
-
-def _freed(calibrated: Calibrated) -> tuple[bool, bool]:
-    """Return whether focal lengths and centres, and whether lens terms were free."""
-    free = {each.names[k] for each in calibrated.cameras for k in each.estimated}
-    knots = any(each.given.knot_unknowns for each in calibrated.cameras)
-    return bool(free & CORE), bool(free - CORE) or knots
 
 
 OUTLINE_DIRECTIONS, OUTLINE_STEPS = 90, 400  # about the best known pixel

@@ -8,7 +8,6 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.io.yaml_text import matrix_lines
-from photogram.results.cameras import AdjustedCamera
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.output.rig import TERMS, Rig, Terms, terms_of
 from photogram.targets.vision import cross_matrices
@@ -49,14 +48,17 @@ def _camera(rig: Rig, row: int, lenses: list[Terms]) -> list[str]:
     lines += _matrix("distortion_coefficients", np.reshape(terms or [], (-1, 1)))
     if rig.calibrated is not None:
         lines += _errors(rig.calibrated, row)
-        lines += _matrix("std_deviations_intrinsics", _deviations(rig.calibrated.cameras[row]))
+        camera = rig.calibrated.cameras[row]
+        sd = dict(zip(camera.names, camera.sd.tolist(), strict=True))
+        sd |= {"fx": sd["f"], "fy": sd["f"]} if "f" in sd else {}
+        sd |= {"k1": sd["k"]} if "k" in sd else {}
+        lines += _matrix("std_deviations_intrinsics", [[sd.get(name, 0.0)] for name in DEVIATIONS])
     if row and rig.tied(row):
         lines += _stereo(rig.sensors[row], lenses[0].matrix, lens.matrix)
     return lines
 
 
 def _errors(calibrated: Calibrated, row: int) -> list[str]:
-    """Return the errors of a camera, of all its corners that were used and of each of its pictures."""
     corners = calibrated.calibration.corners
     squares = (calibrated.result.residuals**2).sum(axis=1)
     pictures = corners.picture[corners.use]
@@ -67,14 +69,6 @@ def _errors(calibrated: Calibrated, row: int) -> list[str]:
         f"avg_reprojection_error: {float(np.sqrt(average))!r}",
         *_matrix("per_view_reprojection_errors", np.sqrt(mean).reshape(-1, 1)),
     ]
-
-
-def _deviations(camera: AdjustedCamera) -> Floats:
-    """Return (18, 1) standard deviations a posteriori, 0 of what was held."""
-    found = dict(zip(camera.names, camera.sd.tolist(), strict=True))
-    found |= {"fx": found["f"], "fy": found["f"]} if "f" in found else {}
-    found |= {"k1": found["k"]} if "k" in found else {}
-    return np.array([[found.get(name, 0.0)] for name in DEVIATIONS])
 
 
 def _stereo(sensor: Floats, before: Floats, own: Floats) -> list[str]:
