@@ -30,10 +30,8 @@ from photogram.statistics.components import WORTH_CHANGING
 
 __all__ = ["Cleaned", "clean"]
 
-MOST_ROUNDS = 3
-"""Of components and snooping."""
-STANDS = 0.05
-"""Components that change by less are the same."""
+MOST_ROUNDS = 3  # Of components and snooping
+STANDS = 0.05  # Components that change by less are the same
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -25,12 +25,9 @@ from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 
 __all__ = ["Settings", "Weighing", "first_adjusted", "of_grouping", "scaled", "variance_components"]
 
-NOTHING = 1e-6
-"""A redundancy that is rounding."""
-OTHERS = "all other observations"
-"""What is in no group."""
-SHARPER = 1e-2
-"""Of the tolerance of components, that of the adjustments in standard deviations."""
+NOTHING = 1e-6  # A redundancy that is rounding
+OTHERS = "all other observations"  # What is in no group
+SHARPER = 1e-2  # Of the tolerance of components, that of the adjustments in standard deviations
 
 
 @Way

@@ -34,14 +34,10 @@ __all__ = ["FirstValues", "first_values"]
 
 _Array = TypeVar("_Array", bound=NDArray[np.generic])
 
-NEEDED = 4
-"""Known points of a photo that is resected."""
-DOUBTFUL = 0.3
-"""Part of the images of control that do not fit where the control, or the start, is doubted."""
-ESTIMATES = 3
-"""Times that free cameras are estimated and photos are searched again, at most."""
-IN_COMMON = 3
-"""What a model must have in common with what is known."""
+NEEDED = 4  # Known points of a photo that is resected
+DOUBTFUL = 0.3  # Part of the images of control that do not fit where the control, or the start, is doubted
+ESTIMATES = 3  # Times that free cameras are estimated and photos are searched again, at most
+IN_COMMON = 3  # What a model must have in common with what is known
 SOURCES = {
     "given": "given",
     "resected": "resected from known points",

@@ -28,8 +28,7 @@ from photogram.results.result import Result
 __all__ = ["at_adjusted", "computed_images", "image_depths", "predict"]
 
 _OF_POSES = (Attitude, Position, Rate, Velocity)
-_AGREES = 1e-3
-"""Standard deviations by which an observation of a trajectory may differ from it."""
+_AGREES = 1e-3  # Standard deviations by which an observation of a trajectory may differ from it
 
 
 def predict(

@@ -32,8 +32,7 @@ from photogram.words import Phrase
 FITS = 10.0
 """Standard deviations, by the median of the images that take part, within which an image returns: the tests
 name what is wrong by so much, and the adjustment bears it; what is beyond would bend it."""
-MEDIAN_LENGTH = 1.1774
-"""The length of a vector with two components of standard deviation 1 has this median."""
+MEDIAN_LENGTH = 1.1774  # The length of a vector with two components of standard deviation 1 has this median
 
 
 def adjust_started(started: FirstValues, *, by: Callable[..., Result] = adjust, **options: Any) -> Result:

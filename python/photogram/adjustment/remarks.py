@@ -19,14 +19,12 @@ from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import Coefficient
 from photogram.results.cameras import adjusted_cameras
 
-NEAR = 1e-3
-"""A point nearer to a station than this part of the median of such distances is at its place."""
+NEAR = 1e-3  # A point nearer to a station than this part of the median of such distances is at its place
 NOTABLE_EXCESS = 1e-5
 """Redundancy numbers whose sum is further off have fewer digits than are printed of them."""
 MOST_CORRELATIONS = 8
 """Correlations, and weak parameters of cameras with their figures, that a message lists at most."""
-HIGHEST_GIANT = 9000.0
-"""Metres: the flying height up to which Appendix F of the GIANT guide holds."""
+HIGHEST_GIANT = 9000.0  # Metres: the flying height up to which Appendix F of the GIANT guide holds
 
 
 def undetermined(

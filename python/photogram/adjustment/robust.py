@@ -21,8 +21,7 @@ SCALES = {"huber": 1.50, "cauchy": 2.55}
 """Scales with which 95 percent of the accuracy of least squares is kept where errors are normal, for the two
 coordinates of an image point taken together."""
 
-NOTABLE = 0.5
-"""Image points whose weight falls below this fraction are counted as modified strongly."""
+NOTABLE = 0.5  # Image points whose weight falls below this fraction are counted as modified strongly
 
 
 def loss_row(loss: Loss | None) -> tuple[str, float] | None:

@@ -62,8 +62,7 @@ __all__ = [
     "started_by_consensus",
     "used_images",
 ]
-MOST_PHOTOS = 0.2
-"""Of the photos, that may agree with no pose: with more it is the consensus that is wrong."""
+MOST_PHOTOS = 0.2  # Of the photos, that may agree with no pose: with more it is the consensus that is wrong
 
 
 def snoop(

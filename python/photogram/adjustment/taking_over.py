@@ -18,10 +18,8 @@ from photogram.network.trajectories import Coefficient, Polynomial, RotationCoef
 from photogram.results.result import Result
 from photogram.results.trajectories import AdjustedTrajectory
 
-LARGE = 0.5
-"""Radians."""
-TIMES = 1000
-"""At which a trajectory is looked at, at the most."""
+LARGE = 0.5  # Radians
+TIMES = 1000  # At which a trajectory is looked at, at the most
 
 
 def large_turns(result: Result) -> dict[str, Floats]:

@@ -31,8 +31,7 @@ _DECENTRING = frozenset({"P1", "P2", "p1", "p2", "B1", "B2"})
 _AFFINITY = frozenset({"b1", "b2"})
 _OF_RING = frozenset({"b1", "yp", "cy", "fx", "fy"})
 """What photos on a ring that are not turned about their axes leave open, with c or each other."""
-_ALONG = 0.8
-"""Cosine of the angle between the view and an axis that is moved along it."""
+_ALONG = 0.8  # Cosine of the angle between the view and an axis that is moved along it
 _PARTS = {
     "along": "flying heights (positions along the view)",
     "across": "positions across the view",
@@ -41,16 +40,11 @@ _PARTS = {
 }
 
 
-_PARALLEL = 0.99
-"""Cosine of the angle between views that are about parallel."""
-_UPRIGHT = 0.05
-"""Photos whose x axes are across one direction to this sine are not turned about their axes."""
-MOST = 40
-"""Lines of a message."""
-_ONE_PLACE = 1e-9
-"""Stations that differ by less than this part of their coordinates are one."""
-_ON_LINE = 1e-3
-"""Places whose spread across a line is less than this part of that along it are on it."""
+_PARALLEL = 0.99  # Cosine of the angle between views that are about parallel
+_UPRIGHT = 0.05  # Photos whose x axes are across one direction to this sine are not turned about their axes
+MOST = 40  # Lines of a message
+_ONE_PLACE = 1e-9  # Stations that differ by less than this part of their coordinates are one
+_ON_LINE = 1e-3  # Places whose spread across a line is less than this part of that along it are on it
 
 
 @dataclass(frozen=True)

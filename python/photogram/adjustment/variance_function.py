@@ -22,8 +22,7 @@ from photogram.statistics.variance_function import estimate_function
 
 __all__ = ["variance_function"]
 
-TOLERANCE = 1e-6
-"""Of the adjustments, in standard deviations."""
+TOLERANCE = 1e-6  # Of the adjustments, in standard deviations
 
 
 class _Left:

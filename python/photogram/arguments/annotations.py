@@ -64,11 +64,6 @@ def check_members(kind: type, given: Mapping[str, Any]) -> None:
         The class.
     given
         Values by the names of its parameters.
-
-    Raises
-    ------
-    InputError
-        A value of a wrong kind.
     """
     checks = _checks_of_class(kind)
     for name, value in given.items():
@@ -84,13 +79,7 @@ def _checks_of_class(kind: type) -> dict[str, Check]:
 
 
 def path(name: str, value: object) -> Path:
-    """Return a path that a string or an object like a path stands for.
-
-    Raises
-    ------
-    InputError
-        Neither of these, or characters that no file can have in its name.
-    """
+    """Return a path that a string or an object like a path stands for."""
     try:
         text = os.fspath(value)  # type: ignore[call-overload]
     except TypeError:

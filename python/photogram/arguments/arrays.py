@@ -21,12 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
 
-LARGEST_SD = math.sqrt(sys.float_info.max)
-"""Standard deviations beyond have no variance."""
-_SYMMETRIC = 1e-9
-"""What a covariance matrix may be unsymmetric by, relative to its diagonal."""
-_ROUNDING = 1e-6
-"""Of correlations that were written with all digits and read again, with room to spare."""
+LARGEST_SD = math.sqrt(sys.float_info.max)  # Standard deviations beyond have no variance
+_SYMMETRIC = 1e-9  # What a covariance matrix may be unsymmetric by, relative to its diagonal
+_ROUNDING = 1e-6  # Of correlations that were written with all digits and read again, with room to spare
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -47,12 +44,6 @@ def shaped(
         What the array must have.
     missing
         Whether values may be missing: masked ones become NaN.
-
-    Raises
-    ------
-    InputError
-        Another shape, what is no number, or masked values where none may be missing; the message names the
-        argument.
     """
     array = numbers(name, value, missing=missing)
     if array.ndim == 0:
@@ -150,14 +141,7 @@ def length(name: str, value: ArrayLike) -> int:
 
 
 def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.int64]:
-    """Return an array of `length` whole numbers from 0 to `count` - 1, which cannot be written.
-
-    Raises
-    ------
-    InputError
-        Another shape, what is no whole number, masked values, or an index outside; the message names the
-        argument.
-    """
+    """Return an array of `length` whole numbers from 0 to `count` - 1, which cannot be written."""
     array = _plain(name, value, f"{length} whole numbers")
     if array.shape != (length,) or (length and array.dtype.kind not in "iu"):
         raise InputError(f"{name} is not an array of {length} whole numbers")
@@ -179,11 +163,6 @@ def names(name: str, values: Iterable[object]) -> list[str]:
     values
         Strings or whole numbers. A name that is missing in a table is None or NaN there; a column of whole
         numbers with one missing has become one of floating-point numbers, and 1.0 is not the name 1.
-
-    Raises
-    ------
-    InputError
-        A name that is missing, empty, no string, or not printable; the message tells its row.
     """
     no_row = isinstance(values, np.ndarray) and values.ndim != 1
     if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):

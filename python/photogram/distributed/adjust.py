@@ -62,10 +62,8 @@ __all__ = ["Run", "adjust_in_parts", "fingerprint", "opened", "plan_in_parts"]
 
 WHOLE = 950.0
 """Bytes of an image point, with its share of its point and of the result, of a block adjusted as a whole."""
-PARTS_A_WORKER = 4
-"""So that a slow worker does not hold the rest."""
-LEAST_PHOTOS = 20
-"""Of a part: smaller ones are all border."""
+PARTS_A_WORKER = 4  # So that a slow worker does not hold the rest
+LEAST_PHOTOS = 20  # Of a part: smaller ones are all border
 
 
 def adjust_in_parts(
@@ -240,33 +238,15 @@ check_arguments(globals(), ["adjust_in_parts", "plan_in_parts"])
 
 @dataclass(frozen=True)
 class Run:
-    """A run whose parts lie in its folder: planned, or carried out.
+    """A run whose parts lie in its folder: planned, or carried out."""
 
-    Attributes
-    ----------
-    folder
-        Of the run.
-    manifest
-        What all nodes have in common.
-    executor
-        Does the tasks.
-    job
-        What tasks are told.
-    workers
-        How many do them.
-    memory
-        Bytes of each; None for any number.
-    held
-        Bytes that a worker holds before it begins.
-    """
-
-    folder: Path
-    manifest: Manifest
-    executor: Executor
-    job: Job
-    workers: int
-    memory: int | None
-    held: int
+    folder: Path  # Of the run
+    manifest: Manifest  # What all nodes have in common
+    executor: Executor  # Does the tasks
+    job: Job  # What tasks are told
+    workers: int  # How many do them
+    memory: int | None  # Bytes of each; None for any number
+    held: int  # Bytes that a worker holds before it begins
 
     def plan(self, *, measured: bool = True) -> PartsPlan:
         """Return the plan; `measured` has one part formed here, for the time that all will take."""

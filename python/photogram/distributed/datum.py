@@ -14,8 +14,7 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow
 from photogram.results.datum import refused
 
-LANES = 8
-"""Right-hand sides that the core reduces at a time, of points."""
+LANES = 8  # Right-hand sides that the core reduces at a time, of points
 
 
 @dataclass(frozen=True)

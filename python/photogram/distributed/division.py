@@ -13,20 +13,13 @@ from photogram.lazy_dataclasses import dataclass
 
 __all__ = ["Division", "bytes_of"]
 
-MOST = 100_000
-"""Workers or parts: more is a slip."""
+MOST = 100_000  # Workers or parts: more is a slip
 MOST_BYTES = 2**63
 UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12, "ki": 2**10, "mi": 2**20, "gi": 2**30}
 
 
 def bytes_of(memory: int | str) -> int:
-    """Return a number of bytes: of `4GB` (10^9), `1.5GiB` (2^30), or a number.
-
-    Raises
-    ------
-    InputError
-        What is none.
-    """
+    """Return a number of bytes: of `4GB` (10^9), `1.5GiB` (2^30), or a number."""
     size: float
     if isinstance(memory, str):
         match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kmgt]?i?)b?\s*", memory.lower(), re.ASCII)

@@ -40,8 +40,7 @@ from photogram.errors import AdjustmentError, RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 
-RULES = _photocore.step_rules()
-"""The constants of the rules of steps, which are those of one process."""
+RULES = _photocore.step_rules()  # The constants of the rules of steps, which are those of one process
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,8 @@ class Stop:
     max_iterations: int = 50
     covariance: bool = True
     unit_variance: str = "constrained"
-    reweighted: bool = False
-    """Whether a loss weights the observations."""
-    as_published: bool = False
-    """Whether steps are those of the 1987 program: the tolerance is its percentage."""
+    reweighted: bool = False  # Whether a loss weights the observations
+    as_published: bool = False  # Whether steps are those of the 1987 program: the tolerance is its percentage
 
 
 @dataclass(frozen=True)

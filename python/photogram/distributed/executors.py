@@ -21,11 +21,9 @@ from photogram.distributed.shelf import shelf
 from photogram.errors import AdjustmentError, InputError
 from photogram.memory import resident_memory
 
-Handle = Any
-"""Stands for what a task will give."""
+Handle = Any  # Stands for what a task will give
 Client = Any
-Future = Any
-"""Of `distributed`, an extra that takes long to import."""
+Future = Any  # Of `distributed`, an extra that takes long to import
 SETTINGS = {
     # A factor stays with its worker; what it takes is planned, and must not make the worker pause.
     "distributed.worker.memory.pause": False,

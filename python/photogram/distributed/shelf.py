@@ -80,5 +80,4 @@ class Shelf:
                 self.lock.release()
 
 
-shelf = Shelf()
-"""Of this process. Its lock lets one task work at a time: memory is planned for that."""
+shelf = Shelf()  # Of this process. Its lock lets one task work at a time: memory is planned for that

@@ -77,8 +77,7 @@ class Formed:
     sum_of_squares: float
     decrease: float
     place: str
-    products: Floats | None = None
-    """(d, d) its share in B^T Q B, where there is a datum to go to."""
+    products: Floats | None = None  # (d, d) its share in B^T Q B, where there is a datum to go to
 
 
 @dataclass(frozen=True, eq=False)

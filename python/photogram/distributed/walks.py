@@ -21,8 +21,7 @@ from photogram.errors import AdjustmentError, PhotogramError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.iteration import Iteration
 
-ATTEMPTS = 20
-"""So often is a node formed again that a worker has taken with it."""
+ATTEMPTS = 20  # So often is a node formed again that a worker has taken with it
 
 
 @dataclass
@@ -33,8 +32,7 @@ class Up:
     contributions: dict[int, Handle]
     sum_of_squares: float
     decrease: float
-    products: Floats | None
-    """B^T Q B, where the block was moved to a datum."""
+    products: Floats | None  # B^T Q B, where the block was moved to a datum
 
 
 class LostFactorError(PhotogramError):

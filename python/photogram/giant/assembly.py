@@ -25,12 +25,9 @@ from photogram.network.refraction import Air, Refraction, Water, metres_per_unit
 from photogram.network.structuring import structure
 from photogram.network.ties import FEWEST_TIES, ties
 
-EARTH_RADIUS = 6.371e6
-"""Metres."""
-FALSE_ORIGIN = 1e5
-"""Map projections count from an origin farther off than this; local systems seldom do."""
-UPRIGHT = 0.97
-"""Vertical component of the axis of a near-vertical photo, at least."""
+EARTH_RADIUS = 6.371e6  # Metres
+FALSE_ORIGIN = 1e5  # Map projections count from an origin farther off than this; local systems seldom do
+UPRIGHT = 0.97  # Vertical component of the axis of a near-vertical photo, at least
 
 
 def remarks(block: Block, frames: list[Frame]) -> list[Message]:
@@ -104,17 +101,13 @@ def _map_projection(block: Block) -> list[Message]:
     ]
 
 
-LONGEST_METRES = 1e7
-"""No semi-major axis in metres is longer than this; in feet all are."""
+LONGEST_METRES = 1e7  # No semi-major axis in metres is longer than this; in feet all are
 
 
 def assemble(project: Contents, limits: Limits | None = None) -> tuple[Block, list[Message]]:
     """Return the block of a project, and the remarks on what was left out or deserves a look.
 
     Photos stand in the order of FRAMES, points in the order of their first image.
-
-    Raises InputError: a frame without images, a camera that is not defined, no frame at all, or a limit that
-    is exceeded.
     """
     limits = limits or Limits()
     common, messages = project.common, list[Message]()

@@ -29,11 +29,7 @@ class Camera:
 
 
 def parse_cameras(source: Source) -> list[Camera]:
-    """Read CAMERAS.
-
-    Raises InputError: a field that is no number, a principal distance of zero, or a name that stands there
-    twice.
-    """
+    """Read CAMERAS."""
     cameras: list[Camera] = []
     spellings: dict[str, Record] = {}
     for record in source.records():
@@ -49,10 +45,7 @@ def parse_cameras(source: Source) -> list[Camera]:
 
 
 def camera_records(cameras: Iterable[Camera]) -> list[str]:
-    """Write CAMERAS.
-
-    Raises ValueError: a name or a principal distance does not fit its field.
-    """
+    """Write CAMERAS."""
     return [
         f"{format_name(camera.name)}  {format_principal_distance(camera.principal_distance)}"
         for camera in cameras

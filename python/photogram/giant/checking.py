@@ -55,11 +55,6 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     Returns
     -------
     The findings, section by section.
-
-    Raises
-    ------
-    InputError
-        The project makes no block.
     """
     block = project.to_block(limits)
     common = project.common

@@ -23,8 +23,7 @@ Table = NDArray[np.uint8]
 
 POWERS = 10 ** np.arange(19, dtype=np.int64)
 BLANK, POINT, MINUS, ZERO = b" .-0"
-RUN = 1 << 16
-"""Values that are written at a time."""
+RUN = 1 << 16  # Values that are written at a time
 TIE = 1e-4
 """A number this close (in units of the last decimal) to the middle between two texts is rounded in decimal.
 
@@ -183,8 +182,6 @@ def position_fields(positions: ArrayLike, geographic: bool) -> Table:
     """Write (n, 3) coordinates (F12.3): X, Y, Z, or longitude and latitude (rad) and height.
 
     Returns (n, 36) characters.
-
-    Raises ValueError: a number that does not fit its field.
     """
     positions = np.asarray(positions, dtype=np.float64).reshape(-1, 3)
     if not geographic:

@@ -125,11 +125,7 @@ class Common:
 
 
 def parse_common(source: Source) -> Common:
-    """Read COMMON.
-
-    Raises InputError: fewer than two records, a field that is no number, or a value that the guide's table
-    does not have.
-    """
+    """Read COMMON."""
     if len(source.lines) < 2:
         raise source.error("two records are needed: the title and the job definition")
     job = source.record(2)
@@ -186,10 +182,7 @@ def _digit(job: Record, column: int, largest: int) -> int:
 
 
 def common_records(common: Common) -> list[str]:
-    """Write COMMON.
-
-    Raises ValueError: a value does not fit its field.
-    """
+    """Write COMMON."""
     if len(common.title) > 80 or not common.title.isprintable():
         raise ValueError("the title must be one line of at most 80 characters")
     if len(common.strip) > 1 or not common.strip.isprintable():

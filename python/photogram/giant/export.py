@@ -219,8 +219,6 @@ def adjusted_records(
     (unit 9) of an adjustment that converged, unless COMMON says not to save them. Positions and attitudes (P,
     3), (P, 3), (n, 3) are those of the last iteration, as in :func:`adjusted_frames` and
     :func:`adjusted_ground`.
-
-    Raises InputError: a value of an adjustment that converged does not fit its field.
     """
     geographic = project.common.geographic
     frames = adjusted_frames(project, block, photo_positions, photo_attitudes)

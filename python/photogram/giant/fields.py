@@ -16,8 +16,7 @@ from photogram.show.angles import ARCSEC
 MOST_ANGLE = (360 * 3600 + 3599) * ARCSEC
 """The largest angle that is written: 360 59 59, for a field may have 360 degrees and minutes besides."""
 
-LARGEST_PACKED = 10**8
-"""Far beyond every angle, and well within what decimal arithmetic divides."""
+LARGEST_PACKED = 10**8  # Far beyond every angle, and well within what decimal arithmetic divides
 
 
 def parse_name(field: str, strip: str = "") -> str:
@@ -41,9 +40,6 @@ def unpack_dms(packed: Decimal) -> tuple[int, int, int, Decimal]:
 
 def parse_angle(field: str, decimals: int) -> tuple[float, bool]:
     """Read a packed DMS field.
-
-    Raises ValueError: the field is no number, or has more than 360 degrees, 60 minutes or 60 seconds: the
-    guide's fatal ILLEGAL DMS FIELD.
 
     Returns
     -------
@@ -71,8 +67,6 @@ def format_real(value: float, width: int, decimals: int) -> str:
     A number that does not fit is rounded. At least `decimals` decimals where there is room. The implied point
     of the format is used only where the explicit one would cost a digit. NaN, an unknown value, is a blank
     field.
-
-    Raises ValueError: the number is infinite, or too large for the field.
     """
     if math.isnan(value):
         return " " * width
@@ -121,8 +115,6 @@ def format_angle(value: float, width: int) -> str:
     An angle that came from such a field is written exactly; others to five decimals of the second, or four
     where the columns end. A negative angle that would lose the fourth decimal gets 360 degrees added, which
     spares the sign. NaN, an unknown value, is a blank field.
-
-    Raises ValueError: the angle is beyond 360 degrees, or too long for the field.
     """
     if math.isnan(value):
         return " " * width
@@ -150,11 +142,7 @@ def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
 
 
 def format_name(name: str) -> str:
-    """Write a name of at most eight characters into its eight columns.
-
-    Raises ValueError: the name is too long, begins with the terminator `****`, or holds blanks at its ends or
-    control characters.
-    """
+    """Write a name of at most eight characters into its eight columns."""
     if len(name) > 8:
         raise ValueError(f"the name {name!r} has more than 8 characters")
     if name != name.strip(" ") or not name.isprintable() or name.startswith("****"):
@@ -171,10 +159,7 @@ def printed_order(name: str) -> tuple[int, str]:
 
 
 def format_principal_distance(value: float) -> str:
-    """Write a principal distance (F10.3); zero, which stands for that of the camera, as blanks.
-
-    Raises ValueError: the value does not fit, or is so small that it would turn into zero.
-    """
+    """Write a principal distance (F10.3); zero, which stands for that of the camera, as blanks."""
     if value == 0:
         return " " * 10
     field = format_real(value, 10, 3)
@@ -188,10 +173,7 @@ def _significant(field: str) -> bool:
 
 
 def format_deviations(values: Iterable[float], angles: Iterable[bool]) -> str:
-    """Write standard deviations, F10.3 or DMS; zero, which stands for the default, as blanks.
-
-    Raises ValueError: a value is negative, does not fit, or is so small that it would turn into zero.
-    """
+    """Write standard deviations, F10.3 or DMS; zero, which stands for the default, as blanks."""
     fields = []
     for value, angle in zip(values, angles, strict=True):
         if value == 0:

@@ -34,10 +34,7 @@ def project_name(path: Path) -> str | None:
 
 
 def find_files(directory: Path) -> dict[str, Path]:
-    """Find the five input files of a project.
-
-    Raises InputError: a file is missing, or two files could be the same one.
-    """
+    """Find the five input files of a project."""
     files: dict[str, Path] = {}
     for name, candidates in present_files(directory).items():
         if not candidates:
@@ -53,10 +50,7 @@ def find_files(directory: Path) -> dict[str, Path]:
 
 
 def written(name: str, writer: Callable[[], list[str]]) -> list[str]:
-    """Return the records that a writer makes.
-
-    Raises InputError: a value that does not fit its field; the message begins with the name of the file.
-    """
+    """Return the records that a writer makes."""
     try:
         return writer()
     except ValueError as error:

@@ -12,8 +12,7 @@ from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.angles import ARCSEC
 
-ATTITUDE_SD = 90 * 3600 * ARCSEC
-"""Default standard deviation of omega, phi and kappa: 90 degrees, in radians."""
+ATTITUDE_SD = 90 * 3600 * ARCSEC  # Default standard deviation of omega, phi and kappa: 90 degrees, in radians
 
 
 @dataclass
@@ -43,11 +42,7 @@ class Frame:
 
 
 def parse_frames(source: Source, geographic: bool) -> list[Frame]:
-    """Read FRAMES; the order of the frames is kept, for it structures the normal equations.
-
-    Raises InputError: a field that is no number or no angle, a record without its partner, or a frame that
-    stands there twice.
-    """
+    """Read FRAMES; the order of the frames is kept, for it structures the normal equations."""
     records = source.records()
     positions = Columns([record.text for record in records[::2]])
     attitudes = Columns([record.text for record in records[1::2]])
@@ -82,10 +77,7 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
 
 
 def frame_records(frames: Iterable[Frame], geographic: bool) -> list[str]:
-    """Write FRAMES.
-
-    Raises ValueError: a name or a number does not fit its field.
-    """
+    """Write FRAMES."""
     frames = list(frames)
     rows = zip(
         frames,

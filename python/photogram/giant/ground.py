@@ -11,8 +11,7 @@ from photogram.giant.columns import Columns, deviation_fields, position_fields, 
 from photogram.giant.fields import format_name
 from photogram.giant.records import Record, Source
 
-CHECK_POINT = 7
-"""The type code of a point of which nothing is held."""
+CHECK_POINT = 7  # The type code of a point of which nothing is held
 
 
 @dataclass(slots=True)
@@ -49,10 +48,7 @@ class GroundPoint:
 
 
 def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
-    """Read GROUND; of a point that stands there twice the first record counts, with a remark.
-
-    Raises InputError: a field that is no number or no angle, a type code above 7, or a point without a name.
-    """
+    """Read GROUND; of a point that stands there twice the first record counts, with a remark."""
     records = source.records()
     names = source.point_names([record.number for record in records])
     columns = Columns([record.text for record in records])
@@ -85,10 +81,7 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
 
 
 def ground_records(points: Iterable[GroundPoint], geographic: bool) -> list[str]:
-    """Write GROUND.
-
-    Raises ValueError: a name or a number does not fit its field.
-    """
+    """Write GROUND."""
     points = list(points)
     rows = zip(
         points,

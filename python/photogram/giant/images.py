@@ -12,8 +12,7 @@ from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 
-IMAGE_SD = 0.010
-"""Default standard deviation of an image coordinate in millimetres."""
+IMAGE_SD = 0.010  # Default standard deviation of an image coordinate in millimetres
 
 TERMINATOR = "****"
 
@@ -61,9 +60,6 @@ def parse_images(source: Source) -> list[ImageFrame]:
 
     All point records are read at once, column by column; those that are not plain numbers are read again one
     by one.
-
-    Raises InputError: a field that is no number, a point without a name or coordinates, or a frame without
-    its terminator.
     """
     numbers = source.filled()
     ends = [row for row, number in enumerate(numbers) if source.lines[number - 1].startswith(TERMINATOR)]
@@ -128,10 +124,7 @@ def _careful_coordinates(record: Record) -> tuple[float, float]:
 
 
 def image_records(frames: Iterable[ImageFrame]) -> list[str]:
-    """Write IMAGES.
-
-    Raises ValueError: a name or a number does not fit its field.
-    """
+    """Write IMAGES."""
     frames = list(frames)
     xy = texts(real_fields(np.concatenate([np.empty((0, 2)), *(frame.xy for frame in frames)]), 10, 3))
     distances = {value: format_principal_distance(value) for value in {f.principal_distance for f in frames}}

@@ -27,8 +27,7 @@ NAMES = {
     "N5": "cameras",
     "N6": "bandwidth",
 }
-SHOWN = 40
-"""Names of points that a message lists at most."""
+SHOWN = 40  # Names of points that a message lists at most
 
 
 @dataclass(frozen=True)
@@ -88,10 +87,7 @@ class Limits:
 
 
 def check_files(project: Contents, limits: Limits) -> None:
-    """Refuse more stations, control or cameras than the limits allow.
-
-    Raises InputError: in the words of the guide, with the first record that is too much.
-    """
+    """Refuse more stations, control or cameras than the limits allow."""
     control = sum(1 + point.repeats for point in project.ground)
     _check("CAMERA STATIONS", project.frames, len(project.frames), limits.stations)
     _check("GROUND CONTROL", project.ground, control, limits.control)
@@ -100,13 +96,7 @@ def check_files(project: Contents, limits: Limits) -> None:
 
 
 def check_points(names: Sequence[str] | dict[str, int], limits: Limits) -> None:
-    """Refuse more different points than the limits allow.
-
-    Raises
-    ------
-    InputError
-        In the words of the guide.
-    """
+    """Refuse more different points than the limits allow."""
     _check("IMAGE POINTS", [], len(names), limits.points)
 
 
@@ -151,8 +141,6 @@ def check_bandwidth(
 
     Intersection needs no normal equations of stations: then the point that would break the limit is remarked
     on only.
-
-    Raises InputError: in the words of the guide; stations have their numbers in FRAMES, from 1.
     """
     overflow = structure.overflow(limit)
     if overflow is None:

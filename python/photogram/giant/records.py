@@ -15,21 +15,14 @@ from photogram.io.records import parse_integer, parse_real
 from photogram.messages import Message
 
 T = TypeVar("T")
-QUARTER_CIRCLE = math.pi / 2 + 1e-12
-"""The largest latitude, rounding allowed for."""
+QUARTER_CIRCLE = math.pi / 2 + 1e-12  # The largest latitude, rounding allowed for
 
 
 @dataclass(frozen=True, eq=False)
 class Source(records.Source):
-    """The records of one file.
+    """The records of one file."""
 
-    Attributes
-    ----------
-    strip
-        The leading character removed from names (COMMON column 15), or nothing.
-    """
-
-    strip: str = ""
+    strip: str = ""  # The leading character removed from names (COMMON column 15), or nothing
 
     @classmethod
     def read(cls, path: Path, strip: str = "") -> Self:
@@ -45,13 +38,7 @@ class Source(records.Source):
         return [self.record(number) for number in self.filled()]
 
     def point_names(self, numbers: list[int]) -> list[str]:
-        """Read the names of points in columns 1-8 of many records.
-
-        Raises
-        ------
-        InputError
-            A point without a name, or a second spelling of one name.
-        """
+        """Read the names of points in columns 1-8 of many records."""
         fields = [self.lines[number - 1][:8].rstrip(" ") for number in numbers]
         names = {text: parse_name(text, self.strip) for text in set(fields)}
         if len(set(names.values())) < len(names) or "" in names:

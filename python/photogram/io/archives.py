@@ -23,11 +23,6 @@ def check_unpacked_size(path: Path, members: Collection[zipfile.ZipInfo]) -> Non
     """Reject members of an archive whose headers announce many times the bytes that they are packed into.
 
     No member is unpacked beyond its header.
-
-    Raises
-    ------
-    InputError
-        The members have more than 64 MiB together, and more than 250 times their packed size.
     """
     packed = sum(each.compress_size for each in members)
     size = sum(each.file_size for each in members)

@@ -38,39 +38,19 @@ class Names:
 
 @dataclass(frozen=True)
 class ColumnTable:
-    """A table whose columns are asked for by name.
+    """A table whose columns are asked for by name."""
 
-    Attributes
-    ----------
-    path
-        The file.
-    head
-        The record that names the columns.
-    columns
-        Their names, in small letters.
-    count
-        How many rows there are.
-    cells
-        Columns of text.
-    ready
-        Columns that were read as numbers or names already.
-    records
-        Number of the record of each row.
-    numeric
-        Columns whose cells together show how the table writes numbers.
-    own
-        What the file calls the columns, in small letters; empty for one that it does not name.
-    """
-
-    path: Path
-    head: Place
-    columns: tuple[str, ...]
-    count: int
-    cells: Mapping[str, Sequence[str]]
-    records: Sequence[int]
+    path: Path  # The file
+    head: Place  # The record that names the columns
+    columns: tuple[str, ...]  # Their names, in small letters
+    count: int  # How many rows there are
+    cells: Mapping[str, Sequence[str]]  # Columns of text
+    records: Sequence[int]  # Number of the record of each row
     delimiter: str = ","
+    # Columns that were read as numbers or names already
     ready: Mapping[str, Floats | Names] = field(default_factory=dict)
-    numeric: frozenset[str] = frozenset()
+    numeric: frozenset[str] = frozenset()  # Columns whose cells together show how the table writes numbers
+    # What the file calls the columns, in small letters; empty for one that it does not name
     own: tuple[str, ...] = ()
 
     def __contains__(self, column: str) -> bool:
@@ -123,25 +103,13 @@ class ColumnTable:
         return replace(self, cells={**self.cells, column: texts}, ready=ready)
 
     def require(self, *columns: str) -> None:
-        """Refuse a table without these columns.
-
-        Raises
-        ------
-        InputError
-            Those that are missing, beside those that are there.
-        """
+        """Refuse a table without these columns."""
         if missing := [column for column in columns if column not in self.columns]:
             what = "the column {} is missing" if len(missing) == 1 else "the columns {} are missing"
             raise self.head.error(f"{what.format(listed(missing))}; there are {listed(list(self.columns))}")
 
     def names(self, column: str) -> Names:
-        """Return a column of names, without blanks at both ends.
-
-        Raises
-        ------
-        InputError
-            A cell that is empty or says NaN, names that differ by inner blanks or by case alone.
-        """
+        """Return a column of names, without blanks at both ends."""
         found = self.ready.get(column)
         if not isinstance(found, Names):
             found = factorised(self._cells(column))
@@ -170,13 +138,7 @@ class ColumnTable:
                 )
 
     def names_once(self, column: str) -> list[str]:
-        """Return a column of names as :meth:`names` has them, none of which may stand in two rows.
-
-        Raises
-        ------
-        InputError
-            As of :meth:`names`; a name that is there twice.
-        """
+        """Return a column of names as :meth:`names` has them, none of which may stand in two rows."""
         found, texts = self.names(column), self.texts(column)
         if len(found.names) < self.count:
             _, first = np.unique(found.rows, return_index=True)
@@ -224,11 +186,6 @@ class ColumnTable:
             Whether `inf` is a number here.
         read
             Reads a cell in place of a plain number.
-
-        Raises
-        ------
-        InputError
-            A cell that is no such number; names file, record and column.
         """
         found = self.ready.get(column)
         if isinstance(found, np.ndarray):
@@ -287,26 +244,14 @@ class ColumnTable:
         return found
 
     def check_given(self, values: Floats, columns: Sequence[str], why: str = "is empty") -> None:
-        """Refuse NaN among (rows, k) numbers of some columns.
-
-        Raises
-        ------
-        InputError
-            There is one; names file, record and column.
-        """
+        """Refuse NaN among (rows, k) numbers of some columns."""
         missing = np.argwhere(np.isnan(values))
         if len(missing):
             row, column = missing[0].tolist()
             raise self.error(row, f"column {columns[column]}: {why}")
 
     def words(self, column: str, known: Sequence[str], default: str | None = None) -> list[str]:
-        """Return a column of some known words in small letters; empty cells have the default, or the first.
-
-        Raises
-        ------
-        InputError
-            Another word.
-        """
+        """Return a column of known words in small letters; empty cells have the default, or the first."""
         found = [each.lower() for each in self.texts(column, known[0] if default is None else default)]
         for row, word in enumerate(found):
             if word not in known:
@@ -314,13 +259,7 @@ class ColumnTable:
         return found
 
     def flags(self, column: str) -> Bools:
-        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true.
-
-        Raises
-        ------
-        InputError
-            Another word.
-        """
+        """Return (rows,) a column of true and false (yes, no, on, off, 1, 0); empty cells are true."""
         values = np.ones(self.count, dtype=bool)
         if column in self.columns:
             for row, cell in enumerate(self.texts(column)):

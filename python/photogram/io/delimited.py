@@ -26,18 +26,13 @@ from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
 from photogram.messages import listed, quoted
 
-LARGE = 1 << 20
-"""Bytes of a table above which the extension module reads it."""
-PIECE = 1 << 22
-"""Bytes of a large table that are read at a time."""
+LARGE = 1 << 20  # Bytes of a table above which the extension module reads it
+PIECE = 1 << 22  # Bytes of a large table that are read at a time
 COMMENT = "#"
-TITLES = 30
-"""Lines in which a header is looked for below titles."""
-NAMELESS = "?"
-"""The first column where each row has a cell more than the header."""
+TITLES = 30  # Lines in which a header is looked for below titles
+NAMELESS = "?"  # The first column where each row has a cell more than the header
 Spelling = Callable[[Sequence[str]], Sequence[str]]
-_SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)
-"""What Excel writes before a table."""
+_SEPARATOR = re.compile(r"sep=.", re.IGNORECASE)  # What Excel writes before a table
 _NUMBER = re.compile(r"[-+]?[\d.,'’ \u00a0\u202f]*(?:[eE][-+]?\d+)?")
 _BLANKS = re.compile(r'"([^"]*)"|(\S+)')
 
@@ -64,12 +59,6 @@ def read_columns(
         Gives the names of all columns from what the file calls them, in small letters.
     hint
         What is said of a first record that names no known column; None: that it does not.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, holds no table, two columns have one name, a row has more or fewer cells than
-        the header.
     """
     if path.suffix == ".parquet":
         return _parquet(path, spelling, numbers)
@@ -106,11 +95,6 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
         Their names; empty for those that nobody asks for.
     numbers
         As in :func:`read_columns`.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or a row has more or fewer cells than there are columns.
     """
 
     def header(text: str) -> _Header:

@@ -10,8 +10,7 @@ from pathlib import Path
 from photogram.errors import InputError
 from photogram.io.sheets import sheet_text
 
-HEAD = 4096
-"""Bytes in which text of two bytes a character is told, where it has no mark."""
+HEAD = 4096  # Bytes in which text of two bytes a character is told, where it has no mark
 
 
 @contextmanager

@@ -39,13 +39,7 @@ def _rows(value: object) -> object:
 
 @contextmanager
 def holding(what: str, path: Path | None = None) -> Iterator[None]:
-    """Say of what is no document, or has other members than were looked for, what it does not hold.
-
-    Raises
-    ------
-    InputError
-        It holds no such thing; what was wrong with a member names the file, too.
-    """
+    """Say of what is no document, or has other members than were looked for, what it does not hold."""
     try:
         yield
     except InputError as error:
@@ -130,13 +124,7 @@ class Tree:
 
 
 def read_json(path: Path) -> Tree:
-    """Read a JSON document.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is none; names the line.
-    """
+    """Read a JSON document."""
     data = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
     try:
         return Tree(orjson.loads(data), path)

@@ -9,11 +9,9 @@ from collections.abc import Iterable
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
 
-LARGEST_INTEGER = 2**63 - 1
-"""The largest that an array of 64-bit integers holds."""
+LARGEST_INTEGER = 2**63 - 1  # The largest that an array of 64-bit integers holds
 
-LONGEST = 1_000
-"""Characters of a number at most: 767 digits tell any two numbers of double precision apart."""
+LONGEST = 1_000  # Characters of a number at most: 767 digits tell any two numbers of double precision apart
 
 _WHOLE = re.compile(r"\+?[0-9]+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -37,11 +35,6 @@ def whole_number(text: str, lowest: int = 0, highest: int = LARGEST_INTEGER) -> 
         Its digits.
     lowest, highest
         What it may be.
-
-    Raises
-    ------
-    ValueError
-        It is no such number; the message shows the text, shortened.
     """
     if len(text) > LONGEST or not _WHOLE.fullmatch(text):
         raise ValueError(f"{quoted(text)} is not a whole number")
@@ -56,11 +49,6 @@ def finite_number(text: str) -> float:
 
     What Python reads besides is refused: NaN and infinity, `1_000`, digits of other alphabets, and numbers
     beyond double precision.
-
-    Raises
-    ------
-    ValueError
-        It is no such number; the message shows the text, shortened.
     """
     value = float(text) if len(text) <= LONGEST and _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
@@ -89,11 +77,6 @@ class Marks:
         """Return a number as it is spelled here: a decimal point, no marks of thousands.
 
         Anything else comes back as it is, for whoever reads numbers to refuse.
-
-        Raises
-        ------
-        ValueError
-            A mark that divides decimals or thousands, and nothing in the table says which.
         """
         simple = _SIMPLE.fullmatch(text) is not None
         if not _MARKED.fullmatch(text) or (simple and (self.decimal == "." or "." not in text)):

@@ -21,10 +21,8 @@ COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
 }
 """How files that begin like this are unpacked piece by piece."""
 LONGEST = max(map(len, COMPRESSED))
-PIECE = 1 << 17
-"""Characters that are read at a time."""
-SHOWN = 120
-"""Characters of a faulty line that are shown."""
+PIECE = 1 << 17  # Characters that are read at a time
+SHOWN = 120  # Characters of a faulty line that are shown
 
 
 def pieces(path: Path) -> Iterator[bytes]:

@@ -18,10 +18,8 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     import pyarrow
 
-ROWS = 2**17
-"""Of a row group."""
-LEVEL = 1
-"""Of zstd: numbers of measurements hardly get smaller at higher ones."""
+ROWS = 2**17  # Of a row group
+LEVEL = 1  # Of zstd: numbers of measurements hardly get smaller at higher ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,27 +35,13 @@ class Repeated:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A column.
+    """A column."""
 
-    Attributes
-    ----------
-    name
-        Without blanks.
-    values
-        (rows,) an array or names, or (rows, k) an array: k numbers in each row.
-    unit
-        `m`, `rad`, `px`, `m2` ...; `1` of plain numbers; empty where it has none.
-    description
-        One line.
-    order
-        What the k numbers are.
-    """
-
-    name: str
-    values: Any
-    unit: str = ""
-    description: str = ""
-    order: tuple[str, ...] = ()
+    name: str  # Without blanks
+    values: Any  # (rows,) an array or names, or (rows, k) an array: k numbers in each row
+    unit: str = ""  # `m`, `rad`, `px`, `m2` ...; `1` of plain numbers; empty where it has none
+    description: str = ""  # One line
+    order: tuple[str, ...] = ()  # What the k numbers are
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,11 +96,6 @@ def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Call
         Of one length, with different names.
     about
         Metadata of the table.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        pyarrow is not installed.
     """
     from pyarrow import parquet, types  # take long to import
 
@@ -140,15 +119,7 @@ def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Call
 
 
 def read_sheet(path: Path) -> Sheet:
-    """Read a table.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or a number is missing (not NaN).
-    ModuleNotFoundError
-        pyarrow is not installed.
-    """
+    """Read a table."""
     import pyarrow.parquet
 
     try:

@@ -67,8 +67,7 @@ _TOKEN = re.compile(
     |(?P<word>(?:[^\s=(){},;"'<>/-]|/(?!\*)|-(?:\r?\n\s*)?)+)""",
     re.VERBOSE,
 )
-_CONTINUED = re.compile(r"-\r?\n\s*")
-"""A hyphen at the end of a line: the text goes on without it."""
+_CONTINUED = re.compile(r"-\r?\n\s*")  # A hyphen at the end of a line: the text goes on without it
 _FOLDED = re.compile(r"\s*\n\s*")
 _WHOLE = re.compile(r"[-+]?(?:0|[1-9]\d{0,17})")
 """Whole numbers. What begins with zeros is a name that digits make up."""
@@ -141,11 +140,6 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
         Where it comes from, for errors.
     numbers
         Whether words that are numbers become numbers; if not, all values are texts as they stand there.
-
-    Raises
-    ------
-    InputError
-        The text is no label; the error has the number of the line.
     """
     reader = _Reader(text, file, numbers)
     label = Group("", "label")
@@ -237,13 +231,7 @@ def _number(word: str) -> str | int | float:
 
 
 def label_text(label: Group) -> str:
-    """Return a label as text, which :func:`parsed` reads as it was.
-
-    Raises
-    ------
-    InputError
-        A text that no marks of quotation can hold: it has both kinds, or several lines.
-    """
+    """Return a label as text, which :func:`parsed` reads as it was."""
     return "\n".join([*_lines(label, ""), "End", ""])
 
 

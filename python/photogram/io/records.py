@@ -15,42 +15,23 @@ from photogram.io.places import Place
 from photogram.messages import Message
 
 WIDTH = 80
-WIDE = 0.25
-"""Zero bytes that no text of one byte a character has, as a part of all."""
-LARGEST_EXPONENT = 400
-"""Beyond every number in double precision, digits before and after the point included."""
+WIDE = 0.25  # Zero bytes that no text of one byte a character has, as a part of all
+LARGEST_EXPONENT = 400  # Beyond every number in double precision, digits before and after the point included
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]([+-]?\d+)|([+-]\d+))?", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """The records of one file.
+    """The records of one file."""
 
-    Attributes
-    ----------
-    path
-        Where the file is.
-    lines
-        Its records without their line ends, cut after column 80.
-    messages
-        Remarks made while the records are read.
-    """
-
-    path: Path
-    lines: list[str]
-    messages: list[Message] = field(default_factory=list)
+    path: Path  # Where the file is
+    lines: list[str]  # Its records without their line ends, cut after column 80
+    messages: list[Message] = field(default_factory=list)  # Remarks made while the records are read
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a text file as :func:`~photogram.io.files.read_lines` does.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read or is UTF-32, or a record holds a tab or
-            another control character, which would move its columns.
-        """
+        """Read a text file as :func:`~photogram.io.files.read_lines` does."""
         lines = read_lines(path)
         text = "".join(lines)
         if text.count("\0") > WIDE * len(text):
@@ -123,11 +104,6 @@ def parse_real(field: str, decimals: int) -> Decimal:
     A blank field is zero, blanks inside are ignored (BLANK='NULL'), and without a decimal point the last
     `decimals` digits are the fraction. An exponent follows E or D, with or without a sign, or is a sign and
     digits without a letter: `1.5+2` is 150. NaN and infinity have no spelling.
-
-    Raises
-    ------
-    ValueError
-        The field is no number, or one that double precision does not have.
     """
     digits = field.replace(" ", "")
     if not digits:

@@ -19,10 +19,8 @@ from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.messages import listed, quoted
 
-DELIMITERS = ("\t", ";", ",", "|")
-"""What a header shows to stand between cells, in this order."""
-LONGEST_RECORD = 100_000
-"""Characters of a record at most. The module `csv` stops at cells of 131,072."""
+DELIMITERS = ("\t", ";", ",", "|")  # What a header shows to stand between cells, in this order
+LONGEST_RECORD = 100_000  # Characters of a record at most. The module `csv` stops at cells of 131,072
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +29,7 @@ class Row:
 
     cells: Mapping[str, str]
     place: Place
-    commas: bool = False
-    """Whether decimals may have commas: these do not stand between cells."""
+    commas: bool = False  # Whether decimals may have commas: these do not stand between cells
 
     def integer(self, column: str, default: int | None = None) -> int:
         """Return a whole number that is not negative; `default` where the cell or the column is missing."""
@@ -64,33 +61,15 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: the names of its columns, and its records, which are split one at a time.
+    """A table: the names of its columns, and its records, which are split one at a time."""
 
-    Attributes
-    ----------
-    path
-        The file.
-    head
-        The record that names the columns.
-    columns
-        Their names.
-    records
-        The records below, blank ones and comments left out.
-    comments
-        Records that begin with the mark of a comment.
-    ragged
-        Whether cells may be missing at the end of a record; they are blank then.
-    delimiter
-        What stands between cells, as the header has it.
-    """
-
-    path: Path
-    head: Place
-    columns: tuple[str, ...]
-    records: tuple[Place, ...]
-    comments: tuple[Place, ...] = ()
-    ragged: bool = False
-    delimiter: str = ","
+    path: Path  # The file
+    head: Place  # The record that names the columns
+    columns: tuple[str, ...]  # Their names
+    records: tuple[Place, ...]  # The records below, blank ones and comments left out
+    comments: tuple[Place, ...] = ()  # Records that begin with the mark of a comment
+    ragged: bool = False  # Whether cells may be missing at the end of a record; they are blank then
+    delimiter: str = ","  # What stands between cells, as the header has it
 
     @classmethod
     def read(
@@ -113,11 +92,6 @@ class Table:
             Whether cells may be missing at the end of a record.
         spelling
             Gives the name of a column from what the file calls it.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read, holds no table, or two of its columns have one name.
         """
         comments: list[Place] = []
         records: list[Place] = []
@@ -144,26 +118,14 @@ class Table:
         return replace(self, columns=tuple(names))
 
     def require(self, *columns: str) -> None:
-        """Refuse a table without these columns.
-
-        Raises
-        ------
-        InputError
-            Those that are missing.
-        """
+        """Refuse a table without these columns."""
         there = set(self.columns)
         if missing := [column for column in columns if column not in there]:
             what = "the column {} is missing" if len(missing) == 1 else "the columns {} are missing"
             raise self.head.error(what.format(listed(missing)))
 
     def rows(self) -> Iterator[Row]:
-        """Split the records, one after the other.
-
-        Raises
-        ------
-        InputError
-            A record has more cells than there are columns, or fewer and the table is not ragged.
-        """
+        """Split the records, one after the other."""
         count = len(self.columns)
         for place in self.records:
             found = cells(place, self.delimiter)
@@ -173,13 +135,7 @@ class Table:
 
 
 def cells(place: Place, delimiter: str = ",") -> list[str]:
-    """Split a record at its commas, or another delimiter; quotation marks hold a cell together.
-
-    Raises
-    ------
-    InputError
-        The record is too long to be one, or cannot be split.
-    """
+    """Split a record at its commas, or another delimiter; quotation marks hold a cell together."""
     text = place.text or ""
     if len(text) > LONGEST_RECORD:
         raise place.error(f"a record of {len(text)} characters; {LONGEST_RECORD} are the most")
@@ -202,11 +158,6 @@ def read_rows(
         Columns that must be there.
     aliases
         Headings of other programs, in small letters, of columns that are not there by their own names.
-
-    Raises
-    ------
-    InputError
-        As :meth:`Table.read`, :meth:`Table.require` and :meth:`Table.rows`.
     """
     table = Table.read(path, ragged=True).renamed(aliases)
     table.require(*needed)

@@ -12,8 +12,7 @@ import orjson
 from photogram.errors import InputError
 from photogram.io.files import reading
 
-SEAL = "sha256"
-"""The member of a document that holds its own checksum."""
+SEAL = "sha256"  # The member of a document that holds its own checksum
 
 
 def seal(document: Mapping[str, Any]) -> str:
@@ -23,13 +22,7 @@ def seal(document: Mapping[str, Any]) -> str:
 
 
 def check_sealed(document: Mapping[str, Any], path: Path) -> None:
-    """Refuse a document that is not the one which was sealed.
-
-    Raises
-    ------
-    InputError
-        Its checksum is another one.
-    """
+    """Refuse a document that is not the one which was sealed."""
     if document.get(SEAL) != seal(document):
         raise InputError("was changed after it was written: its checksum is another one", file=path)
 
@@ -45,11 +38,6 @@ def check_seal(path: Path, expected: object, of: str) -> None:
         Its checksum, as it stands elsewhere.
     of
         The file that says so.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or is another one.
     """
     with reading(path), path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()

@@ -12,18 +12,11 @@ from typing import Any
 from photogram.errors import InputError
 from photogram.io.archives import check_unpacked_size
 
-LARGEST = 1 << 29
-"""Bytes that a workbook may unpack to: beyond, it is no table of a person but an attack."""
+LARGEST = 1 << 29  # Bytes that a workbook may unpack to: beyond, it is no table of a person but an attack
 
 
 def sheet_text(path: Path) -> str:
-    """Return the first sheet of a workbook: a line a row, tabs between its cells, values of formulas.
-
-    Raises
-    ------
-    InputError
-        The file is no workbook, or the library is not installed.
-    """
+    """Return the first sheet of a workbook: a line a row, tabs between its cells, values of formulas."""
     try:
         import openpyxl
     except ImportError:
@@ -69,11 +62,6 @@ def workbook(tables: Mapping[str, Mapping[str, Sequence[Any]]], notes: Mapping[s
         Columns by the names of tables.
     notes
         What is said of tables, in a last sheet.
-
-    Raises
-    ------
-    InputError
-        The library is not installed.
     """
     try:
         import openpyxl

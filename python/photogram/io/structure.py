@@ -21,8 +21,7 @@ from photogram.arguments.annotations import check_members
 from photogram.errors import InputError
 from photogram.messages import quoted
 
-SMALL = 36
-"""Numbers up to which an array is written as numbers that people can read."""
+SMALL = 36  # Numbers up to which an array is written as numbers that people can read
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
@@ -49,13 +48,7 @@ class Encoder:
         self._kept: list[object] = []
 
     def value(self, given: Any) -> Any:
-        """Return a value of JSON that says what the given one is.
-
-        Raises
-        ------
-        TypeError
-            It is of a type that a document has no place for.
-        """
+        """Return a value of JSON that says what the given one is."""
         if given is None or isinstance(given, bool | str):
             return given
         if isinstance(given, int | np.integer):
@@ -132,13 +125,7 @@ class Decoder:
         }
 
     def value(self, given: Any) -> Any:
-        """Return what a value of JSON stands for.
-
-        Raises
-        ------
-        InputError
-            A class that is not known, what no encoder has written, or what the class itself refuses.
-        """
+        """Return what a value of JSON stands for."""
         if isinstance(given, list):
             return [self.value(each) for each in given]
         if not isinstance(given, dict):
@@ -154,13 +141,7 @@ class Decoder:
             raise self._error(f"{quoted(str(given))} is no {kind} ({error})") from None
 
     def fields(self, given: Any, kind: type = object) -> dict[str, Any]:
-        """Return the fields of an object of a class that were written one by one.
-
-        Raises
-        ------
-        InputError
-            As :meth:`value`; a value of another kind than the class has.
-        """
+        """Return the fields of an object of a class that were written one by one."""
         if not isinstance(given, dict):
             raise self._error(f"{quoted(str(given))} has no members")
         found = {name: self.value(each) for name, each in given.items()}

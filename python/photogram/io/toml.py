@@ -20,8 +20,7 @@ from photogram.messages import nearest
 MOST_DIGITS = 1000
 _ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")
 """Python refuses whole numbers of thousands of digits, and does not say where they stand."""
-_SHOWN = 60
-"""Characters of a key that an error shows."""
+_SHOWN = 60  # Characters of a key that an error shows
 
 
 class TomlFile:
@@ -31,11 +30,6 @@ class TomlFile:
     ----------
     path
         The file.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or is no TOML.
     """
 
     def __init__(self, path: Path) -> None:
@@ -114,11 +108,6 @@ class Sections(TomlFile):
     said
         What a user says of keys in the place of the file: `section.key=value`, the value as in the file; a
         text may go without its quotation marks.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is no TOML; words of another form.
     """
 
     def __init__(self, path: Path, said: Sequence[str] = ()) -> None:

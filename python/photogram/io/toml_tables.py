@@ -11,8 +11,7 @@ from photogram.errors import InputError
 from photogram.io.toml import TomlFile, float_of
 from photogram.messages import listed
 
-_LONGEST = 60
-"""Characters of a value that an error shows."""
+_LONGEST = 60  # Characters of a value that an error shows
 
 
 class Table:
@@ -218,11 +217,6 @@ def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> D
         The file.
     tables
         What it may hold: the keys of each table, None where the reader of the table checks them.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, is not TOML, or has tables or keys besides these.
     """
     document = TomlFile(path).content
     unknown = sorted(set(document) - set(tables))

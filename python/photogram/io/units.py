@@ -6,8 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-TYPED_DECIMALS = 12
-"""Decimals that people type at most."""
+TYPED_DECIMALS = 12  # Decimals that people type at most
 
 MATRIX_ROUNDING = float(np.degrees(8.0 * np.finfo(float).eps))
 """Error of an angle that was computed from a rotation matrix, degrees."""

@@ -19,8 +19,7 @@ from photogram.io.files import read_lines
 from photogram.io.numbers import number_or_text
 from photogram.io.places import Place
 
-DEEPEST = 50
-"""Brackets and indents within each other."""
+DEEPEST = 50  # Brackets and indents within each other
 # Possessive: a run of blanks would be tried in all ways to divide it.
 _KEY = re.compile(
     r"""("(?:[^"\\]|\\.)*+"\s*+|'[^']*+'\s*+|[^\s#'"\[\]{},&*!|>%@`-][^#:]*+|-[^\s#:][^#:]*+):(?:\s+|$)"""
@@ -43,13 +42,7 @@ class _Line:
 
 
 def read_yaml_text(path: Path) -> dict[str, Any]:
-    """Return the mapping that a file is.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, is no mapping, or has a form that is not taken: names the line.
-    """
+    """Return the mapping that a file is."""
     lines = []
     for record, text in enumerate(read_lines(path), 1):
         place = Place(path, record, text)
@@ -147,8 +140,7 @@ class _Reader:
         return value
 
 
-_Tokens = list[tuple[str, str]]
-"""What each is (a bracket, `,` or `:` by itself; `text`), and its text."""
+_Tokens = list[tuple[str, str]]  # What each is (a bracket, `,` or `:` by itself; `text`), and its text
 
 
 def _tokens(text: str, place: Place) -> _Tokens:

@@ -61,10 +61,8 @@ from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.summary import Brief, Rows, few
 
-_NUMBERS: Any = None
-"""Names that are not given."""
-_ANGLES = 1e6
-"""Radians: larger angles have lost the digits that an attitude needs."""
+_NUMBERS: Any = None  # Names that are not given
+_ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

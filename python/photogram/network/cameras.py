@@ -22,11 +22,9 @@ from photogram.show.summary import Brief, Rows
 Weights = Literal["corrected", "measured"]
 """Of a backward camera: what the standard deviations of images are those of."""
 
-_MEASURED = "_measured"
-"""What the core calls backward cameras whose residuals lie in the measured image."""
+_MEASURED = "_measured"  # What the core calls backward cameras whose residuals lie in the measured image
 
-ImageUnit = Literal["mm", "px"]
-"""What image coordinates are measured in."""
+ImageUnit = Literal["mm", "px"]  # What image coordinates are measured in
 
 CameraRow = tuple[str, list[float], list[float], list[float] | None, list[float] | None]
 """Model, parameters, their standard deviations, the covariance matrix of those that are weighted, row by row,

@@ -11,10 +11,8 @@ from photogram.network.cameras import rays_of_row
 from photogram.network.motion import focal_images, scanners
 from photogram.network.subset import image_rows, kept_images
 
-_SIDE = -0.02
-"""u3 of unit directions that are seen well in front of the camera."""
-_SMALL = 1e-6
-"""Radians off the axis, where no lens distorts."""
+_SIDE = -0.02  # u3 of unit directions that are seen well in front of the camera
+_SMALL = 1e-6  # Radians off the axis, where no lens distorts
 
 
 def image_directions(block: Block) -> Floats:

@@ -14,12 +14,9 @@ from photogram.network.block import Block
 from photogram.network.films import Film, FilmNumbers, Scan
 from photogram.network.observations import Fiducial
 
-FEWEST = 4
-"""Marks of an affine fit that has something to be judged by."""
-FIT = 5e-4
-"""Parts of their extent to which marks fit: 0.1 mm of a film of 23 cm; others are wrong."""
-_PLACES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-"""Readings of these say what an affine map is."""
+FEWEST = 4  # Marks of an affine fit that has something to be judged by
+FIT = 5e-4  # Parts of their extent to which marks fit: 0.1 mm of a film of 23 cm; others are wrong
+_PLACES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])  # Readings of these say what an affine map is
 _DIFFERENCES = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
 
 

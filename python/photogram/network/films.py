@@ -21,10 +21,8 @@ from photogram.network.cameras import Camera
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
 
-PATTERNS = ("none", "w1 w2", "ebner", "grid")
-"""By the number under which the core knows each."""
-MOST_SHIFTS = 200
-"""Unknowns of the reseau of a photo."""
+PATTERNS = ("none", "w1 w2", "ebner", "grid")  # By the number under which the core knows each
+MOST_SHIFTS = 200  # Unknowns of the reseau of a photo
 
 
 class FilmNumbers(Numbers):

@@ -7,8 +7,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 
 MANY, DIRECTIONS = 1000, 16
-ROUNDING = 1e-9
-"""Of the extent of a hull: a point that is no farther outside lies on it."""
+ROUNDING = 1e-9  # Of the extent of a hull: a point that is no farther outside lies on it
 
 
 def hull(points: Floats) -> Floats:

@@ -15,10 +15,8 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Numbers, Unknown
 
-KNOTTED = "splined_stereographic"
-"""The model that has knots."""
-MOST = 10_000
-"""Knots along columns or rows, at the most."""
+KNOTTED = "splined_stereographic"  # The model that has knots
+MOST = 10_000  # Knots along columns or rows, at the most
 
 
 @dataclass(frozen=True, eq=False)

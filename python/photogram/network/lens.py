@@ -15,10 +15,8 @@ from photogram.lazy_dataclasses import dataclass
 LensModel = Literal["radial", "transverse", "lrolrocnac", "kaguyalism", "cahvor", "radtan"]
 
 STEPS = 50
-CLOSE = 1e-14
-"""Of the size of a place, beyond a millimetre: where steps of the inverse end."""
-APART = 1e-6
-"""Of the same: how far from a place the slopes of the inverse are taken."""
+CLOSE = 1e-14  # Of the size of a place, beyond a millimetre: where steps of the inverse end
+APART = 1e-6  # Of the same: how far from a place the slopes of the inverse are taken
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ __all__ = ["LineSensor", "Lines", "Moment", "Poses", "Shutter", "Timed", "checke
 Direction = Literal["down", "up", "right", "left"]
 
 STEPS = 100
-CLOSE = 1e-10
-"""Samples: where steps to the sample abreast of a place end."""
+CLOSE = 1e-10  # Samples: where steps to the sample abreast of a place end
 
 
 @cache

@@ -20,14 +20,11 @@ from photogram.network.unknowns import Unknown
 
 __all__ = ["camera_of", "projected", "projected_images", "standing"]
 
-Values = Callable[[Unknown], tuple[Floats, Floats]]
-"""Position and rotation of a common unknown."""
+Values = Callable[[Unknown], tuple[Floats, Floats]]  # Position and rotation of a common unknown
 
 STEPS = 200
-CLOSE, CLOSE_LINES = 1e-13, 1e-9
-"""Of a whole readout; of a line, where times have as many digits."""
-ROUNDED = 1e-9
-"""Of a whole readout: what rounding alone may change."""
+CLOSE, CLOSE_LINES = 1e-13, 1e-9  # Of a whole readout; of a line, where times have as many digits
+ROUNDED = 1e-9  # Of a whole readout: what rounding alone may change
 
 
 def given(unknown: Unknown) -> tuple[Floats, Floats]:

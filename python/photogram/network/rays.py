@@ -14,8 +14,7 @@ PARALLEL = 1e-8
 """Determinant of the normal matrix of a mean ray below which the rays of a point count as parallel."""
 
 
-SMALL_FRAME = 0.01
-"""The radius of a frame, as a part of the principal distance, at least."""
+SMALL_FRAME = 0.01  # The radius of a frame, as a part of the principal distance, at least
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,7 @@ __all__ = ["METRES_PER_UNIT", "Air", "Refraction", "Water", "metres_per_unit"]
 Air = Literal["giant", "standard"]
 Water = Literal["giant", "snell"]
 
-METRES_PER_UNIT = {"m": 1.0, "ft": 0.3048}
-"""Linear units whose length is known."""
+METRES_PER_UNIT = {"m": 1.0, "ft": 0.3048}  # Linear units whose length is known
 
 _AIR_NAMES = {"giant": "GIANT guide, Appendix F", "standard": "standard atmosphere"}
 _WATER_NAMES = {"giant": "GIANT guide, Appendix G", "snell": "Snell's law"}
@@ -86,13 +85,7 @@ class Refraction:
 
 
 def metres_per_unit(linear_unit: str) -> float:
-    """Return the length of a linear unit in metres: the models of the air know metres only.
-
-    Raises
-    ------
-    InputError
-        Neither "m" nor "ft".
-    """
+    """Return the length of a linear unit in metres: the models of the air know metres only."""
     if linear_unit not in METRES_PER_UNIT:
         units = " or ".join(METRES_PER_UNIT)
         raise InputError(f"refraction needs a linear unit of known length, {units}, not {linear_unit!r}")

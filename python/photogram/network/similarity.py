@@ -6,8 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 
-LINE = 1e-9
-"""Points spread less across a line than this, as a part of along it, lie on the line."""
+LINE = 1e-9  # Points spread less across a line than this, as a part of along it, lie on the line
 
 
 def turn_and_scale(model: Floats, targets: Floats) -> tuple[float, Floats, Floats]:

@@ -21,10 +21,8 @@ from photogram.memory import available_memory
 from photogram.network import geometry
 from photogram.network.geometry import Spheroid
 
-_FAR_MORE = 10.0
-"""Times as many points as were asked for are too many."""
-_AT_ONCE = 2**22
-"""Pairs of photo and point that may see each other, that are looked at together."""
+_FAR_MORE = 10.0  # Times as many points as were asked for are too many
+_AT_ONCE = 2**22  # Pairs of photo and point that may see each other, that are looked at together
 _CANDIDATE_BYTES, _IMAGE_BYTES = 300, 240
 """Memory for such a pair, and for an image of the block, at the peak."""
 _JITTER = 0.15  # of a grid cell, either way: small enough to keep the middle of an overlap in the overlap

@@ -28,10 +28,8 @@ from photogram.network.trajectories import Polynomial, Readout, Spline
 
 __all__ = ["LineScanner", "RollingShutter", "photo_angles", "rolled", "rotations_of"]
 
-_GUSTS = 0.03
-"""Standard deviation of a component of a velocity, as part of the speed."""
-_STARTS = 0.5
-"""Where a readout time starts of which nothing is known, as part of the true one."""
+_GUSTS = 0.03  # Standard deviation of a component of a velocity, as part of the speed
+_STARTS = 0.5  # Where a readout time starts of which nothing is known, as part of the true one
 
 
 @dataclass(frozen=True)

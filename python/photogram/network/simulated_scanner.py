@@ -19,12 +19,9 @@ from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_id
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
-_BETWEEN = 60.0
-"""Seconds between two passes, at least."""
-_PERIODS = 8.0, 30.0
-"""Seconds, of the three waves that roll and pitch are made of."""
-_BEYOND = 2
-"""Lines beyond the first and the last, to which trajectories reach."""
+_BETWEEN = 60.0  # Seconds between two passes, at least
+_PERIODS = 8.0, 30.0  # Seconds, of the three waves that roll and pitch are made of
+_BEYOND = 2  # Lines beyond the first and the last, to which trajectories reach
 _SURE = 5.0
 """Standard deviations within which the measurement of a line stays: where the ground moves slowly past the
 line, an error in the focal plane is one of many lines.

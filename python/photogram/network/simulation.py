@@ -34,12 +34,10 @@ __all__ = ["Blunders", "Simulation", "simulate"]
 
 
 _HUGE = 1e12
-_TINY = 1e-3
-"""What no length of a block exceeds, and what none falls below."""
+_TINY = 1e-3  # What no length of a block exceeds, and what none falls below
 _NARROWEST, _WIDEST = 1e-6, 1.4
 """Radians from the vertical: what photos show beyond it is too far away to simulate."""
-_FAR_MORE = 10.0
-"""Times as far aside as photos see is too far."""
+_FAR_MORE = 10.0  # Times as far aside as photos see is too far
 
 
 @dataclass(frozen=True)

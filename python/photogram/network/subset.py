@@ -16,8 +16,7 @@ PHOTOS = (
     *("photo_positions_observed", "photo_attitudes_observed", "principal_distances", "photo_cameras"),
 )
 """Arrays of a block with a row for each photo."""
-IMAGES = ("image_photos", "image_points", "image_xy", "image_sd")
-"""Those with a row for each image."""
+IMAGES = ("image_photos", "image_points", "image_xy", "image_sd")  # Those with a row for each image
 
 
 def image_rows(network: object, kept: Indices | Bools) -> dict[str, Any]:

@@ -6,8 +6,7 @@ import numpy as np
 
 from photogram.network.block import Block
 
-FEWEST_TIES = 3
-"""Points that the orientation of a photo needs at least."""
+FEWEST_TIES = 3  # Points that the orientation of a photo needs at least
 
 
 def ties(block: Block) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

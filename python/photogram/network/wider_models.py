@@ -13,8 +13,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.network.cameras import Camera
 
-_RADIAL = {"k1", "k2"}
-"""Terms of models that a calibration may change to."""
+_RADIAL = {"k1", "k2"}  # Terms of models that a calibration may change to
 _DIRECTIONS = np.array([[0.2, 0.1, -1.0], [-0.3, 0.25, -1.0], [0.05, -0.35, -1.0]])
 """Directions with equal images in a model and in all models that contain it."""
 _DISTANCES = frozenset({"f", "fx", "fy", "c"})

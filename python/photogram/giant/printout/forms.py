@@ -11,11 +11,9 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.show.angles import degrees_minutes_seconds
 
-Page = list[str]
-"""The lines of a page below its banner."""
+Page = list[str]  # The lines of a page below its banner
 
-WIDTH = 132
-"""Columns of a line printer, carriage control not counted."""
+WIDTH = 132  # Columns of a line printer, carriage control not counted
 LINES = 52
 """Lines of entries on a page: 13 stations, 52 points of one line or 13 of four, 10 control points of five."""
 
@@ -151,8 +149,7 @@ class Space:
         return [*planimetry, fixed(third, VALUE, decimals)]
 
 
-MATRIX = 33
-"""Columns of a row of a matrix: three numbers (1X, E10.3)."""
+MATRIX = 33  # Columns of a row of a matrix: three numbers (1X, E10.3)
 
 
 def matrix_rows(covariance: Floats | None) -> Sequence[str]:

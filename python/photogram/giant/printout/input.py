@@ -112,8 +112,7 @@ def _entry(space: Space, point: GroundPoint, default_sd: tuple[float, float, flo
     ]
 
 
-ACROSS = 4
-"""Plate coordinates, or names of points, on a line."""
+ACROSS = 4  # Plate coordinates, or names of points, on a line
 
 
 @dataclass(frozen=True)

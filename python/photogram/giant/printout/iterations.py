@@ -56,8 +56,7 @@ def _numbers(values: Values) -> str:
     return "".join(fixed(value, 16, 9) for value in values)
 
 
-ACROSS = 10
-"""Frames on a line."""
+ACROSS = 10  # Frames on a line
 
 
 @dataclass(frozen=True)

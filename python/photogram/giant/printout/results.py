@@ -20,8 +20,7 @@ from photogram.giant.printout.forms import (
     paginate,
 )
 
-POSITION, ATTITUDE = VALUE + 5, VALUE + 7
-"""Columns of `LNG =` and `OMEGA =` with their values."""
+POSITION, ATTITUDE = VALUE + 5, VALUE + 7  # Columns of `LNG =` and `OMEGA =` with their values
 
 
 def station_pages(
@@ -69,8 +68,7 @@ def _station(
 
 
 TITLE = "TRIANGULATED GROUND POINTS"
-IDENT = 18
-"""Columns of the name and the mark of control."""
+IDENT = 18  # Columns of the name and the mark of control
 
 
 def point_pages(space: Space, names: Sequence[str], marks: Sequence[str], positions: Floats) -> list[Page]:
@@ -149,8 +147,7 @@ def _summary(space: Space, deviations: Floats, counted: Bools) -> list[str]:
     ]
 
 
-ACROSS = 4
-"""Points on a line."""
+ACROSS = 4  # Points on a line
 
 
 def correction_pages(

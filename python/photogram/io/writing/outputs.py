@@ -124,13 +124,6 @@ class OutputSet:
     ----------
     inputs
         Files that are read: none is written over.
-
-    Raises
-    ------
-    InputError
-        An output is an input, a directory, or another output.
-    OSError
-        A file cannot be written; the error names it as the caller did.
     """
 
     def __init__(self, inputs: Iterable[Path] = ()) -> None:
@@ -268,8 +261,7 @@ class OutputSet:
                 _live.remove(self)
 
 
-_live: list[OutputSet] = []
-"""Those at work, for a signal that ends the process."""
+_live: list[OutputSet] = []  # Those at work, for a signal that ends the process
 
 
 def abandon_all() -> None:
@@ -279,15 +271,7 @@ def abandon_all() -> None:
 
 
 def write_whole(files: Mapping[Path, Content]) -> None:
-    """Write contents by path so that all are there, or none.
-
-    Raises
-    ------
-    InputError
-        An output is a directory, or another output.
-    OSError
-        A file cannot be written; what was there has not changed.
-    """
+    """Write contents by path so that all are there, or none."""
     with OutputSet() as outputs:
         for path, content in files.items():
             outputs.write(path, content)

@@ -47,13 +47,7 @@ class Staging:
         self._lock: int | None = None
 
     def begin(self) -> None:
-        """Make the directory; :meth:`remove` is called whatever happens.
-
-        Raises
-        ------
-        OSError
-            It cannot be made.
-        """
+        """Make the directory; :meth:`remove` is called whatever happens."""
         for _ in range(TRIALS):
             if self._begin():
                 return

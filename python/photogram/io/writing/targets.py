@@ -13,31 +13,18 @@ from pathlib import Path
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 
-MOST_LINKS = 40
-"""Symbolic links that are followed, as by Linux."""
+MOST_LINKS = 40  # Symbolic links that are followed, as by Linux
 _Identity = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where the bytes of an output go.
+    """Where the bytes of an output go."""
 
-    Attributes
-    ----------
-    given
-        The path as the user wrote it; errors name it.
-    place
-        The path after all symbolic links.
-    status
-        Of what stands there; None where nothing does.
-    descriptor
-        A descriptor of this process that the path means, as `/dev/stdout` does.
-    """
-
-    given: Path
-    place: str
-    status: os.stat_result | None
-    descriptor: int | None = None
+    given: Path  # The path as the user wrote it; errors name it
+    place: str  # The path after all symbolic links
+    status: os.stat_result | None  # Of what stands there; None where nothing does
+    descriptor: int | None = None  # A descriptor of this process that the path means, as `/dev/stdout` does
 
     @property
     def regular(self) -> bool:
@@ -60,15 +47,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def follow(path: Path) -> Target:
-    """Find out where an output goes.
-
-    Raises
-    ------
-    InputError
-        The path is a directory, or no path at all.
-    OSError
-        Its symbolic links form a loop, or its name is too long.
-    """
+    """Find out where an output goes."""
     if "\0" in str(path):
         raise InputError("a path cannot hold a NUL character", file=path)
     with naming(path):
@@ -126,15 +105,7 @@ class Guard:
             self._above |= {_spelling(place), *_above(place)}
 
     def add(self, path: Path) -> Target:
-        """Return where an output goes.
-
-        Raises
-        ------
-        InputError
-            It cannot be what it is to be.
-        OSError
-            Its name is too long, or a loop of symbolic links.
-        """
+        """Return where an output goes."""
         target = follow(path)
         if not target.regular:
             return target

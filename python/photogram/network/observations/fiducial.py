@@ -15,8 +15,7 @@ from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
 from photogram.network.observations.observation import Observation
 from photogram.network.unknowns import Unknown
 
-FILM = ("t1", "t2", "theta", "m", "b1", "b2")
-"""The unknowns of the film of a photo: mm, radians, ratios."""
+FILM = ("t1", "t2", "theta", "m", "b1", "b2")  # The unknowns of the film of a photo: mm, radians, ratios
 
 
 @dataclass(frozen=True, eq=False)
