@@ -8,7 +8,7 @@ towards the viewer; the camera looks along -z. Whatever numbers a file or a user
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,8 +45,6 @@ _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
 """F: vision axes (x right, y down, z forward) from photo axes, and back."""
 _ORTHONORMAL = 1e-6  # What the product of a matrix with its transpose may differ from the identity by
 _LEAST_LENGTH = 1e-100  # Of a quaternion: the square of a shorter one is not a number to divide by
-
-_Numbers: TypeAlias = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,14 +126,27 @@ class Attitudes:
         """
         one_of("representation", representation, get_args(Representation))
         if representation.startswith("matrix"):
-            matrices = _from_matrices(representation, values)
+            matrices = shaped("values", values, (length("values", values), 3, 3))
+            _check_orthonormal(matrices)
+            # One step of Newton's method for the nearest orthonormal matrix: files hold few digits.
+            matrices = matrices @ (3.0 * np.eye(3) - matrices.transpose(0, 2, 1) @ matrices) / 2.0
+            matrices = _FROM[representation](matrices)
             return cls(matrices, None if covariances is None else numbers("covariances", covariances))
-        found, rates = _from_numbers(representation, values, _boresight(mounting))
+        boresight = _boresight(mounting)
+        rows = numbers("values", values)
+        if not np.isfinite(rows).all():
+            raise InputError("values has numbers that are not finite")
+        if representation.startswith("quaternion") and rows.ndim == 2:
+            short = np.flatnonzero(np.hypot.reduce(rows, axis=1) < _LEAST_LENGTH)
+            if short.size:
+                raise InputError(f"the quaternion of row {short[0]} has no length")
+        # The partials are of the rotation step by the numbers.
+        matrices, partials = _photocore.attitudes_from_numbers(representation, rows, boresight)
         if covariances is None:
-            return cls(found)
-        width = rates.shape[2]
-        own = shaped("covariances", covariances, (len(found), width, width))
-        return cls(found, rates @ own @ rates.transpose(0, 2, 1))
+            return cls(matrices)
+        width = partials.shape[2]
+        covariances = shaped("covariances", covariances, (len(matrices), width, width))
+        return cls(matrices, partials @ covariances @ partials.transpose(0, 2, 1))
 
     def values(
         self, representation: Representation, *, mounting: Mounting | ArrayLike = "top forward"
@@ -146,8 +157,10 @@ class Attitudes:
         of them is zero. Of quaternions w is not negative. Arguments are those of :meth:`of`.
         """
         one_of("representation", representation, get_args(Representation))
+        if representation == "matrix_to_vision":
+            return np.asarray(_TO_VISION @ self.matrices.transpose(0, 2, 1))
         if representation.startswith("matrix"):
-            return _to_matrices(representation, self.matrices)
+            return _FROM[representation](self.matrices)
         return _photocore.numbers_of_attitudes(representation, self.matrices, _boresight(mounting))[0]
 
     def covariances(
@@ -189,38 +202,12 @@ class Attitudes:
         return np.asarray(-np.einsum("nji,nj->ni", self.values("matrix_to_vision"), shifts))
 
 
-def _from_numbers(representation: str, values: ArrayLike, boresight: Floats) -> _Numbers:
-    """Matrices A, and the partials of the rotation step by the numbers."""
-    given = numbers("values", values)
-    if not np.isfinite(given).all():
-        raise InputError("values has numbers that are not finite")
-    if representation.startswith("quaternion") and given.ndim == 2:
-        short = np.flatnonzero(np.hypot.reduce(given, axis=1) < _LEAST_LENGTH)
-        if short.size:
-            raise InputError(f"the quaternion of row {short[0]} has no length")
-    return _photocore.attitudes_from_numbers(representation, given, boresight)
-
-
 _FROM: dict[str, Callable[[Floats], Floats]] = {
     "matrix": lambda a: a,
     "matrix_to_photo": lambda a: a.transpose(0, 2, 1),
     "matrix_to_vision": lambda a: a.transpose(0, 2, 1) @ _TO_VISION,
     "matrix_from_vision": lambda a: a @ _TO_VISION,
 }
-
-
-def _from_matrices(representation: str, values: ArrayLike) -> Floats:
-    given = shaped("values", values, (length("values", values), 3, 3))
-    _check_orthonormal(given)
-    # One step of Newton's method for the nearest orthonormal matrix: files hold few digits.
-    found: Floats = given @ (3.0 * np.eye(3) - given.transpose(0, 2, 1) @ given) / 2.0
-    return _FROM[representation](found)
-
-
-def _to_matrices(representation: str, attitudes: Floats) -> Floats:
-    if representation == "matrix_to_vision":
-        return np.asarray(_TO_VISION @ attitudes.transpose(0, 2, 1))
-    return _FROM[representation](attitudes)
 
 
 def _check_orthonormal(matrices: Floats) -> None:

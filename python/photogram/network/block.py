@@ -231,7 +231,13 @@ class Block(Valued, Brief):
             "photo_attitude_sd": (photos, 3),
             "point_sd": (points, 3),
         }
-        self._check_cameras(photos)
+        self._set("cameras", checked_cameras(self.cameras))
+        if not self.cameras and self.photo_cameras is not None:
+            raise InputError("photo_cameras is given, but no cameras")
+        if self.cameras:
+            if self.principal_distances is not None:
+                raise InputError("principal_distances and cameras are both given: the cameras have them")
+            self._set("photo_cameras", frozen(photo_indices(self.photo_cameras, self.cameras, photos)))
         for name, shape in shapes.items():
             if name == "principal_distances" and self.cameras:
                 continue
@@ -254,16 +260,6 @@ class Block(Valued, Brief):
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
-
-    def _check_cameras(self, photos: int) -> None:
-        self._set("cameras", checked_cameras(self.cameras))
-        if not self.cameras:
-            if self.photo_cameras is not None:
-                raise InputError("photo_cameras is given, but no cameras")
-            return
-        if self.principal_distances is not None:
-            raise InputError("principal_distances and cameras are both given: the cameras have them")
-        self._set("photo_cameras", frozen(photo_indices(self.photo_cameras, self.cameras, photos)))
 
     def _check_values(self) -> None:
         owners = {"photo": self.photo_ids, "princ": self.photo_ids, "point": self.point_ids}
@@ -337,15 +333,6 @@ class Block(Valued, Brief):
             if not isinstance(self.refraction, Refraction):
                 raise InputError(f"refraction is a Refraction or None, not {shown(self.refraction)}")
             metres_per_unit(self.linear_unit)
-
-    def _check_mounts(self) -> None:
-        self._set("mounts", checked_mounts(self.mounts, self.photo_ids))
-        if not self.mounts:
-            return
-        mounted = np.isin(self.photo_ids, [each.photo for each in self.mounts])[:, np.newaxis]
-        why = "is weighted or fixed, but the photo is on a frame, whose pose and sensor it has"
-        for name in ("photo_position_sd", "photo_attitude_sd"):
-            self._refuse(name, mounted & np.isfinite(getattr(self, name)), why, self.photo_ids)
 
     def _check_timed(self) -> None:
         self._set("timed", checked_timed(self.timed, self.photo_ids))
@@ -431,30 +418,33 @@ class Block(Valued, Brief):
         for row, each in enumerate(self.observations):
             if not isinstance(each, Observation) or not each.KIND:
                 raise InputError(f"observations[{row}] is no observation: {shown(each)}")
-        self._check_mounts()
+        self._set("mounts", checked_mounts(self.mounts, self.photo_ids))
+        if self.mounts:
+            mounted = np.isin(self.photo_ids, [mount.photo for mount in self.mounts])[:, np.newaxis]
+            why = "is weighted or fixed, but the photo is on a frame, whose pose and sensor it has"
+            for name in ("photo_position_sd", "photo_attitude_sd"):
+                self._refuse(name, mounted & np.isfinite(getattr(self, name)), why, self.photo_ids)
         self._check_timed()
         self._check_motions()
         self._set("passages", checked_passages(self.passages, self.point_ids, self.photo_ids))
         self._set("observations", with_smoothness(self.observations, self.trajectories))
         self._set("observations", with_knots(self.observations, self.cameras))
         _ = self.observation_groups  # refuses what observations name and the block has not
-        self._check_figures()
+        figures = {
+            name: figure.title
+            for figure in self.passages
+            if isinstance(figure, Figure)
+            for name in figure.points
+        }
+        touched = {name for row in self.observations for name in row.points} if figures else set()
+        for row, name in enumerate(self.point_ids if figures else ()):
+            if name in figures and (self.point_sd[row].any() or name in touched):
+                raise InputError(
+                    f"the point {name} of the {figures[name]} is free, weighted or observed beside images:"
+                    " its coordinates are given, and point_sd is 0"
+                )
         of_photos = self.photo_cameras if self.cameras else None
         check_scans(self.passages, self.photo_ids, self.cameras, of_photos, self.image_photos)
-
-    def _check_figures(self) -> None:
-        named = {
-            name: each.title for each in self.passages if isinstance(each, Figure) for name in each.points
-        }
-        if not named:
-            return
-        touched = {name for each in self.observations for name in each.points}
-        for row, name in enumerate(self.point_ids):
-            if name in named and (self.point_sd[row].any() or name in touched):
-                raise InputError(
-                    f"the point {name} of the {named[name]} is free, weighted or observed beside images: its"
-                    " coordinates are given, and point_sd is 0"
-                )
 
     def _refuse(self, name: str, bad: NDArray[np.bool_], why: str, owners: list[str] | None) -> None:
         if bad.any():

@@ -264,7 +264,15 @@ class Camera(Valued, Brief):
         else:
             own = number(f"sd of the camera {self.title}", self.sd)
             given = {name: own for name in self.names if name not in self.constants}
-        given |= self._of_covariance(given if isinstance(self.sd, Mapping) else {})
+        if self.covariance is not None:
+            names, matrix = self.covariance
+            deviations = dict(zip(names, np.sqrt(np.diag(np.asarray(matrix))).tolist(), strict=True))
+            for name in given.keys() & deviations.keys() if isinstance(self.sd, Mapping) else ():
+                if not math.isclose(given[name], deviations[name], rel_tol=1e-9):
+                    raise InputError(
+                        f"sd of {name} of the camera {self.title} is not that of its covariance matrix"
+                    )
+            given |= deviations
         for name, value in given.items():
             if not value >= 0:
                 raise InputError(f"sd of {name} of the camera {self.title} is no standard deviation: {value}")
@@ -293,19 +301,6 @@ class Camera(Valued, Brief):
         if not is_covariance(found):
             raise InputError(f"{what} is not symmetric and positive definite: {found.tolist()}")
         return listed, found
-
-    def _of_covariance(self, given: Mapping[str, float]) -> dict[str, float]:
-        """Return the standard deviations that the covariance matrix has."""
-        if self.covariance is None:
-            return {}
-        names, matrix = self.covariance
-        own = dict(zip(names, np.sqrt(np.diag(np.asarray(matrix))).tolist(), strict=True))
-        for name in given.keys() & own.keys():
-            if not math.isclose(given[name], own[name], rel_tol=1e-9):
-                raise InputError(
-                    f"sd of {name} of the camera {self.title} is not that of its covariance matrix"
-                )
-        return own
 
     @property
     def prior_covariance(self) -> Floats | None:

@@ -51,7 +51,19 @@ def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
     directions = image_directions(block)
     seen = (directions[:, 2] < _SIDE) & pictured
     if 2 * np.count_nonzero(seen) < np.count_nonzero(pictured):
-        tangents, seen = _near_axis(block), pictured
+        # The tangents -u1/u3, -u2/u3 as if cameras were everywhere what they are near the axis.
+        tangents, seen = np.empty_like(block.image_xy), pictured
+        image_cameras = block.photo_cameras[block.image_photos]
+        for row, camera in enumerate(block.cameras):
+            middle, right, up = camera.project([[0.0, 0.0, -1.0], [_SMALL, 0.0, -1.0], [0.0, _SMALL, -1.0]])
+            linear = np.column_stack([right - middle, up - middle]) / _SMALL
+            if not abs(np.linalg.det(linear)) > 0:
+                raise InputError(
+                    f"the camera {camera.name} shows all that is near its axis in one point: its f or c is"
+                    " wrong"
+                )
+            of_camera = image_cameras == row
+            tangents[of_camera] = np.linalg.solve(linear, (block.image_xy[of_camera] - middle).T).T
     else:
         tangents = -directions[:, :2] / directions[:, 2:]
     scales = block.camera_scales()
@@ -63,22 +75,6 @@ def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
         **image_rows(block, seen) | {"image_xy": (scales[block.image_photos, np.newaxis] * tangents)[seen]},
     )
     return plain, seen
-
-
-def _near_axis(block: Block) -> Floats:
-    """(m, 2) tangents -u1/u3, -u2/u3 of images, as if cameras were everywhere what they are near the axis."""
-    tangents = np.empty_like(block.image_xy)
-    of_images = np.asarray(block.photo_cameras)[block.image_photos]
-    for row, camera in enumerate(block.cameras):
-        middle, right, up = camera.project([[0.0, 0.0, -1.0], [_SMALL, 0.0, -1.0], [0.0, _SMALL, -1.0]])
-        linear = np.column_stack([right - middle, up - middle]) / _SMALL
-        own = of_images == row
-        if not abs(np.linalg.det(linear)) > 0:
-            raise InputError(
-                f"the camera {camera.name} shows all that is near its axis in one point: its f or c is wrong"
-            )
-        tangents[own] = np.linalg.solve(linear, (block.image_xy[own] - middle).T).T
-    return tangents
 
 
 def direction_deviations(block: Block) -> Floats:

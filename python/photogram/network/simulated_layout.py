@@ -77,12 +77,6 @@ def laid_out(
     columns = max(1, round(base * math.sqrt(density)))
     rows = max(1, round(density * base * separation / columns))
     plan = Layout(strips, photos_per_strip, base, separation, columns, rows, reach)
-    _check_size(plan, footprint, points_per_photo)
-    return plan
-
-
-def _check_size(plan: Layout, footprint: float, points_per_photo: float) -> None:
-    """Refuse a plan with far more image points than were asked for, or than there is memory for."""
     dx, dy = plan.cell
     fewest = footprint**2 / (dx * dy)
     if fewest > _FAR_MORE * points_per_photo:
@@ -90,11 +84,11 @@ def _check_size(plan: Layout, footprint: float, points_per_photo: float) -> None
             "forward_overlap and side_overlap: with a column of points under every photo and a row in every"
             f" side overlap a photo shows about {fewest:.0f} points, not {points_per_photo:g}"
         )
-    photos = plan.strips * plan.photos_per_strip
     needed, available = _CANDIDATE_BYTES * _AT_ONCE + _IMAGE_BYTES * photos * fewest, available_memory()
     if available is not None and needed > available:
         gib = [f"{size / 2**30:.1f} GiB" for size in (needed, available)]
         raise InputError(f"the simulation takes {gib[0]} of memory, and {gib[1]} are free")
+    return plan
 
 
 def _covered_once(count: int, step: float, length: float) -> float:
@@ -220,12 +214,6 @@ def control_pattern(plan: Layout, terrain: Floats, pattern: str, spacing: int) -
             near = order[low:high]
             held[near[np.argmin(((terrain[near, :2] - place) ** 2).sum(axis=1))], components] = True
     return held
-
-
-def strip_ids(plan: Layout) -> list[str]:
-    """Return the names of the strips."""
-    digits = max(2, len(str(plan.strips)))
-    return [f"{strip:0{digits}d}" for strip in range(1, plan.strips + 1)]
 
 
 def photo_ids(plan: Layout) -> list[str]:

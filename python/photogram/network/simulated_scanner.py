@@ -15,7 +15,7 @@ from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.observations import Attitude, Observation, Position
 from photogram.network.projecting import projected, standing
 from photogram.network.simulated_images import Taken
-from photogram.network.simulated_layout import Layout, grid, photo_ids, strip_ids, window
+from photogram.network.simulated_layout import Layout, grid, photo_ids, window
 from photogram.network.simulated_motion import LineScanner, photo_angles, rotations_of
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
@@ -135,7 +135,9 @@ def _passes(layout: Layout, flown: Flown) -> Iterator[_Pass]:
     all_columns, all_rows = grid(layout)
     half = flown.frame_size / 2 / abs(flown.principal_distance) * flown.height
     scenes = flown.scanner.scenes
-    names = photo_ids(layout) if scenes else strip_ids(layout)
+    digits = max(2, len(str(layout.strips)))
+    strips = [f"{strip:0{digits}d}" for strip in range(1, layout.strips + 1)]
+    names = photo_ids(layout) if scenes else strips
     start = 0.0
     for row, name in enumerate(names):
         strip, number = divmod(row, layout.photos_per_strip) if scenes else (row, 0)

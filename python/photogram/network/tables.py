@@ -39,7 +39,8 @@ def table_arguments(
 ) -> dict[str, Any]:
     """Return arguments of a block from tables; :meth:`photogram.Block.from_tables` says what these have."""
     axes = RECTANGULAR_COLUMNS if spheroid is None else GEOGRAPHIC_COLUMNS
-    photo_ids = _photo_ids(photos)
+    has_names = _has(photos, "photos", "photo")
+    photo_ids = _name_column(photos, "photos", "photo") if has_names else numbered(_rows(photos, "photos"))
     image_point_names = _name_column(images, "images", "point")
     control_ids = _name_column(points, "points", "point") if points is not None else []
     control_ids = different("points", control_ids)
@@ -116,13 +117,6 @@ def _rows(table: Table, table_name: str) -> int:
     if not isinstance(column, Sized) or np.ndim(column) == 0:
         raise InputError(f"{table_name}, column {known} is not a list of names or numbers: {shown(column)}")
     return len(column)
-
-
-def _photo_ids(photos: Table) -> list[str]:
-    """Return the column of names; without it numbers from 0."""
-    if _has(photos, "photos", "photo"):
-        return _name_column(photos, "photos", "photo")
-    return numbered(_rows(photos, "photos"))
 
 
 def _name_column(table: Table, table_name: str, name: str) -> list[str]:

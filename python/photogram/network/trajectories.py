@@ -322,7 +322,15 @@ class Spline:
         if self.smooth is not None:
             found += self._differences(*self.smooth)
         if self.correlation is not None:
-            found += self._markov(*self.correlation)
+            time, sd = self.correlation
+            if not (0 < time < np.inf and 0 < sd < np.inf):
+                raise InputError(f"correlation is a time and a standard deviation: {self.correlation}")
+            knots, p = self._knots, self.degree
+            places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
+            found.append(([0], [1.0], sd))
+            for k, step in enumerate(np.diff(places).tolist()):
+                kept = float(np.exp(-step / time))
+                found.append(([k, k + 1], [-kept, 1.0], sd * float(np.sqrt(1 - kept**2))))
         return found
 
     def _differences(self, order: int, sd: float) -> list[tuple[list[int], list[float], float]]:
@@ -340,17 +348,6 @@ class Spline:
             factors = h**order * math.factorial(order) / gaps.prod(axis=1)
             step = (own[-1] - own[0]) / order
             found.append((list(range(k, k + order + 1)), factors.tolist(), sd * float(np.sqrt(h / step))))
-        return found
-
-    def _markov(self, time: float, sd: float) -> list[tuple[list[int], list[float], float]]:
-        if not (0 < time < np.inf and 0 < sd < np.inf):
-            raise InputError(f"correlation is a time and a standard deviation: {self.correlation}")
-        knots, p = self._knots, self.degree
-        places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
-        found = [([0], [1.0], sd)]
-        for k, step in enumerate(np.diff(places).tolist()):
-            kept = float(np.exp(-step / time))
-            found.append(([k, k + 1], [-kept, 1.0], sd * float(np.sqrt(1 - kept**2))))
         return found
 
 

@@ -73,7 +73,17 @@ class Observation:
     precision: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self._check_moment()
+        given = {name: getattr(self, name, None) for name in ("trajectory", "clock")}
+        for (name, value), kind in zip(given.items(), (Trajectory, Clock), strict=True):
+            if value is not None and not isinstance(value, kind):
+                raise InputError(f"the {name} of the {self.KIND} is no {kind.__name__}: {shown(value)}")
+        if given["clock"] is not None and given["trajectory"] is None:
+            raise InputError(f"the {self.KIND} has a clock, {given['clock'].name}, but is of no trajectory")
+        if hasattr(self, "time"):
+            time = number(f"time of the {self.KIND}", self.time)
+            if not np.isfinite(time):
+                raise InputError(f"time of the {self.KIND} is not finite: {time}")
+            self._set("time", time)
         moment = self.moment
         self._set("points", tuple(names(self.KIND, [getattr(self, name) for name in self.POINTS])))
         of = [getattr(self, name) for name in self.PHOTOS]
@@ -101,20 +111,6 @@ class Observation:
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
-
-    def _check_moment(self) -> None:
-        """Refuse what is no trajectory, no time or no clock, and a clock without a trajectory."""
-        given = {name: getattr(self, name, None) for name in ("trajectory", "clock")}
-        for (name, value), kind in zip(given.items(), (Trajectory, Clock), strict=True):
-            if value is not None and not isinstance(value, kind):
-                raise InputError(f"the {name} of the {self.KIND} is no {kind.__name__}: {shown(value)}")
-        if given["clock"] is not None and given["trajectory"] is None:
-            raise InputError(f"the {self.KIND} has a clock, {given['clock'].name}, but is of no trajectory")
-        if hasattr(self, "time"):
-            time = number(f"time of the {self.KIND}", self.time)
-            if not np.isfinite(time):
-                raise InputError(f"time of the {self.KIND} is not finite: {time}")
-            self._set("time", time)
 
     @property
     def moment(self) -> Moment | None:
