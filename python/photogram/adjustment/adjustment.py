@@ -257,7 +257,8 @@ def core_options(
     as_published = isinstance(tolerance, AsPublished)
     limit = tolerance.percent if isinstance(tolerance, AsPublished) else tolerance
     if max_iterations is None:
-        max_iterations = AS_PUBLISHED if as_published else most_iterations(row)
+        # Reweighting takes more iterations.
+        max_iterations = AS_PUBLISHED if as_published else 50 if row is None else 200
     check_iteration(ordering, max_iterations, limit)
     if unit_variance == "redundancy" and not covariance:
         raise InputError("unit_variance='redundancy' needs redundancy numbers: covariance=True")
@@ -338,8 +339,12 @@ def messages_of(
     """Return what a result remarks on, but for hints."""
     messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
     messages += remark(options.loss, solution.image_weights)
-    if options.criterion == "percent":
-        messages += _rises([Iteration(*row) for row in solution.iterations])
+    iterations = [Iteration(*row) for row in solution.iterations] if options.criterion == "percent" else []
+    for before, after in pairwise(iterations):
+        percent = 100 * (after.weighted_sum_of_squares / before.weighted_sum_of_squares - 1)
+        if percent > NOTABLE_RISE:
+            rise = f"the weighted sum of squares rose by {percent:.2g} percent in iteration {after.number}"
+            messages.append(Message(rise))
     return messages
 
 
@@ -354,11 +359,6 @@ def teller(
         progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
 
     return tell
-
-
-def most_iterations(loss: tuple[str, float] | None) -> int:
-    """Return how many iterations there are at the most where nobody says it: reweighting takes more."""
-    return 50 if loss is None else 200
 
 
 def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
@@ -400,20 +400,6 @@ def _left_out(dropped: Mapping[str, str]) -> list[Message]:
     for point, reason in dropped.items():
         by_reason.setdefault(reason, []).append(point)
     return [Message(f"left out, {reason}: {', '.join(names)}") for reason, names in by_reason.items()]
-
-
-def _rises(iterations: list[Iteration]) -> list[Message]:
-    """Remark on iterations after which the sum of squares was larger than before, rounding apart."""
-    messages = []
-    for before, after in pairwise(iterations):
-        percent = 100 * (after.weighted_sum_of_squares / before.weighted_sum_of_squares - 1)
-        if percent > NOTABLE_RISE:
-            messages.append(
-                Message(
-                    f"the weighted sum of squares rose by {percent:.2g} percent in iteration {after.number}"
-                )
-            )
-    return messages
 
 
 def named(

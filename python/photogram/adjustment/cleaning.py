@@ -146,7 +146,8 @@ def clean(
     settings = Settings(level=level, equality=False, probing=probing or Probing())
     factors = np.ones(grouping.count)
     snooped = snoop(network, level=level, threads=threads, **options)
-    if not _rejected(snooped.result):
+    test = snooped.result.global_test
+    if test is None or not (test.rejected_high or test.rejected_low):
         return Cleaned(snooped, None, names, factors, 0, settled=True)
     rounds, settled = 0, False
     while rounds < MOST_ROUNDS and not settled:
@@ -164,12 +165,6 @@ def clean(
     return Cleaned(snooped, found, names, factors, rounds, settled)
 
 
-def _rejected(result: AdjustedNetwork) -> bool:
-    """Whether the residuals that are left are larger or smaller than their weights allow."""
-    test = result.global_test
-    return test is not None and (test.rejected_high or test.rejected_low)
-
-
 def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[Any, Grouping]:
     """Return what snooping has left of a network, and the groups of its observations."""
     left = result.given
@@ -181,7 +176,10 @@ def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[An
     observations = grouping.observations
     if len(observations) != len(left.observations):
         names = [_told(each) for each in network.observations]
-        rows = _rows(names, [_told(each) for each in left.observations])
+        rows, start = list[int](), 0
+        for observation in left.observations:  # in the same order
+            rows.append(names.index(_told(observation), start))
+            start = rows[-1] + 1
         observations = observations[rows]
     return left, replace(grouping, images=grouping.images[places], observations=observations)
 
@@ -189,16 +187,6 @@ def _left(network: Any, grouping: Grouping, result: AdjustedNetwork) -> tuple[An
 def _told(observation: Any) -> tuple[object, ...]:
     """Return what tells an observation from others whatever its weight is."""
     return (observation.label, observation.of, observation.observed.tobytes())
-
-
-def _rows(names: list[tuple[object, ...]], left: list[tuple[object, ...]]) -> list[int]:
-    """Return the places of those that are left among all, both in the same order."""
-    rows, start = [], 0
-    for name in left:
-        start = names.index(name, start)
-        rows.append(start)
-        start += 1
-    return rows
 
 
 def _changed(found: VarianceComponents, names: Sequence[str], factors: Floats) -> Floats:
@@ -217,7 +205,6 @@ def _changed(found: VarianceComponents, names: Sequence[str], factors: Floats) -
 
 
 def _out(snooped: Snooped) -> set[str]:
-    """Return what is out, by name."""
     return {entry.name for entry in snooped.removed}
 
 

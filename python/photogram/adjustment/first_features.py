@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from photogram.network.geometry import Cartesian
 from photogram.network.observations import Attitude, Observation
 from photogram.network.observations.observation import with_unknowns
 from photogram.network.rays import meet
-from photogram.network.rigs import Mount
 from photogram.network.unknowns import Boresight, Level, Line, Plane, PlumbLine, Sensor, Unknown
 
 FLAT = 1e-3
@@ -43,14 +42,13 @@ def started(block: Block) -> Block:
         found[id(each)] = _FINDERS[type(each)](sites, each, own)
     return block.replace(
         observations=[with_unknowns(each, found) for each in block.observations],
-        mounts=[_on(each, found) for each in block.mounts],
+        mounts=[
+            replace(mount, sensor=sensor)
+            if isinstance(sensor := found.get(id(mount.sensor)), Sensor)
+            else mount
+            for mount in block.mounts
+        ],
     )
-
-
-def _on(mount: Mount, found: Mapping[int, Unknown]) -> Mount:
-    """Return a mount whose sensor has its values."""
-    sensor = found.get(id(mount.sensor))
-    return replace(mount, sensor=sensor) if isinstance(sensor, Sensor) else mount
 
 
 class _Sites:

@@ -81,7 +81,12 @@ def predict(
     )
     if not result.converged:
         raise AdjustmentError(f"the adjustment of computed image coordinates has {result.status}")
-    _check_agreement(result)
+    # Residuals of observations that do not agree with the given values are none of the network's.
+    for kind in result.kinds.values():
+        tests = np.abs(kind.residuals / kind.sd)
+        if (tests > _AGREES).any():
+            name = kind.names[int(np.argwhere(tests > _AGREES)[0][0])]
+            raise InputError(f"predict: the {kind.kind} of {name} does not agree with what is given")
     remark = Message("predicted: image coordinates are computed, not observed; residuals mean nothing")
     return replace(result, messages=[remark, *result.messages])
 
@@ -168,15 +173,6 @@ def _check_observations(block: Block) -> Block:
         if not (of_motion or (isinstance(each, _OF_POSES) and moving.issuperset(photos))):
             raise InputError(f"predict: the {each.KIND} is of no trajectory, which is not taken there")
     return block
-
-
-def _check_agreement(result: Result) -> None:
-    """Refuse observations that do not agree with what is given: their residuals are none of the network's."""
-    for kind in result.kinds.values():
-        tests = np.abs(kind.residuals / kind.sd)
-        if (tests > _AGREES).any():
-            name = kind.names[int(np.argwhere(tests > _AGREES)[0][0])]
-            raise InputError(f"predict: the {kind.kind} of {name} does not agree with what is given")
 
 
 def _check_positions(block: Block) -> None:

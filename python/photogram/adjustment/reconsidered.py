@@ -132,7 +132,6 @@ def _named(started: FirstValues) -> tuple[Phrase, ...]:
 
 
 def _returned(first: FirstValues, last: FirstValues) -> list[Message]:
-    """Say what has returned."""
     aside, missing = int(first.set_aside.sum()), len(first.missing)
     images, photos = aside - int(last.set_aside.sum()), missing - len(last.missing)
     said = []

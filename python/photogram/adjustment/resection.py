@@ -416,7 +416,6 @@ def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
 
 
 def _messages(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> list[Message]:
-    """Collect what a user should know before trusting the pose."""
     messages = []
     count = len(solution.alternatives)
     if count:

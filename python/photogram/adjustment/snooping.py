@@ -129,9 +129,25 @@ def snoop(
         Ctrl-C.
     """
     truth_value("parts", parts)
+    one_of("unit_weight", unit_weight, ("known", "unknown"))
+    if robust is not None:
+        truth_value("robust", robust)
+    family = number("level", level) if fdr is None else number("fdr", fdr)
+    if not 0 < family < 1:
+        raise InputError(
+            f"{'level' if fdr is None else 'fdr'} is a probability between 0 and 1, not {family:g}"
+        )
+    if whole_number("max_rounds", max_rounds) < 1:
+        raise InputError("there must be one round at least")
     return snooped_network(
         block,
-        settings_of(level, fdr, unit_weight, robust, max_rounds),
+        Settings(
+            level=family,
+            fdr=fdr is not None,
+            known=unit_weight == "known",
+            robust=robust,
+            max_rounds=max_rounds,
+        ),
         parts=parts,
         unit_variance=unit_variance,
         threads=threads,
@@ -153,29 +169,6 @@ def snooped_network(
 ) -> Snooped:
     """Take gross errors out of a network of any class; see :func:`snoop`."""
     raise InputError(f"snoop takes a Block or a Collection, not {type(network).__name__}")
-
-
-def settings_of(
-    level: float, fdr: float | None, unit_weight: str, robust: bool | None, max_rounds: int
-) -> Settings:
-    """Return checked options."""
-    one_of("unit_weight", unit_weight, ("known", "unknown"))
-    if robust is not None:
-        truth_value("robust", robust)
-    family = number("level", level) if fdr is None else number("fdr", fdr)
-    if not 0 < family < 1:
-        raise InputError(
-            f"{'level' if fdr is None else 'fdr'} is a probability between 0 and 1, not {family:g}"
-        )
-    if whole_number("max_rounds", max_rounds) < 1:
-        raise InputError("there must be one round at least")
-    return Settings(
-        level=family,
-        fdr=fdr is not None,
-        known=unit_weight == "known",
-        robust=robust,
-        max_rounds=max_rounds,
-    )
 
 
 @snooped_network.register

@@ -36,14 +36,9 @@ _ARRAYS = {"NDArray": NDArray, "np": np, "Floats": Floats, "Indices": Indices, "
 
 
 def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
-    """Let functions and classes check what they are called with.
+    """Let the `public` functions and classes among the globals of a module check their arguments.
 
-    Parameters
-    ----------
-    names
-        The globals of a module or package.
-    public
-        Which of them: functions get a checking one in their place, classes check what they are made of.
+    A function is replaced by a checking one; a class checks the arguments of its constructor.
     """
     for name in public:
         found = names[name]
@@ -56,15 +51,7 @@ def check_arguments(names: dict[str, Any], public: Iterable[str]) -> None:
 
 
 def check_members(kind: type, given: Mapping[str, Any]) -> None:
-    """Check what a class is to be made of as arguments are checked; nothing is converted.
-
-    Parameters
-    ----------
-    kind
-        The class.
-    given
-        Values by the names of its parameters.
-    """
+    """Check the values of a class by parameter name as arguments are checked; nothing is converted."""
     checks = _checks_of_class(kind)
     for name, value in given.items():
         made = checks.get(name, _anything)(name, value)

@@ -33,17 +33,8 @@ def shaped(
 ) -> NDArray[np.float64]:
     """Return an array of the given shape, which cannot be written; a single number stands for all of them.
 
-    Parameters
-    ----------
-    name
-        Of the argument, for messages.
-    value
-        Numbers: integers or floating-point numbers. Words, truth values and complex numbers are none, even
-        where NumPy would make numbers of them.
-    shape
-        What the array must have.
-    missing
-        Whether values may be missing: masked ones become NaN.
+    Words, truth values and complex numbers are not numbers, even if NumPy would convert them. If values may
+    be `missing`, masked ones become NaN.
     """
     array = numbers(name, value, missing=missing)
     if array.ndim == 0:
@@ -156,13 +147,8 @@ def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.
 def names(name: str, values: Iterable[object]) -> list[str]:
     """Return names as strings; whole numbers are names too.
 
-    Parameters
-    ----------
-    name
-        Of the argument, for messages.
-    values
-        Strings or whole numbers. A name that is missing in a table is None or NaN there; a column of whole
-        numbers with one missing has become one of floating-point numbers, and 1.0 is not the name 1.
+    A name that is missing in a table is None or NaN there; a column of whole numbers with one missing has
+    become one of floating-point numbers, and 1.0 is not the name 1.
     """
     no_row = isinstance(values, np.ndarray) and values.ndim != 1
     if no_row or isinstance(values, str | bytes) or not isinstance(values, Iterable):

@@ -47,7 +47,9 @@ def alike(a: object, b: object) -> bool:
     if a is b:
         return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        return _equal_arrays(np.asarray(a), np.asarray(b))
+        one, other = np.asarray(a), np.asarray(b)
+        alike_kinds = one.shape == other.shape and one.dtype.kind == other.dtype.kind
+        return alike_kinds and np.array_equal(one, other, equal_nan=one.dtype.kind in "fc")
     if type(a) is not type(b):
         return False
     if isinstance(a, Valued):
@@ -60,9 +62,3 @@ def alike(a: object, b: object) -> bool:
         strings = all(type(each) is str for each in a)  # of which there may be many
         return len(a) == len(b) and (a == b if strings else all(map(alike, a, b)))
     return bool(a == b) or (isinstance(a, float) and a != a and b != b)
-
-
-def _equal_arrays(a: np.ndarray[Any, Any], b: np.ndarray[Any, Any]) -> bool:
-    if a.shape != b.shape or a.dtype.kind != b.dtype.kind:
-        return False
-    return np.array_equal(a, b, equal_nan=a.dtype.kind in "fc")

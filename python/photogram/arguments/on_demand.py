@@ -15,14 +15,8 @@ def attach_checked(
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """Return `__getattr__`, `__dir__` and `__all__` of a package, as `lazy_loader.attach_stub` does.
 
-    Functions check their arguments.
-
-    Parameters
-    ----------
-    package, file
-        Its `__name__` and `__file__`: beside this is the list of names.
-    given
-        Classes that users make: they check what they are made of. Others are made by functions.
+    Functions check their arguments, and so do the classes `given`, which users make. Functions make the
+    others.
     """
     load, listed, public = lazy_loader.attach_stub(package, file)
 

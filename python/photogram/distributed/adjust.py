@@ -117,7 +117,9 @@ def adjust_in_parts(
     options = core_options(unit_variance, loss, covariance, tolerance, max_iterations)
     core_threads(threads)  # refused here, not by a worker
     block, options, row = _ready(block, options, datum)
-    if division.parts is None and division.cluster is None and _fits(block, division.memory_bytes):
+    room = None if division.parts is not None or division.cluster is not None else division.memory_bytes
+    # A block that fits as a whole is adjusted as a whole.
+    if room is not None and _counted(block, 1).factor_bytes[0] + WHOLE * len(block.image_xy) <= room:
         return adjust(
             block,
             datum=datum,
@@ -179,16 +181,10 @@ def _ready(
     return block, *with_datum(block, options, datum)
 
 
-def _fits(block: Block, room: int | None) -> bool:
-    """Whether a block fits as a whole into so many bytes, where they are given."""
-    return room is not None and _counted(block, 1).factor_bytes[0] + WHOLE * len(block.image_xy) <= room
-
-
 @contextmanager
 def _run(
     block: Block, options: CoreOptions, row: DatumRow | None, division: Division, threads: int | None
 ) -> Iterator[Run]:
-    """Open the run of a block."""
     if not math.isfinite(options.limit):  # which documents of a run have no way to write
         raise InputError("in parts the tolerance must be finite")
     with ExitStack() as stack:

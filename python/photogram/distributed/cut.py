@@ -127,7 +127,16 @@ def cut(positions: Floats, weights: Floats, incidences: Callable[[], Iterable[In
             middle = tree.spans[tree.children[node][0]][1]
             node_of[first:last] = node
             right[first:middle], right[middle:last] = 0, 1
-        near = np.flatnonzero(_boundary(owners, right[part], incidences())) if here else part[:0]
+        # The boundary: vertices that are free yet and share an edge with one beyond the cut.
+        boundary, side_of = np.zeros(len(owners), dtype=bool), right[part]
+        for incidence in incidences() if here else ():
+            free = (owners[incidence.vertices] < 0) & (side_of[incidence.vertices] >= 0)
+            vertices, edges = incidence.vertices[free], incidence.edges[free]
+            seen = np.zeros((2, incidence.count), dtype=bool)
+            seen[side_of[vertices], edges] = True
+            across = seen[0] & seen[1]
+            boundary[vertices[across[edges]]] = True
+        near = np.flatnonzero(boundary)
         nodes, sides = node_of[part[near]], right[part[near]]
         counts = np.bincount(2 * nodes + sides, minlength=2 * len(tree)).reshape(-1, 2)
         smaller = (counts[:, 1] < counts[:, 0]).astype(np.int64)
@@ -168,19 +177,6 @@ def joined(count: int, together: Iterable[tuple[int, ...]]) -> Indices:
     for each in touched:
         found[each] = least(each)
     return found
-
-
-def _boundary(owners: Indices, right: Indices, incidences: Iterable[Incidence]) -> np.ndarray:
-    """Return (V,) which vertices are free yet and share an edge with one beyond the cut."""
-    boundary = np.zeros(len(owners), dtype=bool)
-    for each in incidences:
-        free = (owners[each.vertices] < 0) & (right[each.vertices] >= 0)
-        vertices, edges = each.vertices[free], each.edges[free]
-        seen = np.zeros((2, each.count), dtype=bool)
-        seen[right[vertices], edges] = True
-        across = seen[0] & seen[1]
-        boundary[vertices[across[edges]]] = True
-    return boundary
 
 
 def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -66,32 +66,6 @@ class Mover:
             arrays = {"values": moved[rows], "b": b[:, rows], "t": t[:, rows]}
             found.append({**arrays, "condition": np.array(condition), "staying": staying})
         return found
-
-
-def rights_of(b: Floats, outer: Indices, children: Sequence[Indices], left: Sequence[Floats]) -> Floats:
-    """Return (d, N) right-hand sides of a node: B of what is at home there, and what its children have left.
-
-    `outer` and `children` say where outer unknowns stand, and those of each child, which has left (d, S).
-    """
-    rights = b.copy()
-    rights[:, outer] = 0.0
-    for rows, each in zip(children, left, strict=True):
-        rights[:, rows] += each
-    return rights
-
-
-def with_columns(prediction: Mapping[str, float], size: int, outer: int, columns: int) -> dict[str, float]:
-    """Return what work and memory a node takes that also has so many columns for a datum.
-
-    `size` and `outer` are the unknowns of a state, and the outer ones.
-    """
-    if not columns:
-        return dict(prediction)
-    kept, sent = 8.0 * size * (columns + LANES), 8.0 * columns * outer
-    # B, T, W and copies of them in the order of the core.
-    more = {"factor_bytes": kept, "memory_bytes": kept + 6.0 * 8.0 * columns * size}
-    more |= {"contribution_bytes": sent, "cofactor_bytes": sent}
-    return {name: value + more.get(name, 0.0) for name, value in prediction.items()}
 
 
 def local_row(row: DatumRow, photos: Indices, points: Indices) -> DatumRow:

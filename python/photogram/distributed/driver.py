@@ -178,7 +178,12 @@ class Driver:
         course, damping = self._course, up.at.damping
         after, course.chord = self._step(up), None
         if change > RULES["far"] * math.sqrt(self._unknowns[4]):
-            after = self._relocated(after)
+            # Points are intersected anew if that lowers the sum of squares.
+            other = self._new_state()
+            sums = np.array(self._walks.all(relocated, after, other, phase="solve"))
+            before, moved = sums.sum(axis=0).tolist()
+            self._walks.remove(after if moved < before else other)
+            after = other if moved < before else after
         elif chord and self._unknowns[5] and not self.stop.reweighted:
             after = self._with_chord(up, after, change)
         self._walks.forget(up)
@@ -267,7 +272,12 @@ class Driver:
             datum = None if up.products is None else InDatum(up.products, last)
             self._walks.invert(up, after, variance, datum)
             if self.stop.unit_variance == "redundancy":
-                freedom, variance = self._settled(sums)
+                # The nodes scale what they have found by q / r, of all but photos (docs/weights.md).
+                numbers = self._walks.all(redundancies, phase="invert")
+                freedom = math.fsum(share for _, *measured in numbers for share in measured)
+                variance = sum(sums[1:]) / freedom if freedom > RULES["least_redundancy"] else None
+                self._walks.all(settled, variance, phase="invert")
+                freedom = round(freedom, 6)
         else:
             self._walks.all(finished, course.before, after, variance, phase="invert")
         self._walks.forget(up)
@@ -307,17 +317,6 @@ class Driver:
         if kind == "redundancy":  # these are known when all nodes are inverted
             return freedom, None
         return freedom, total / freedom if freedom > 0 else None
-
-    def _settled(self, sums: tuple[float, float, float, float]) -> tuple[float, float | None]:
-        """Have the nodes scale what they have found by q / r, of all but photos (docs/weights.md).
-
-        Returns the sum of redundancy numbers r and the variance of unit weight; None without redundancy.
-        """
-        found = self._walks.all(redundancies, phase="invert")
-        freedom = math.fsum(own for _, *measured in found for own in measured)
-        variance = sum(sums[1:]) / freedom if freedom > RULES["least_redundancy"] else None
-        self._walks.all(settled, variance, phase="invert")
-        return round(freedom, 6), variance
 
     def _counts(self) -> tuple[int, int, int, int, int, int]:
         found = self._walks.all(counted, phase="read")
@@ -361,11 +360,3 @@ class Driver:
     def _new_state(self) -> str:
         self._course.trials += 1
         return f"{self._course.trials}"
-
-    def _relocated(self, state: str) -> str:
-        """Return the state with points intersected anew, where that lowers the sum of squares."""
-        other = self._new_state()
-        sums = np.array(self._walks.all(relocated, state, other, phase="solve"))
-        before, moved = sums.sum(axis=0).tolist()
-        self._walks.remove(state if moved < before else other)
-        return other if moved < before else state

@@ -6,6 +6,7 @@ Scheduling, transport and retries on a cluster are those of `distributed`.
 from __future__ import annotations
 
 import logging
+import os
 import pickle
 import re
 import shutil
@@ -261,7 +262,7 @@ def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
     others = sorted({f"{address} has {each or 'none'}" for address, each in versions.items() if each != own})
     if others:
         raise InputError(f"all workers must have photogram {own}, as here: {'; '.join(others)}")
-    blind = [address for address, seen in client.run(_sees, str(folder)).items() if not seen]
+    blind = [address for address, seen in client.run(os.path.isdir, str(folder)).items() if not seen]
     if blind:
         raise InputError(
             f"the workers at {', '.join(sorted(blind))} do not see {folder}: parts and results lie on a disk"
@@ -301,7 +302,3 @@ def _held() -> int:
 
     shelf.clear_unless_used()
     return resident_memory() or 0
-
-
-def _sees(folder: str) -> bool:
-    return Path(folder).is_dir()

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from photogram.arguments.types import Indices
-from photogram.distributed.cut import Incidence, homes, joined
+from photogram.distributed.cut import Incidence, joined
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, flown_by
 from photogram.network.films import Scan
@@ -112,18 +112,6 @@ def incidence_of(block: Block) -> tuple[Incidence, Indices, Indices]:
         count,
     )
     return incidence, edges, np.array(of_observations, dtype=np.int64)
-
-
-def homes_of(block: Block, owners: Indices, root: int) -> Homes:
-    """Return the nodes where everything is at home.
-
-    `owners` are (P,) the nodes of photos, which do not count of those for which others stand; observations of
-    common unknowns alone belong to the `root`.
-    """
-    incidence, edges, of_observations = incidence_of(block)
-    found = homes(owners, incidence, root)
-    points = found[edges]
-    return Homes(owners[vertices_of(block)], points, points[block.image_points], found[of_observations])
 
 
 def shared_cameras(block: Block) -> Indices:

@@ -13,7 +13,7 @@ from photogram.arguments.types import Indices
 from photogram.distributed.datum import local_row
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.parts import Names, Part
-from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
+from photogram.distributed.run import read_manifest, read_node, result_folder
 from photogram.io.structure import Decoder, Encoder
 from photogram.lazy_dataclasses import replace
 from photogram.network.core_arrays import block_network
@@ -74,7 +74,11 @@ class CoreEngine:
         folder = result_folder(run, number)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / OUTCOME).unlink(missing_ok=True)
-        _write(folder, _result(part, manifest, solution, variance))
+        scaled = cast("BlockSolution", _Scaled(part, solution, variance))
+        row = None if manifest.datum is None else local_row(manifest.datum, part.photos, part.points)
+        datum = datum_of(part.block, solution, row, held=manifest.held)
+        freedom = solution.degrees_of_freedom
+        _write(folder, _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], freedom))
         # The last of its files: with it the node is done.
         write_json(folder / OUTCOME, Encoder().value(_outcome(part, solution)))
 
@@ -103,7 +107,6 @@ class CoreEngine:
 
 
 def _write(folder: Path, result: Result) -> None:
-    """Write the result of a node."""
     for name, content in block_files(result).items():
         if isinstance(content, bytes):
             plain = content
@@ -117,14 +120,6 @@ def read_outcome(folder: Path) -> dict[str, Any]:
     path = folder / OUTCOME
     found: dict[str, Any] = Decoder([], path).value(read_json(path))
     return found
-
-
-def _result(part: Part, manifest: Manifest, solution: BlockSolution, variance: float | None) -> Result:
-    """Return the result of a node, scaled by the variance of unit weight of the whole."""
-    scaled = cast("BlockSolution", _Scaled(part, solution, variance))
-    row = None if manifest.datum is None else local_row(manifest.datum, part.photos, part.points)
-    datum = datum_of(part.block, solution, row, held=manifest.held)
-    return _OfNode.from_solution(part.block, scaled, manifest.options, datum, [], solution.degrees_of_freedom)
 
 
 class _OfNode(Result):

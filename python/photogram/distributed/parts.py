@@ -252,7 +252,9 @@ def read_part(folder: Path, sealed: str) -> Part:
     for table in TABLES:
         check_seal(folder / f"{table}.parquet", document["tables"][table], SETTINGS)
     sheets = {table: read_sheet(folder / f"{table}.parquet") for table in TABLES}
-    decoder = Decoder(_classes(), folder / SETTINGS)
+    single = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Reseau, Spheroid)
+    classes = [*single, *CLASSES, *_below(Observation), *_below(Passage), *_below(Unknown)]
+    decoder = Decoder(classes, folder / SETTINGS)
     given: dict[str, Any] = decoder.fields(document["block"], Block)
     common = tuple(decoder.value(document["common"]))
     for table, fields in TABLES.items():
@@ -271,11 +273,6 @@ def read_part(folder: Path, sealed: str) -> Part:
         np.array(document["unknowns"], dtype=np.int64),
         common,
     )
-
-
-def _classes() -> list[type]:
-    single = (Camera, Film, Frame, Mount, Pattern, Readings, Refraction, Reseau, Spheroid)
-    return [*single, *CLASSES, *_below(Observation), *_below(Passage), *_below(Unknown)]
 
 
 def _below(base: type) -> Iterator[type]:

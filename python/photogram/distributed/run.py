@@ -12,11 +12,11 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Floats, Indices
-from photogram.distributed.cut import Tree, cut, tree_of
+from photogram.distributed.cut import Tree, cut, homes, tree_of
 from photogram.distributed.files import read_json, write_json
 from photogram.distributed.graph import (
+    Homes,
     alone_of,
-    homes_of,
     incidence_of,
     photos_of_unknowns,
     shared_cameras,
@@ -105,15 +105,19 @@ def partition(
     block = with_flights(block)
     # A node has some of the observations of a drift only.
     block = block.replace(observations=with_epochs(block.observations))
-    incidence, _, _ = incidence_of(block)
+    incidence, edges, of_observations = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
     found = cut(places_of(block), images.astype(float), lambda: [incidence], parts)
-    homes = homes_of(block, found.owners, found.tree.root)
+    # Observations of common unknowns alone are at home in the root.
+    nodes = homes(found.owners, incidence, found.tree.root)
+    of_points = nodes[edges]
+    owners = found.owners[vertices_of(block)]
+    at_home = Homes(owners, of_points, of_points[block.image_points], nodes[of_observations])
     return divided(
         block,
         run,
         found.tree,
-        lambda node, below: part_of(block, homes, node, below),
+        lambda node, below: part_of(block, at_home, node, below),
         options,
         source,
         held,

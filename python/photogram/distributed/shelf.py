@@ -44,22 +44,16 @@ class Shelf:
         held = resident_memory()
         over = (sum(size for _, size in self._kept.values()) if held is None else held) + needed - memory
         given_up = False
-        for key in self._expendable(spared):
+        # Nodes, which are read again, are given up before factors. Of each what was used last goes first:
+        # walks over the tree come round, so that it is asked for last.
+        others = [key for key in reversed(self._kept) if key[1:3] != spared]
+        for key in sorted(others, key=lambda key: key[0] != "node"):
             if over <= 0:
                 break
             over -= self._kept.pop(key)[1]
             given_up = True
         if given_up:
             give_back()
-
-    def _expendable(self, spared: tuple[Any, ...]) -> list[tuple[Any, ...]]:
-        """Return what can be given up, in this order: nodes, which are read again, before factors.
-
-        Of each what was used last comes first: walks over the tree come round, so that it is asked for
-        last.
-        """
-        others = [key for key in reversed(self._kept) if key[1:3] != spared]
-        return sorted(others, key=lambda key: key[0] != "node")
 
     def drop(self, of: Callable[[tuple[Any, ...]], bool]) -> None:
         """Give up what some keys stand for."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.distributed.datum import InDatum, rights_of, with_columns
+from photogram.distributed.datum import LANES, InDatum
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.shelf import shelf
 from photogram.errors import InputError
@@ -140,7 +140,11 @@ def formed(job: Job, number: int, at: Point, contributions: Sequence[Contributio
         columns = products = None
         if "b" in state:
             below = [each.columns for each in contributions if each.columns is not None]
-            rights = rights_of(state["b"], node.outer, node.children, below)
+            # B of what is at home here, and what the children have left.
+            rights = state["b"].copy()
+            rights[:, node.outer] = 0.0
+            for rows, left in zip(node.children, below, strict=True):
+                rights[:, rows] += left
             columns, products = found.reduce(_plain(rights), threads=job.threads)
             columns = columns.reshape(len(rights), -1)
             # A node may have nothing to eliminate.
@@ -329,7 +333,15 @@ def predicted(job: Job, number: int) -> dict[str, float]:
 
 
 def _prediction(job: Job, node: Node) -> dict[str, float]:
-    return with_columns(node.prediction, len(node.initial), len(node.outer), job.columns)
+    """Return what work and memory a node takes, with its columns for a datum."""
+    if not job.columns:
+        return dict(node.prediction)
+    size = len(node.initial)
+    kept, sent = 8.0 * size * (job.columns + LANES), 8.0 * job.columns * len(node.outer)
+    # B, T, W and copies of them in the order of the core.
+    more = {"factor_bytes": kept, "memory_bytes": kept + 6.0 * 8.0 * job.columns * size}
+    more |= {"contribution_bytes": sent, "cofactor_bytes": sent}
+    return {name: value + more.get(name, 0.0) for name, value in node.prediction.items()}
 
 
 def _plain(values: Floats) -> Floats:

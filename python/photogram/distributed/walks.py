@@ -87,12 +87,13 @@ class Walks:
             self.executor.forget([*told, *handles.values()])
             raise
         self._places = [each.place for each in found]
+        products = [each.products for each in found if each.products is not None]
         return Up(
             at,
             handles,
             sum(each.sum_of_squares for each in found),
             sum(each.decrease for each in found),
-            _added([each.products for each in found if each.products is not None]),
+            np.sum(products, axis=0) if products else None,  # in the order of the nodes
         )
 
     def substitute(self, up: Up, task: Callable[[int, Floats], Handle]) -> None:
@@ -235,11 +236,6 @@ class Walks:
         """Tell of parts done."""
         if self._progress is not None:
             self._progress(Progress(phase, done, total, iteration))
-
-
-def _added(products: list[Floats]) -> Floats | None:
-    """Return a sum in the order of the nodes; None of nothing."""
-    return np.sum(products, axis=0) if products else None
 
 
 class Reforming:

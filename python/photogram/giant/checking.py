@@ -11,15 +11,12 @@ from photogram.diagnosis.findings import Finding, Section, Words
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.limits import Limits
 from photogram.giant.project import Project
-from photogram.network.block import Block
 
 """As the 1987 program printed them."""
 CODES = np.array([1, 2, 4])
 
 
 class _GuideWords(Words):
-    """Words of the guide."""
-
     sense = "COMMON column 2"
     order = "FRAMES"
     usual_um = (5.0, 15.0)
@@ -61,22 +58,18 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     why = "COMMON column 10 asks for intersection only" if common.intersection_only else ""
     options = {"unit_variance": common.unbiased_variance, "threads": threads}
     sections, result = check_block(block, Manner(options, _GuideWords(), why))
-    return Diagnosis(project.title, [_input(project, block, limits), *sections], result)
+    files = Section("Input", "Remarks on the files, and the warnings of the 1987 program.")
+    files.remark(
+        f"{len(block.photo_ids)} photos, {len(block.point_ids)} points, {len(block.image_xy)} images"
+    )
+    files.findings += [Finding("remark", "look", str(message)) for message in project.messages]
+    for warning in error_warnings(project, block, limits):
+        files.figure(warning.heading, ", ".join(warning.names))
+        text = f"{warning.heading.lower()}: {len(warning.names)}"
+        files.findings.append(Finding("warning", "look", text, [], warning.names))
+    return Diagnosis(project.title, [files, *sections], result)
 
 
 @check_of.register
 def _(network: Project, threads: int | None) -> Diagnosis:
     return check(network, threads=threads)
-
-
-def _input(project: Project, block: Block, limits: Limits | None) -> Section:
-    section = Section("Input", "Remarks on the files, and the warnings of the 1987 program.")
-    section.remark(
-        f"{len(block.photo_ids)} photos, {len(block.point_ids)} points, {len(block.image_xy)} images"
-    )
-    section.findings += [Finding("remark", "look", str(message)) for message in project.messages]
-    for warning in error_warnings(project, block, limits):
-        section.figure(warning.heading, ", ".join(warning.names))
-        text = f"{warning.heading.lower()}: {len(warning.names)}"
-        section.findings.append(Finding("warning", "look", text, [], warning.names))
-    return section

@@ -65,8 +65,18 @@ class Contents(Brief):
         InputError
             A value that does not fit its field, or a name that would lose its first character.
         """
-        self._check_names()
-        geographic = self.common.geographic
+        geographic, strip = self.common.geographic, self.common.strip
+        if strip:
+            names = {camera.name for camera in self.cameras} | {frame.name for frame in self.frames}
+            names |= {frame.name for frame in self.images} | {frame.camera for frame in self.images}
+            names |= {name for frame in self.images for name in frame.points}
+            names |= {point.name for point in self.ground}
+            # Stripping the beginning of a name would make another name of it.
+            for name in sorted(names):
+                if parse_name(name, strip) != name:
+                    raise InputError(
+                        f"the name {name!r} cannot be written: COMMON strips {strip!r} from the beginning"
+                    )
         writers: dict[str, Callable[[], list[str]]] = {
             "COMMON": lambda: common_records(self.common),
             "CAMERAS": lambda: camera_records(self.cameras),
@@ -75,18 +85,3 @@ class Contents(Brief):
             "GROUND": lambda: ground_records(self.ground, geographic),
         }
         return {name: written(name, writer) for name, writer in writers.items()}
-
-    def _check_names(self) -> None:
-        """Refuse names that would be read as others, because COMMON column 15 strips their beginning."""
-        strip = self.common.strip
-        if not strip:
-            return
-        names = {camera.name for camera in self.cameras} | {frame.name for frame in self.frames}
-        names |= {frame.name for frame in self.images} | {frame.camera for frame in self.images}
-        names |= {name for frame in self.images for name in frame.points}
-        names |= {point.name for point in self.ground}
-        for name in sorted(names):
-            if parse_name(name, strip) != name:
-                raise InputError(
-                    f"the name {name!r} cannot be written: COMMON strips {strip!r} from the beginning"
-                )

@@ -49,7 +49,18 @@ def block_files(
     distances = dict.fromkeys(of_photos)
     names = {distance: f"CAMERA{number}" for number, distance in enumerate(distances, 1)}
     cameras = [Camera(name, distance) for distance, name in names.items()]
-    frames = _frames(block, stations)
+    rows = zip(
+        block.photo_ids,
+        stations[0],
+        _turns(stations[1]),
+        _weights("the position of photo", block.photo_ids, block.photo_position_sd),
+        _weights("the attitude of photo", block.photo_ids, block.photo_attitude_sd),
+        strict=True,
+    )
+    frames = [
+        Frame(name, _triple(position), _triple(attitude), _triple(position_sd), _triple(attitude_sd))
+        for name, position, attitude, position_sd, attitude_sd in rows
+    ]
     images = _images(block, [names[distance] for distance in of_photos])
     return common, cameras, frames, images, _ground(block), messages
 
@@ -95,21 +106,6 @@ def _stations(block: Block) -> tuple[tuple[Floats, Floats], list[Message]]:
         stations.append(values)
     text = "FRAMES has one set of stations: observed values are written, initial values are not"
     return (stations[0], stations[1]), [Message(text)] if left else []
-
-
-def _frames(block: Block, stations: tuple[Floats, Floats]) -> list[Frame]:
-    rows = zip(
-        block.photo_ids,
-        stations[0],
-        _turns(stations[1]),
-        _weights("the position of photo", block.photo_ids, block.photo_position_sd),
-        _weights("the attitude of photo", block.photo_ids, block.photo_attitude_sd),
-        strict=True,
-    )
-    return [
-        Frame(name, _triple(position), _triple(attitude), _triple(position_sd), _triple(attitude_sd))
-        for name, position, attitude, position_sd, attitude_sd in rows
-    ]
 
 
 def _images(block: Block, cameras: list[str]) -> list[ImageFrame]:

@@ -108,19 +108,16 @@ def _coordinates(source: Source, numbers: list[int]) -> Floats:
     xy = np.column_stack([columns.real(11, 20), columns.real(21, 30)])
     plain = columns.plain & ~columns.blank(11, 20) & ~columns.blank(21, 30)
     for row in np.flatnonzero(~plain).tolist():
-        xy[row] = _careful_coordinates(source.record(numbers[row]))
+        record = source.record(numbers[row])
+        blank = [record.blank(first, first + 9) for first in (11, 21)]
+        if all(blank) or (any(blank) and not record.blank(31, 48)):
+            raise record.error(
+                "a point without coordinates; if it is a header, the terminator **** before it is missing"
+            )
+        if any(blank):
+            record.remark("a blank image coordinate is read as zero")
+        xy[row] = record.real(11, 20), record.real(21, 30)
     return xy
-
-
-def _careful_coordinates(record: Record) -> tuple[float, float]:
-    blank = [record.blank(first, first + 9) for first in (11, 21)]
-    if all(blank) or (any(blank) and not record.blank(31, 48)):
-        raise record.error(
-            "a point without coordinates; if it is a header, the terminator **** before it is missing"
-        )
-    if any(blank):
-        record.remark("a blank image coordinate is read as zero")
-    return record.real(11, 20), record.real(21, 30)
 
 
 def image_records(frames: Iterable[ImageFrame]) -> list[str]:

@@ -121,10 +121,6 @@ class ColumnTable:
                 raise self.error(
                     row, f"column {column}: {'is empty' if not name else f'{name!r} is no name'}"
                 )
-        self._check_alike(column, found)
-        return found
-
-    def _check_alike(self, column: str, found: Names) -> None:
         seen: dict[str, int] = {}
         for place, name in enumerate(found.names):
             plain = "".join(name.split()).casefold()
@@ -136,6 +132,7 @@ class ColumnTable:
                     f"column {column}: {quoted(name)} differs from {quoted(found.names[other])} by blanks or"
                     " case alone",
                 )
+        return found
 
     def names_once(self, column: str) -> list[str]:
         """Return a column of names as :meth:`names` has them, none of which may stand in two rows."""
@@ -174,18 +171,9 @@ class ColumnTable:
         infinite: bool = False,
         read: Callable[[str], float] | None = None,
     ) -> Floats:
-        """Return (rows,) a column of numbers.
+        """Return (rows,) a column of numbers; empty cells, and all cells of a missing column, are `default`.
 
-        Parameters
-        ----------
-        column
-            Its name.
-        default
-            For empty cells, and where the column is missing.
-        infinite
-            Whether `inf` is a number here.
-        read
-            Reads a cell in place of a plain number.
+        `infinite` permits `inf`; `read` reads a cell in place of :func:`finite_number`.
         """
         found = self.ready.get(column)
         if isinstance(found, np.ndarray):

@@ -15,15 +15,7 @@ _ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
 
 
 def csv_text(columns: Mapping[str, Sequence[Any] | Any], comments: Sequence[str] = ()) -> bytes:
-    """Return a table as text: a header and a line a row; empty cells for NaN and None.
-
-    Parameters
-    ----------
-    columns
-        Columns of one length by their names: arrays, or lists of numbers, texts and truth values.
-    comments
-        Lines before the header, marked as comments.
-    """
+    """Return a table as text: comments, a header, a line per row; empty cells for NaN and None."""
     head = [*(f"# {each}" for each in comments), ",".join(columns)]
     rows = _photocore.csv_rows([_column(column) for column in columns.values()])
     return ("\n".join(head) + "\n").encode() + rows

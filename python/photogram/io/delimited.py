@@ -45,20 +45,11 @@ def read_columns(
     spelling: Spelling = tuple,
     hint: Callable[[Sequence[str]], str] | None = None,
 ) -> ColumnTable:
-    """Read a table.
+    """Read a table from a text or Parquet file.
 
-    Parameters
-    ----------
-    path
-        The file: text, or Parquet by its ending.
-    known
-        Columns of which a header has one at least: it may then begin with the mark of a comment.
-    numbers
-        Columns of numbers, if the table has them: for the reader of large tables.
-    spelling
-        Gives the names of all columns from what the file calls them, in small letters.
-    hint
-        What is said of a first record that names no known column; None: that it does not.
+    A header contains at least one of the `known` columns: it may then begin with the mark of a comment. The
+    reader of large tables requires the columns of `numbers`. `spelling` returns the names of all columns from
+    those in the file (in small letters). `hint` returns the error of a first record without a known column.
     """
     if path.suffix == ".parquet":
         return _parquet(path, spelling, numbers)
@@ -87,14 +78,7 @@ def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool
 def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = ()) -> ColumnTable:
     """Read a table whose columns are known, after any comments, titles and headers.
 
-    Parameters
-    ----------
-    path
-        The file.
-    columns
-        Their names; empty for those that nobody asks for.
-    numbers
-        As in :func:`read_columns`.
+    Columns that are not used have empty names; `numbers` as in :func:`read_columns`.
     """
 
     def header(text: str) -> _Header:
@@ -159,8 +143,10 @@ def _head(
             if place is not None and known and _knows(place, known, spelling):
                 return place, _delimiter(place)
         if known and comment is None:
-            if (below := _below_titles(path, text, record, known, spelling)) is not None:
-                return below, _delimiter(below)
+            for number, row in enumerate(itertools.islice(_lines(text), record, TITLES), record + 1):
+                below = Place(path, number, row)
+                if len(set(known).intersection(_spelled(below, spelling))) > 2:
+                    return below, _delimiter(below)
             if hint is not None:
                 raise head.error(hint([cell.strip() for cell in _split(head, _delimiter(head))]))
             raise head.error(f"is no header: it names none of the columns {listed(sorted(known))}")
@@ -168,16 +154,6 @@ def _head(
     if comment is not None and _knows(comment, known, spelling):
         return comment, _delimiter(comment)
     raise Place(path).error("holds no table")
-
-
-def _below_titles(
-    path: Path, text: str, first: int, known: Collection[str], spelling: Spelling
-) -> Place | None:
-    for record, line in enumerate(itertools.islice(_lines(text), TITLES), 1):
-        place = Place(path, record, line)
-        if record > first and len(set(known).intersection(_spelled(place, spelling))) > 2:
-            return place
-    return None
 
 
 def _lines(text: str) -> Iterator[str]:

@@ -27,15 +27,7 @@ def is_whole_number(text: str) -> bool:
 
 
 def whole_number(text: str, lowest: int = 0, highest: int = LARGEST_INTEGER) -> int:
-    """Read a whole number that is not negative.
-
-    Parameters
-    ----------
-    text
-        Its digits.
-    lowest, highest
-        What it may be.
-    """
+    """Read a whole number between two limits, which is not negative by default."""
     if len(text) > LONGEST or not _WHOLE.fullmatch(text):
         raise ValueError(f"{quoted(text)} is not a whole number")
     value = int(text)

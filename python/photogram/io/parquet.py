@@ -88,15 +88,7 @@ class Sheet:
 
 
 def parquet_content(columns: Sequence[Column], about: Mapping[str, str]) -> Callable[[BinaryIO], None]:
-    """Return what writes a table to a file that is open.
-
-    Parameters
-    ----------
-    columns
-        Of one length, with different names.
-    about
-        Metadata of the table.
-    """
+    """Return a function that writes columns of one length, with metadata of the table, to an open file."""
     from pyarrow import parquet, types  # take long to import
 
     table = _table(columns, about)

@@ -130,16 +130,9 @@ class _Reader:
 
 
 def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
-    """Return what a label says, up to its `End` or the end of the text.
+    """Return the groups of a label, up to its `End` or the end of the text.
 
-    Parameters
-    ----------
-    text
-        The label.
-    file
-        Where it comes from, for errors.
-    numbers
-        Whether words that are numbers become numbers; if not, all values are texts as they stand there.
+    `numbers`: whether words that are numbers become numbers; if not, all values are the texts of the label.
     """
     reader = _Reader(text, file, numbers)
     label = Group("", "label")
@@ -183,7 +176,6 @@ def _close(reader: _Reader, open_groups: list[Group], kind: str, key: str, start
 
 
 def _value(reader: _Reader, key: str, depth: int = 0) -> Value:
-    """Read a value, with its unit if it has one."""
     opens = reader.token.kind == "sign" and reader.token.text in _OPENING
     value = _list(reader, key, depth) if opens else _scalar(reader, key)
     return Quantity(value, reader.take().text.strip()) if reader.token.kind == "unit" else value

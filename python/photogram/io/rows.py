@@ -82,16 +82,7 @@ class Table:
     ) -> Table:
         """Read a table whose first record names the columns.
 
-        Parameters
-        ----------
-        path
-            The file.
-        comment
-            With what comments begin; None: there are none.
-        ragged
-            Whether cells may be missing at the end of a record.
-        spelling
-            Gives the name of a column from what the file calls it.
+        `comment` is the mark of comments, `spelling` returns the name of a column from its name in the file.
         """
         comments: list[Place] = []
         records: list[Place] = []
@@ -148,16 +139,10 @@ def cells(place: Place, delimiter: str = ",") -> list[str]:
 def read_rows(
     path: Path, needed: Collection[str], aliases: Mapping[str, Collection[str]] = MappingProxyType({})
 ) -> list[Row]:
-    """Read a ragged table without comments.
+    """Read a ragged table without comments, in which the columns `needed` are present.
 
-    Parameters
-    ----------
-    path
-        The file.
-    needed
-        Columns that must be there.
-    aliases
-        Headings of other programs, in small letters, of columns that are not there by their own names.
+    `aliases` are headings of other programs, in small letters, for columns that are not there by their own
+    names.
     """
     table = Table.read(path, ragged=True).renamed(aliases)
     table.require(*needed)

@@ -28,17 +28,7 @@ def check_sealed(document: Mapping[str, Any], path: Path) -> None:
 
 
 def check_seal(path: Path, expected: object, of: str) -> None:
-    """Refuse a file that is not the one which was sealed.
-
-    Parameters
-    ----------
-    path
-        The file.
-    expected
-        Its checksum, as it stands elsewhere.
-    of
-        The file that says so.
-    """
+    """Refuse a file whose checksum differs from the one that the file `of` states."""
     with reading(path), path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     if found != expected:

@@ -54,14 +54,9 @@ def _cell(value: Any) -> str:
 
 
 def workbook(tables: Mapping[str, Mapping[str, Sequence[Any]]], notes: Mapping[str, str]) -> bytes:
-    """Return tables as a workbook, a sheet each, headers in the first row; text is never a formula.
+    """Return tables as a workbook, a sheet each, with notes on tables in a last sheet.
 
-    Parameters
-    ----------
-    tables
-        Columns by the names of tables.
-    notes
-        What is said of tables, in a last sheet.
+    Headers are in the first row; text is never a formula.
     """
     try:
         import openpyxl

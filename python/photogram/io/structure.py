@@ -100,15 +100,7 @@ class Encoder:
 
 
 class Decoder:
-    """Makes objects of what an :class:`Encoder` has written.
-
-    Parameters
-    ----------
-    classes
-        Those that a document may name.
-    path
-        The document, for errors.
-    """
+    """Makes objects of what an :class:`Encoder` has written, of the given classes only."""
 
     def __init__(self, classes: Iterable[type], path: Path) -> None:
         self._classes = {each.__name__: each for each in classes}

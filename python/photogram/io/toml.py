@@ -24,13 +24,7 @@ _SHOWN = 60  # Characters of a key that an error shows
 
 
 class TomlFile:
-    """The content of a file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    """
+    """The content of a file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -15,19 +15,10 @@ _LONGEST = 60  # Characters of a value that an error shows
 
 
 class Table:
-    """One table of a TOML file.
+    """One table of a TOML file, by its name in errors.
 
-    What is missing and has no default, is of another kind or beyond its limits is an :class:`InputError` that
-    names file, table and key.
-
-    Parameters
-    ----------
-    values
-        What stands in it.
-    name
-        How it is called in errors.
-    file
-        The file.
+    Missing values without a default, values of another kind or beyond their limits are an :class:`InputError`
+    that names file, table and key.
     """
 
     def __init__(self, values: Mapping[str, Any], name: str, file: Path) -> None:
@@ -165,15 +156,7 @@ class Table:
 
 
 class Document:
-    """A TOML file of tables; one that is missing, or there more often than it may, is an :class:`InputError`.
-
-    Parameters
-    ----------
-    tables
-        By name: one table, or several of the same name.
-    file
-        The file.
-    """
+    """A TOML file of tables by name, one or several of each; a missing or surplus one is an InputError."""
 
     def __init__(self, tables: Mapping[str, list[Table]], file: Path) -> None:
         self._tables, self.file = tables, file
@@ -209,15 +192,7 @@ class Document:
 
 
 def read_document(path: Path, tables: Mapping[str, Collection[str] | None]) -> Document:
-    """Read a TOML file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    tables
-        What it may hold: the keys of each table, None where the reader of the table checks them.
-    """
+    """Read a TOML file with the keys of each table; None: the reader of the table checks its keys."""
     document = TomlFile(path).content
     unknown = sorted(set(document) - set(tables))
     if unknown:

@@ -211,7 +211,6 @@ _FROM: dict[str, Callable[[Floats], Floats]] = {
 
 
 def _check_orthonormal(matrices: Floats) -> None:
-    """Refuse matrices that are no rotations."""
     with np.errstate(invalid="ignore", over="ignore"):
         excess = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
     bad = np.flatnonzero(~(excess <= _ORTHONORMAL))

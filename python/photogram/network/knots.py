@@ -42,15 +42,7 @@ class Knot(Numbers):
 
 @dataclass(frozen=True, eq=False)
 class Knots(Passage):
-    """That images of a camera pass its spline.
-
-    Parameters
-    ----------
-    camera
-        The row of the camera in its block.
-    knots
-        Its knots, row by row.
-    """
+    """Images of the camera in a row of the block pass its spline; the knots are ordered row by row."""
 
     KIND = "knots"
 

@@ -151,14 +151,9 @@ class Rays:
         return Intersection(positions, residuals, in_front)
 
     def residuals(self, positions: Floats, rows: Indices | None = None) -> tuple[Floats, Bools]:
-        """Return residuals, observed minus computed in mm, and whether the positions are in front.
+        """Return residuals of images, observed minus computed in mm, and whether positions are in front.
 
-        Parameters
-        ----------
-        positions
-            (k, 3) a position for each image in the metric axes.
-        rows
-            (k,) the images; all by default.
+        `positions` are (k, 3), one for each image in the metric axes.
         """
         block = self.block
         which: Indices | slice = slice(None) if rows is None else rows

@@ -66,7 +66,9 @@ def with_gnss(
         Arguments outside their ranges, a block with a rig.
     """
     _positive(sd=sd, seconds=seconds)
-    _not_negative(shift_sd=shift_sd, drift_sd=drift_sd)
+    for name, deviation in (("shift_sd", shift_sd), ("drift_sd", drift_sd)):
+        if not 0 <= number(name, deviation) < math.inf:
+            raise InputError(f"{name} must be finite and not negative, not {deviation}")
     if simulation.block.mounts:
         raise InputError("positions are of the photos that fly: add the rig afterwards")
     random, truth = np.random.default_rng(seed), simulation.truth
@@ -74,7 +76,10 @@ def with_gnss(
     given = arm + (lever_arm_sd if math.isfinite(lever_arm_sd) else 1.0) * random.standard_normal(3)
     arms = LeverArm("antenna", arm, 0.0), LeverArm("antenna", given, lever_arm_sd)
     axes, (centres, turned) = Cartesian(truth.spheroid), _poses(truth)
-    strips = _strips(truth)
+    # The strip of a photo is the first half of its name.
+    names = [name[: len(name) // 2] for name in truth.photo_ids]
+    places = {name: row for row, name in enumerate(dict.fromkeys(names))}
+    strips = np.array([places[name] for name in names], dtype=np.int64)
     times = seconds * np.arange(len(strips))
     shifts, drifts = (
         deviation * random.standard_normal((strips.max() + 1, 3)) for deviation in (shift_sd, drift_sd)
@@ -307,12 +312,6 @@ def _positive(**values: float) -> None:
             raise InputError(f"{name} must be positive and finite, not {value}")
 
 
-def _not_negative(**values: float) -> None:
-    for name, value in values.items():
-        if not 0 <= number(name, value) < math.inf:
-            raise InputError(f"{name} must be finite and not negative, not {value}")
-
-
 def _observed(
     simulation: Simulation, exact: Sequence[Observation], noisy: Sequence[Observation]
 ) -> Simulation:
@@ -329,13 +328,6 @@ def _of_strips(kind: type[Shift] | type[Drift], values: Floats) -> tuple[list[An
     names = [f"strip {k + 1}" for k in range(len(values))]
     known = [kind(name, value, 0.0) for name, value in zip(names, values, strict=True)]
     return known, [kind(name) for name in names]
-
-
-def _strips(block: Block) -> Indices:
-    """Return (P,) the strip of each photo, from the first half of its name."""
-    names = [name[: len(name) // 2] for name in block.photo_ids]
-    places = {name: row for row, name in enumerate(dict.fromkeys(names))}
-    return np.array([places[name] for name in names], dtype=np.int64)
 
 
 def _poses(block: Block) -> tuple[Floats, Floats]:

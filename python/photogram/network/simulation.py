@@ -351,7 +351,6 @@ def _observed(truth: Floats, sd: Floats, random: np.random.Generator) -> Floats 
 
 
 def _title(strips: int, photos_per_strip: int, motion: RollingShutter | LineScanner | None) -> str:
-    """Return what a simulated block is."""
     of = counted(photos_per_strip, "photograph")
     if isinstance(motion, LineScanner):
         of = counted(motion.lines, "line")

@@ -93,14 +93,7 @@ def with_one_focal_length(camera: Camera, size: tuple[float, float] | None = Non
     """Return a camera with equal fx and fy in the narrowest model with one focal length f and its images.
 
     The camera remains as it is if fx differs from fy, if no model contains its values and unknowns, or if
-    that model requires the size of the picture and none is given.
-
-    Parameters
-    ----------
-    camera
-        The camera.
-    size
-        Width and height of the picture in pixels.
+    that model requires the `size` of the picture (width and height in pixels) and none is given.
     """
     sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     values = camera.parameters

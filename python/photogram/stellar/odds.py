@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.network.neighbours import nearest
 
 __all__ = [
     "ACCEPTED",
@@ -123,7 +123,7 @@ def star_probabilities(
     if not len(has):
         return probability
     own = np.linalg.norm(images[has] - predicted[found[has]], axis=1)
-    second = nearest(images[has], predicted, float(own.max()) + _REACH * sd, found[has])
+    second = _photocore.nearest_points(images[has], predicted, float(own.max()) + _REACH * sd, found[has])
     away = np.where(second >= 0, np.linalg.norm(images[has] - predicted[second], axis=1), np.inf)
     first = _normal(own, sd)
     rest = _normal(away, sd) + FALSE / (1 - FALSE) * density

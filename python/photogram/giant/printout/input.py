@@ -59,22 +59,16 @@ def options_page(
     lines.append(_residuals(common.residual_limit))
     if common.strip:
         lines.append(f"LEADING '{common.strip}' WILL BE ELIMINATED FROM ALL IDENTIFICATIONS")
-    if space.geographic or not as_published:
-        lines += _lengths(common, space)
+    if space.geographic:
+        for axis, length in (("MAJOR", common.semi_major), ("MINOR", common.semi_minor)):
+            lines.append(f"SEMI-{axis} AXIS OF SPHEROID = {length:.3f} {space.linear_unit}")
+    elif not as_published:
+        lines.append(f"LINEAR UNIT OF OBJECT SPACE = {space.linear_unit}")
     if common.save_points:
         lines.append("TRIANGULATED GROUND COORDINATES WILL BE SAVED")
     if common.save_stations:
         lines.append("ADJUSTED CAMERA STATION PARAMETERS WILL BE SAVED")
     return ["", *(line for option in lines for line in (option, ""))]
-
-
-def _lengths(common: Common, space: Space) -> list[str]:
-    if not space.geographic:
-        return [f"LINEAR UNIT OF OBJECT SPACE = {space.linear_unit}"]
-    return [
-        f"SEMI-{axis} AXIS OF SPHEROID = {length:.3f} {space.linear_unit}"
-        for axis, length in (("MAJOR", common.semi_major), ("MINOR", common.semi_minor))
-    ]
 
 
 def _residuals(limit: float) -> str:

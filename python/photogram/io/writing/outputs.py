@@ -173,8 +173,13 @@ class OutputSet:
 
     def _stage(self, target: Target) -> io.BufferedWriter:
         with naming(target.given):
-            staging = self._staging(target.directory)
-            path = os.path.join(staging.path, str(len(self._staged)))
+            if target.directory not in self._stagings:
+                self._make(target.directory)
+                remove_leftovers(target.directory)
+                # Known before it is made, so that it is removed whenever the process is told to end.
+                self._stagings[target.directory] = Staging(target.directory)
+                self._stagings[target.directory].begin()
+            path = os.path.join(self._stagings[target.directory].path, str(len(self._staged)))
             mode = stat.S_IMODE(target.status.st_mode) & PERMISSIONS if target.status else 0o666
             descriptor = os.open(path, os.O_WRONLY | NEW, mode)
             file = _opened(descriptor, target)
@@ -182,15 +187,6 @@ class OutputSet:
             if target.status:
                 _keep_owner(descriptor, target.status, mode)
         return file
-
-    def _staging(self, directory: str) -> Staging:
-        if directory not in self._stagings:
-            self._make(directory)
-            remove_leftovers(directory)
-            # Known before it is made, so that it is removed whenever the process is told to end.
-            self._stagings[directory] = Staging(directory)
-            self._stagings[directory].begin()
-        return self._stagings[directory]
 
     def _make(self, directory: str) -> None:
         """Make a directory with those above it."""

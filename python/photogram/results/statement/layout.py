@@ -11,12 +11,12 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram import _photocore
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
-from photogram.network.neighbours import nearest
 
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
 FAR = 1 / 3
@@ -119,7 +119,7 @@ def _least_spacing(plan: Floats) -> float:
     reach = 1.001 * float(np.linalg.norm(np.ptp(plan, axis=0)))
     if not reach > 0:
         return 0.0
-    neighbours = nearest(plan, plan, reach, np.arange(len(plan)))
+    neighbours = _photocore.nearest_points(plan, plan, reach, np.arange(len(plan)))
     return float(np.hypot(*(plan - plan[neighbours]).T).min())
 
 
@@ -129,7 +129,9 @@ def _far(plan: Floats, block: Floats, limit: float) -> float:
     middles = (np.arange(CELLS) + 0.5) / CELLS
     grid = low + extent * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
     inside: Bools = ~outside(grid, hull(block))
-    return float(np.mean(nearest(grid[inside], plan, limit) < 0)) if inside.any() else math.nan
+    if not inside.any():
+        return math.nan
+    return float(np.mean(_photocore.nearest_points(grid[inside], plan, limit) < 0))
 
 
 def _heights(own: Floats, block: Floats) -> float:
