@@ -89,7 +89,7 @@ def test_it_waits_until_it_is_used():
     [
         ("print(repr(found))", repr(Message("text"))),
         ("print(found == Message('text'), hash(found) == hash(Message('text')))", "True True"),
-        ("print(hash(found) == hash(('text', None, None, None)))", "True"),
+        ("print(hash(found) == hash(('text', None, None, None, None)))", "True"),
         (
             "try: found.text = 1\nexcept AttributeError as error: print(error)",
             "cannot assign to field 'text'",

@@ -81,11 +81,16 @@ def test_outliers_of_every_kind_are_named():
     assert lines[0].endswith(f"is that of image of point {point} on photo {photo}")
     assert lines[1].endswith(f"is that of control point {block.point_ids[control]}")
     assert lines[2].endswith(f"is that of position of photo {block.photo_ids[7]}")
-    # The tests are those of the verdict, with their limits.
-    tests = {test.name.split(": ")[0]: test for test in result.verdict.tests}
-    for line in lines:
-        test = tests[line.split(" have ")[0].split(" ", 3)[3]]
-        assert f"{test.statistic} beyond {test.limits[1]:.2f}: the largest, {test.value:.1f}," in line
+    # The tests are those of the verdict, whose limits consider the common factor of the standard deviations.
+    tests = {test.kind: test for test in result.verdict.tests}
+    for line in result.verdict.outliers:
+        fields, test = line.fields, tests[line.fields["kind"]]
+        assert (fields["statistic"], fields["value"], fields["name"]) == (
+            test.statistic,
+            test.value,
+            test.subject,
+        )
+        assert fields["limit"] == pytest.approx(test.limits[1] * fields.get("factor", 1.0) ** 2)
         assert not test.accepted
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import Phrase
 
 __all__ = ["Message", "Undetermined"]
 
@@ -79,12 +81,26 @@ class Message:
         The remark, in a sentence.
     file, record, record_text
         The file, the number of the record in it (from 1) and the record itself, as far as they apply.
+    phrase
+        The remark as a code with fields; None if it has none.
     """
 
     text: str
     file: Path | None = None
     record: int | None = None
     record_text: str | None = None
+    phrase: Phrase | None = None
+
+    @classmethod
+    def of(cls, code: str, /, **fields: Any) -> Message:
+        """Return the remark of a code with its fields."""
+        phrase = Phrase(code, fields)
+        return cls(str(phrase), phrase=phrase)
+
+    @property
+    def code(self) -> str:
+        """The code of the remark; empty if it has none."""
+        return "" if self.phrase is None else self.phrase.code
 
     def __str__(self) -> str:
         return locate(self.text, self.file, self.record, self.record_text)

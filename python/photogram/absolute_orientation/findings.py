@@ -25,7 +25,7 @@ def orientation_findings(result: Orientation) -> Findings:
     if not result.weighted and result.degrees_of_freedom:
         if_usable.append(Phrase("advice.give-sd"))
     if result.degrees_of_freedom == 0:
-        if_usable.append(Phrase("advice.one-more"))
+        if_usable.append(Phrase("advice.spare-coordinate"))
     if_usable += [
         Phrase("advice.alternative", {"scale": significant(each.scale, 6)})
         for each in result.alternatives[:1]

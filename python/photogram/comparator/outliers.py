@@ -422,12 +422,7 @@ def plate_remarks(session: Session, cases: Sequence[PlacedCase]) -> list[Message
         corners = [case.orientation.corner for case in own]
         complete = all(len(case.points) == count for case in own)
         if len({corners.count(corner) for corner in range(1, 5)}) > 1 or not complete:
-            remarks.append(
-                Message(
-                    f"plate {plate}: GRID CALIBRATION CORRECTIONS ARE VALID ONLY IF ALL AVERAGE RESIDUALS"
-                    " ARE COMPUTED FROM A MULTIPLE OF FOUR EXACTLY 90 DEGREE ROTATION CASES"
-                )
-            )
+            remarks.append(Message.of("comparator.rotations", plate=str(plate)))
         missing = [count - len(case.points) for case in own]
         remarks += [
             Message(f"case {case.number}: {lacking} of {count} points of plate {plate} are missing")

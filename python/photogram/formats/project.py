@@ -16,7 +16,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import Message, listed
+from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
@@ -264,8 +264,7 @@ def assembled(
         if image_sd is not None and np.ndim(image_sd):
             image_sd = np.delete(image_sd, left, axis=0)
         names = [f"{point} on {photo}" for point, photo in zip(repeated.points, repeated.photos, strict=True)]
-        text = f"{len(left)} second images of a point on a photo are left out: {listed(names, 3)}"
-        found.append(Message(f"{text} (--keep-repeated takes them in)"))
+        found.append(Message.of("read.repeated", n=len(left), names=names, option=Phrase("option.repeated")))
     lacking = list(lacks)
     if image_sd is None:
         unit = cameras[0].unit or "px"

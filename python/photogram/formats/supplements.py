@@ -36,7 +36,7 @@ from photogram.network.wider_models import (
     with_parameters,
 )
 from photogram.results.result import Result
-from photogram.words import OPTIONS_OF_CONTROL, option_sd
+from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd
 
 if TYPE_CHECKING:
     from photogram.formats.control_lists import ControlList
@@ -107,14 +107,9 @@ def with_repeated(project: Project) -> Project:
     spread = (((own - mean) / sd) ** 2).sum() + (((others - mean[place]) / sd[place]) ** 2).sum()
     xy, deviations = block.image_xy.copy(), np.array(block.image_sd)
     xy[rows], deviations[rows] = mean, sd / np.sqrt(count)
-    said = [each for each in project.messages if "--keep-repeated" not in each.text]
-    text = f"{len(second)} second images of a point on a photo are averaged with the first: the adjustment is"
-    said.append(
-        Message(
-            f"{text} that of all of them, whose weighted sum of squares is larger by {spread:.6f}"
-            f" (half of it: {spread / 2:.6f})"
-        )
-    )
+    said = [each for each in project.messages if each.code != "read.repeated"]
+    spread = float(spread)
+    said.append(Message.of("read.averaged", n=len(second), spread=spread, half=spread / 2))
     block = block.replace(image_xy=xy, image_sd=deviations)
     return project.replace(block=block, messages=tuple(said), repeated=Repeated())
 
@@ -134,10 +129,12 @@ def repeated_remarks(project: Project, result: Result) -> list[Message]:
     more = float(((residuals / block.image_sd[first]) ** 2).sum())
     total = result.sums_of_squares.total
     return [
-        Message(
-            f"with {len(first)} second images of a point on a photo, which are left out, the weighted"
-            f" sum of squares would be {total + more:.6g} here and not {total:.6g}"
-            " (--keep-repeated takes them in)"
+        Message.of(
+            "result.repeated",
+            n=len(first),
+            more=total + more,
+            total=float(total),
+            option=Phrase("option.repeated"),
         )
     ]
 

@@ -177,17 +177,19 @@ class Evidence:
         found = []
         for kind, count in counts.items():
             tested, place = worst[kind]
-            limit = _test_at(tested, place, self.level, self.number).limits[1]
+            limit = _test_at(tested, place, self.level, self.number).limits[1] or math.nan
+            scale = {"w": factor, "T": factor**2}.get(tested.statistic, 1.0)
             fields = {
                 "n": count,
                 "all": self._count(tested),
                 "kind": kind,
                 "statistic": tested.statistic,
-                "limit": (limit or math.nan) * {"w": factor, "T": factor**2}.get(tested.statistic, 1.0),
+                "limit": limit * scale,
                 "value": float(tested.values[place]),
                 "name": tested.name(place),
             }
-            found.append(Phrase("line.outliers", fields))
+            scaled = {"factor": factor} if scale > 1 else {}
+            found.append(Phrase(f"line.outliers{'.scaled' if scaled else ''}", {**fields, **scaled}))
         return found
 
     @cached_property
