@@ -29,7 +29,6 @@ from photogram import (
 from photogram.giant import read_project
 from photogram.plots import Plot
 from photogram.results.fitting import with_features
-from photogram.show.methods import page_of
 from photogram.show.page import Drawing
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
@@ -63,7 +62,7 @@ def scanned() -> Result:
 def stated() -> Plot:
     """Return the map on the first sheet of the statement of the packaged survey."""
     project = formats.read(str(files("photogram") / "examples" / "survey"))
-    page = page_of(adjust(project.block, unit_variance="unity").statement(**project.statement))
+    page = adjust(project.block, unit_variance="unity").statement(**project.statement).document()
     drawings = [part for section in page.sections for part in section.parts if isinstance(part, Drawing)]
     plot = next(each for each in drawings if each.name == "map-differences").sketch()
     assert plot is not None

@@ -14,7 +14,6 @@ from photogram.formats import Wishes, read, to_files
 from photogram.formats.supplements import with_control
 from photogram.giant import Project, write_project
 from photogram.results.check_points import check_points
-from photogram.show.methods import page_of
 from photogram.statistics.agreement import agreement
 
 
@@ -92,7 +91,7 @@ def test_a_wrong_check_point_heads_the_verdict():
     assert result.verdict.code == "check-points"
     assert re.match(rf"Check points disagree with the adjustment: 1\) {name}, -\d\.\d+ m in Z \(sd 0\.\d+\)$",
                     result.verdict.headline)  # fmt: skip
-    page = page_of(result)
+    page = result.document()
     assert page.judgements[0].tone == "bad"
     assert page.advice[0].code == "advice.wrong-checks"
     assert not any("Nothing needs" in each for each in page.advice)

@@ -23,7 +23,6 @@ from photogram.perspective_center import run_deck
 from photogram.perspective_center.document import set_document
 from photogram.show.forms import summary
 from photogram.show.judgement import remarks_section
-from photogram.show.methods import page_of
 
 EXAMPLES = files("photogram") / "examples"
 
@@ -31,7 +30,7 @@ EXAMPLES = files("photogram") / "examples"
 def see(result, document=True):
     """Hold page, text, document and exit code of a result against each other."""
     assert_one_judgement(
-        result.verdict, page_of(result), result.report(), result.to_json() if document else None
+        result.verdict, result.document(), result.report(), result.to_json() if document else None
     )
     return result.verdict
 
@@ -203,7 +202,7 @@ def test_components(block, state):
 def test_plans():
     size = {"strips": 2, "photos_per_strip": 3, "points_per_photo": 40, "check_points": 0}
     made = plan({each: simulate(control=each, **size).truth for each in ("perimeter", "corners")})
-    page, report, document = page_of(made), made.report(), json.loads(made.to_json())
+    page, report, document = made.document(), made.report(), json.loads(made.to_json())
     assert page.advice == document["next"]
     assert all(each in " ".join(report.split()) for each in page.advice)
 
@@ -327,7 +326,7 @@ COMPARATORS = {
 def test_comparators(state):
     make, code = COMPARATORS[state]
     found = calibrate_comparator(make())
-    assert_one_judgement(found.verdict, page_of(found), listing(found), found.to_json())
+    assert_one_judgement(found.verdict, found.document(), listing(found), found.to_json())
     assert found.verdict.code == code
     assert (json.loads(found.to_json())["correction"] is None) == (found.verdict.exit != 0)
 
@@ -438,12 +437,12 @@ def test_what_contradicts_is_seen(one):
 def test_a_planted_contradiction_is_seen(block):
     """Another verdict, another advice, another line of the page beside a good report: each is seen."""
     result = adjust(block)
-    verdict, page, report = result.verdict, page_of(result), result.report()
+    verdict, page, report = result.verdict, result.document(), result.report()
     assert not contradictions(sentences_of(verdict, page, report, result.to_json()))
     bad = adjust(BLOCKS["gross error"][0](block))
     for mixed in (
         (bad.verdict, page, report, None),
-        (verdict, page_of(bad), report, None),
+        (verdict, bad.document(), report, None),
         (verdict, page, bad.report(), None),
         (verdict, replace(page, advice=["Do not use any of these figures."]), report, None),
         (replace(verdict, lines=("gross errors likely: 1) a",)), page, report, None),

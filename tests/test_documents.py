@@ -15,7 +15,7 @@ from photogram.io import json as json_files
 from photogram.show import html, quantity
 from photogram.show.cells import page_table, written
 from photogram.show.forms import record, summary, table_text, text, to_json
-from photogram.show.methods import Documented, page_of
+from photogram.show.methods import Documented
 from photogram.show.page import (
     Column,
     Document,
@@ -229,7 +229,7 @@ def test_a_result_with_a_document_needs_no_other_definition():
         def document(self):
             return document()
 
-    assert page_of(Survey()).sections[0].key == "points"
+    assert Survey().document().sections[0].key == "points"
     assert json.loads(Survey().to_json())["name"] == "A"
     pytest.importorskip("jinja2")
     assert b"Points" in Survey().to_html()

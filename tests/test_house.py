@@ -55,7 +55,7 @@ def modules():
     return found
 
 
-COMPOSED = {"document", "_findings", "_members", "_table"}
+COMPOSED = {"document", "statement", "_findings", "_files", "_members", "_table"}
 """Methods of results whose definitions are in the files above that read the results."""
 
 

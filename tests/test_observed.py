@@ -10,7 +10,7 @@ from photogram import Orientation, Result, collection
 from photogram.collection import AdjustedCollection
 from photogram.results.films import OnFilm
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Shown, columns_of
+from photogram.show.methods import Documented
 from photogram.words import Phrase
 
 KINDS = {
@@ -136,20 +136,7 @@ def test_a_result_is_one_class():
     assert AdjustedCollection.__bases__ == (AdjustedNetwork,)
     # What it says of films is a part of a block alone.
     assert Result.__bases__ == (OnFilm, AdjustedNetwork)
-    assert Shown in Orientation.__bases__
-
-
-def test_a_way_that_nobody_has_defined_says_so():
-    class Bare(Shown):
-        pass
-
-    for way in (
-        Bare().report,
-        Bare().to_json,
-        lambda: columns_of(Bare(), "photo"),
-    ):
-        with pytest.raises(NotImplementedError, match="Bare has no"):
-            way()
+    assert Documented in Orientation.__bases__
 
 
 def test_a_report_lists_no_more_than_can_be_read(monkeypatch):

@@ -12,7 +12,6 @@ from photogram import Camera, adjust, diagnose, formats, simulate
 from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
 from photogram.network.wider_models import with_parameters
-from photogram.show.methods import page_of
 from photogram.words import Phrase
 
 
@@ -146,7 +145,7 @@ def test_a_lens_pattern_asks_for_a_calibration_and_not_for_snooping(run, tmp_pat
     names = "c,xp,yp,K1,K2,P1,P2"
     remedy = found.verdict.message.fields["remedy"]
     assert (remedy.code, remedy.fields["how"].fields) == ("part.calibrate.first", {"names": names})
-    page = page_of(found)
+    page = found.document()
     assert (page.advice[0].code, page.advice[0].fields) == ("advice.calibrate", {"names": names})
     words = " ".join(map(str, [found.verdict.headline, *found.verdict.lines, *page.advice]))
     assert "photogram.snoop" not in words

@@ -13,7 +13,6 @@ import photogram
 from photogram.collection import simulate
 from photogram.formats import read
 from photogram.results.statement import annexes
-from photogram.show.methods import page_of
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +26,7 @@ def snooped():
 
 def listed(stated, table="table.removed"):
     """Return the rows of the table of removed observations on the page."""
-    (annex,) = [each for each in page_of(stated).sections if each.key == "annex-e"]
+    (annex,) = [each for each in stated.document().sections if each.key == "annex-e"]
     found = [part for part in annex.parts if getattr(part, "caption", "") == stated.texts(table)]
     return found[0].rows if found else []
 

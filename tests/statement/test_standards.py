@@ -21,7 +21,6 @@ from photogram.results.statement.lengths import (
     measured_lengths,
 )
 from photogram.results.statement.nssda import nssda
-from photogram.show.methods import page_of
 from photogram.statistics import effective_freedom
 
 
@@ -133,7 +132,7 @@ def test_page_and_document_have_one_verdict_for_each_class(result, count):
         assert keys == {
             f"{SENTENCES[verdict]}.{name}" for name, verdict in verdicts.items() if count or name != "3d"
         }
-        (section,) = [each for each in page_of(found).sections if each.key == "figures"]
+        (section,) = [each for each in found.document().sections if each.key == "figures"]
         rows = section.parts[0].rows if count else []
         shown = {row[0]: row[-1] for row in rows if row[-1]}
         of_page = {"plan": "h", "h": "v", "all": "3d"}

@@ -9,7 +9,6 @@ import numpy as np
 from photogram.adjustment.resection import Resection
 from photogram.arguments.types import Floats
 from photogram.results.observation_kinds import parts_of
-from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
@@ -17,7 +16,6 @@ from photogram.words import Phrase
 UNKNOWNS = ("X", "Y", "Z", "omega", "phi", "kappa")
 
 
-@findings_of.register(Resection)
 def resection_findings(result: Resection) -> Findings:
     """Return the tests of a resection: standard deviations are given, so the unit weight is known."""
     ids = result.point_ids

@@ -31,6 +31,7 @@ from photogram.messages import Message
 from photogram.network.geometry import Spheroid
 from photogram.results.iteration import Iteration
 from photogram.show.methods import Judged
+from photogram.statistics.findings import Findings
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
 
@@ -146,6 +147,11 @@ class Resection(Judged):
     iterations: list[Iteration]
     alternatives: list[Pose]
     outside_danger_cylinder: float | None
+
+    def _findings(self) -> Findings:
+        from photogram.adjustment.findings import resection_findings
+
+        return resection_findings(self)
 
     @property
     def converged(self) -> bool:

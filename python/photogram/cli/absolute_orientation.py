@@ -145,7 +145,6 @@ def absolute_orientation(
     with job:
         from photogram import orient
         from photogram.messages import Message
-        from photogram.show.methods import page_of
 
         if file is None:
             directory = job.packaged(EXAMPLE)
@@ -179,7 +178,7 @@ def absolute_orientation(
         made |= _records(result, part_two, restart_out, name)
         title = file.name
         made |= documents.page(
-            job, "absolute-orientation", folder, lambda: replace(page_of(result), title=title)
+            job, "absolute-orientation", folder, lambda: replace(result.document(), title=title)
         )
         written = list(made)
         with job.outputs() as outputs:

@@ -6,7 +6,6 @@ import os
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -214,12 +213,10 @@ def _pdf(calibration: Calibration, run_date: str) -> bytes:
 
 def _pages(job: Job, placed: dict[Path, Calibration], documents: Documents) -> dict[Path, bytes]:
     """Make the reports for the browser, one for each calibration."""
-    from photogram.show.methods import page_of
-
     written: dict[Path, bytes] = {}
     for number, (place, calibration) in enumerate(placed.items(), 1):
         mark = f"-{number}" if documents.html is not None and len(placed) > 1 else ""
-        make = partial(page_of, replace(calibration, messages=job.told(calibration.messages)))
+        make = replace(calibration, messages=job.told(calibration.messages)).document
         written |= documents.page(job, "comparator", place, make, mark)
     return written
 

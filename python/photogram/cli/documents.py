@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -153,9 +152,7 @@ class Documents:
         """Return the files of `--parquet DIR`; none without it."""
         if self.parquet is None:
             return {}
-        from photogram.show.methods import files_of
-
-        return {self.parquet / name: content for name, content in files_of(result).items()}
+        return {self.parquet / name: content for name, content in result._files().items()}
 
     def conclude(
         self,
@@ -188,7 +185,6 @@ class Documents:
             The exit code, where it is not that of the verdict.
         """
         from photogram.show.forms import summary
-        from photogram.show.methods import page_of
 
         def summarize() -> None:
             print_sections(above, "the report")
@@ -196,7 +192,7 @@ class Documents:
             for line in lines:
                 output.print(escape(line))
 
-        document, page = self.as_json(found), self.page(job, command, out, partial(page_of, found))
+        document, page = self.as_json(found), self.page(job, command, out, found.document)
         texts = {out / TEXT: found.report().encode()} if text and out is not None else {}
         files = [texts, document, page] if texts else [{**(more or {}), **page}, document]
         job.finish(*files, summary=summarize, code=found.verdict.exit if code is None else code)

@@ -67,7 +67,6 @@ def perspective_center(
     """
     with job:
         from photogram.perspective_center import run_deck
-        from photogram.show.methods import page_of
         from photogram.statistics.verdict import worst
 
         if deck is None:
@@ -86,7 +85,7 @@ def perspective_center(
         stopped = run.stop is not None
         job.finish(
             _files(run, documents.json, folder, pictures),
-            documents.page(job, "perspective-center", folder, lambda: page_of(run)) if run.results else {},
+            documents.page(job, "perspective-center", folder, run.document) if run.results else {},
             summary=lambda: _summarize(run),
             code=0 if stopped else worst((each.verdict for each in run.results), strict=strict),
         )

@@ -26,8 +26,6 @@ WAYS = {
     "check_of": ("checking",),
     "core_network": ("core_arrays",),
     "determined": ("tables",),
-    "files_of": ("result_files",),
-    "findings_of": ("findings",),
     "first_adjusted": ("components",),
     "observables": ("components",),
     "pictured": ("picture_data",),

@@ -13,7 +13,6 @@ from photogram.collection.result import AdjustedCollection
 from photogram.results.findings import network_findings
 from photogram.results.fixed_tests import SUSPECTED, Held, held_tests
 from photogram.results.patterns import CameraImages, patterns
-from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.words import Phrase
 
@@ -24,7 +23,6 @@ POINTS = 3
 """Coordinates of a point, whose partials stand behind those of the photos."""
 
 
-@findings_of.register(AdjustedCollection)
 def collection_findings(result: AdjustedCollection) -> Findings:
     """Return the tests of a collection.
 

@@ -15,8 +15,12 @@ from photogram.results.network import AdjustedNetwork
 from photogram.results.selection import Adjusted, Things
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from photogram.io.writing import Content
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
+    from photogram.statistics.findings import Findings
 
 __all__ = ["AdjustedCollection"]
 
@@ -57,6 +61,16 @@ class AdjustedCollection(AdjustedNetwork):
     datum: list[tuple[int, str]]
 
     KNOWN: ClassVar[bool] = False
+
+    def _findings(self) -> Findings:
+        from photogram.collection.findings import collection_findings
+
+        return collection_findings(self)
+
+    def _files(self) -> Mapping[str, Content]:
+        from photogram.collection.result_files import collection_files
+
+        return collection_files(self)
 
     def document(self) -> Document:
         """Return the document: judgement, sections, tables."""

@@ -28,7 +28,6 @@ from photogram.results.result_files import (
     sheet,
     written,
 )
-from photogram.show.methods import files_of
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase
 
@@ -38,7 +37,6 @@ _TABLES = {"control": "control", "stations": "station"}
 """Tables for people, and the kind that each is in `collection.tables`."""
 
 
-@files_of.register(AdjustedCollection)
 def collection_files(result: AdjustedCollection) -> dict[str, Content]:
     """Return the files of the result of a collection."""
     given = result.collection

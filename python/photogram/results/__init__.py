@@ -3,10 +3,7 @@
 import lazy_loader
 
 WAYS = {
-    "files_of": ("block_files",),
-    "findings_of": ("findings",),
     "pictured": ("picture_data",),
-    "statement_of": ("statement.statement",),
     "terms_of": ("tables",),
 }
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""

@@ -61,7 +61,6 @@ from photogram.results.result_files import (
 from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.tables import TABLES
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.methods import files_of
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase
 
@@ -107,7 +106,6 @@ _TABLES = {
 """Tables for people, and the kind that each is in `results.tables`."""
 
 
-@files_of.register(Result)
 def block_files(result: Result) -> dict[str, Content]:
     """Return the files of the result of a block."""
     block = result.block

@@ -74,6 +74,33 @@ class VarianceComponents(Judged, Documented, Brief):
         """Return the components as a data frame."""
         return components_table(self).frame()
 
+    def _findings(self) -> Findings:
+        """Return the components and the tests of the adjustment with their weights.
+
+        Too optimistic weights would make gross errors of good observations. The global test is that of the
+        given weights.
+        """
+        estimated = [
+            GroupFactor(
+                group=each.name,
+                factor=each.factor_of_sd,
+                interval=(math.sqrt(each.interval[0]), math.sqrt(each.interval[1])),
+                significant=each.worth_changing,
+            )
+            for each in self.components
+            if not each.held
+        ]
+        given = findings_of(self.first)
+        first = statement(self)[0]
+        told = [f"{first[:1].upper()}{first[1:]}."]
+        return replace(
+            findings_of(self.result),
+            global_test=given.global_test,
+            components=estimated,
+            if_usable=told,
+            if_withheld=(),
+        )
+
     def document(self) -> Document:
         """Return the document: judgement, what to do first, the components."""
         from photogram.results.components_document import components_document
@@ -96,35 +123,6 @@ class VarianceComponents(Judged, Documented, Brief):
                 "steps": [dict(zip(of_step, step, strict=True)) for step in estimate.steps],
             }
         )
-
-
-@findings_of.register(VarianceComponents)
-def _findings(found: VarianceComponents) -> Findings:
-    """Return what the verdict on the given weights rests on: components and, with their weights, the tests.
-
-    Too optimistic weights would make gross errors of good observations. The global test is that of the given
-    weights.
-    """
-    estimated = [
-        GroupFactor(
-            group=each.name,
-            factor=each.factor_of_sd,
-            interval=(math.sqrt(each.interval[0]), math.sqrt(each.interval[1])),
-            significant=each.worth_changing,
-        )
-        for each in found.components
-        if not each.held
-    ]
-    given = findings_of(found.first)
-    first = statement(found)[0]
-    told = [f"{first[:1].upper()}{first[1:]}."]
-    return replace(
-        findings_of(found.result),
-        global_test=given.global_test,
-        components=estimated,
-        if_usable=told,
-        if_withheld=(),
-    )
 
 
 def components_table(found: VarianceComponents) -> Table:

@@ -20,7 +20,6 @@ from photogram.results.reliability_summary import ReliabilitySummary
 from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
 from photogram.results.tested_observations import tested_singly
-from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
@@ -75,7 +74,6 @@ def network_findings(
     )
 
 
-@findings_of.register(Result)
 def block_findings(result: Result) -> Findings:
     """Return the tests of a block: standard deviations are given, so the unit weight is known."""
     # Held to look for blunders before the photos are adjusted: nobody takes these places for true.

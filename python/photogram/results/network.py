@@ -26,7 +26,7 @@ from photogram.network.unadjusted import Given
 from photogram.results.covariance import Covariances, Failure, Propagated
 from photogram.results.iteration import Iteration
 from photogram.results.selection import Adjusted, Selection
-from photogram.show.methods import Documented, Judged, files_of
+from photogram.show.methods import Documented, Judged
 from photogram.show.summary import Brief, Rows
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import standardized
@@ -34,6 +34,7 @@ from photogram.statistics.reliability import standardized
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.io.writing import Content
     from photogram.plots import Plots
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.reliability import Reliability
@@ -456,7 +457,11 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         folder = Path(directory)
         from photogram.io.writing import write_whole  # what is only adjusted is not written
 
-        write_whole({folder / name: content for name, content in files_of(self).items()})
+        write_whole({folder / name: content for name, content in self._files().items()})
+
+    def _files(self) -> Mapping[str, Content]:
+        """Return the result as files of a folder, by their names, from which it can be read again."""
+        raise NotImplementedError
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return the table of one kind of thing as a data frame; pandas takes long to import."""

@@ -41,16 +41,17 @@ from photogram.results.trajectories import (
     restarted_motion,
 )
 from photogram.results.unknowns import AdjustedUnknown, adjusted_unknowns
-from photogram.show.methods import statement_of
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from photogram.io.writing import Content
     from photogram.results.features import Features
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
+    from photogram.statistics.findings import Findings
 
 __all__ = ["Result"]
 
@@ -174,6 +175,16 @@ class Result(OnFilm, AdjustedNetwork):
         from photogram.results.document import block_document
 
         return block_document(self)
+
+    def _findings(self) -> Findings:
+        from photogram.results.findings import block_findings
+
+        return block_findings(self)
+
+    def _files(self) -> Mapping[str, Content]:
+        from photogram.results.block_files import block_files
+
+        return block_files(self)
 
     def _members(self) -> dict[str, Any]:
         """Return the members of the JSON document, without the sections that people read."""
@@ -412,7 +423,9 @@ class Result(OnFilm, AdjustedNetwork):
         It has `figures`, `sentences`, `assumptions`, `exit`, `budget(..)`, `check_points`, `leave_one_out`,
         `to_html()`, `to_pdf()` and `to_json()`; options and errors are those of :func:`photogram.statement`.
         """
-        return statement_of(self, **asked)
+        from photogram.results.statement.statement import statement
+
+        return statement(self, **asked)
 
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""

@@ -138,7 +138,10 @@ def table_text(table: Table) -> list[str]:
         for texts, (column, cell) in zip(columns, row, strict=True):
             mark = "*" if cell.tone == "look" and not column.text else ""
             texts.append(f"{column.written(cell.value)}{mark}".translate(PLAIN))
-    if max(len(text) for texts in columns for text in texts) > WIDTH // 2:  # sentences: rows are paragraphs
+    longest = max(len(text) for texts in columns for text in texts)
+    if longest > WIDTH // 2 and all(
+        column.text for column in table.columns
+    ):  # sentences: rows are paragraphs
         rows = ("; ".join(filter(None, row)) for row in zip(*(texts[1:] for texts in columns), strict=True))
         return [textwrap.fill(row, WIDTH, subsequent_indent="  ") for row in rows]
     padded = [

@@ -1,9 +1,8 @@
-"""Ways to show a result: declared here, defined for each class of results in the files above it.
+"""Results with a verdict and a document, and functions with a definition for each class of networks.
 
-A class of results holds arrays and their names, and knows no report; a report knows the class whose arrays it
-reads. `Result.report()` calls `report_of`, which `results.report` defines for `Result`. So a result is one
-class, and no file needs one that needs it. `WAYS` of the package of a class says which of its files define
-its ways: they are loaded when the way is first asked for, by whichever name the class was imported.
+A class of results has the methods `document` and `_findings`, which import the file that composes the
+document or the findings. A `Way` has a definition for blocks and one for collections; `WAYS` of the package
+of a class names the file that defines it.
 """
 
 from __future__ import annotations
@@ -12,11 +11,9 @@ import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property, singledispatch, update_wrapper
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, BinaryIO, Generic, NoReturn, ParamSpec, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar, overload
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
     from photogram.statistics.verdict import Verdict
@@ -64,55 +61,9 @@ class Way(Generic[P, R]):
         return self._function.register(kind)
 
 
-@Way
-def report_of(result: object) -> str:
-    """Return the report of a result as text."""
-    _undefined(result, "report")
-
-
-@Way
-def document_of(result: object) -> bytes:
-    """Return the whole result as a JSON document (UTF-8)."""
-    _undefined(result, "JSON document")
-
-
-@Way
-def columns_of(result: object, what: str) -> Mapping[str, Any]:
-    """Return what a result says about one kind of thing (`photo`, `point`, `image` ...) as named columns."""
-    _undefined(result, f"table of {what}s")
-
-
-@Way
-def files_of(result: object) -> Mapping[str, bytes | Callable[[BinaryIO], None]]:
-    """Return a result as files of a folder, by their names, from which it can be read again.
-
-    Large ones write themselves to the file that they are given.
-    """
-    _undefined(result, "files")
-
-
-@Way
-def page_of(result: object) -> Document:
-    """Return the document of a result: its own, or what is defined for its class."""
-    if not isinstance(result, Documented):
-        _undefined(result, "page")
-    return result.document()
-
-
-@Way
-def findings_of(result: object) -> Findings:
+def findings_of(result: Judged) -> Findings:
     """Return what the verdict on a result rests on."""
-    _undefined(result, "verdict")
-
-
-@Way
-def statement_of(result: object, **asked: Any) -> Any:
-    """Return the accuracy statement of a result, by what is asked for."""
-    _undefined(result, "statement")
-
-
-def _undefined(result: object, way: str) -> NoReturn:
-    raise NotImplementedError(f"{type(result).__name__} has no {way}")
+    return result._findings()
 
 
 class Judged:
@@ -126,25 +77,11 @@ class Judged:
         return verdict(self._findings())
 
     def _findings(self) -> Findings:
-        return findings_of(self)
+        """Return what the verdict rests on."""
+        raise NotImplementedError
 
 
-class Paged:
-    """What has a report for the browser."""
-
-    def to_html(self) -> bytes:
-        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
-
-        Needs jinja2 (`pip install 'photogram[report]'`).
-        """
-        from photogram.show.html import page_html
-        from photogram.show.run import reproducibility
-
-        page = page_of(self)
-        return page_html(page.with_sections(reproducibility(None, page.phases)))
-
-
-class Documented(Paged):
+class Documented:
     """A result that is one document, from which all its forms are written."""
 
     def document(self) -> Document:
@@ -163,24 +100,13 @@ class Documented(Paged):
 
         return to_json(self.document())
 
+    def to_html(self) -> bytes:
+        """Return the report for the browser: one HTML file that needs nothing else (docs/report.md).
 
-class Shown(Judged, Paged):
-    """What has a report, a JSON document, and tables."""
-
-    def report(self) -> str:
-        """Return the report as text."""
-        return report_of(self)
-
-    def to_json(self) -> bytes:
-        """Return the whole result as a JSON document (UTF-8); the page of the program lists its members."""
-        return document_of(self)
-
-    def _table(self, what: str) -> pd.DataFrame:
-        """Return what the result says about one kind of thing as a data frame.
-
-        pandas rather than polars: geopandas, matplotlib and statsmodels, which people use on such tables,
-        speak it. It is imported only when a table is asked for: that takes long.
+        Needs jinja2 (`pip install 'photogram[report]'`).
         """
-        import pandas as pd
+        from photogram.show.html import page_html
+        from photogram.show.run import reproducibility
 
-        return pd.DataFrame(columns_of(self, what))
+        page = self.document()
+        return page_html(page.with_sections(reproducibility(None, page.phases)))

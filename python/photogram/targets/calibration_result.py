@@ -26,6 +26,7 @@ from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
 from photogram.show.summary import Brief, Rows
+from photogram.statistics.findings import Findings
 from photogram.statistics.limits import GlobalTest
 from photogram.statistics.verdict import Verdict
 from photogram.targets.calibration_difference import CameraDifference
@@ -124,6 +125,11 @@ class UnknownWeight(Result):
     def global_test(self) -> GlobalTest | None:
         """None: nobody has said how well corners are measured."""
         return None
+
+    def _findings(self) -> Findings:
+        from photogram.targets.findings import unknown_weight_findings
+
+        return unknown_weight_findings(self)
 
 
 def with_unknown_weight(result: Result) -> Result:

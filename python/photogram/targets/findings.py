@@ -110,8 +110,7 @@ def _parts(calibrated: Calibrated, number: int) -> tuple[int, tuple[str, ...] | 
 FREE_PARAMETERS_OF_LENS = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
 
 
-@findings_of.register(UnknownWeight)
-def findings(result: UnknownWeight) -> Findings:
+def unknown_weight_findings(result: UnknownWeight) -> Findings:
     """Return the tests of a block whose standard deviations of corners are ratios alone."""
     return replace(block_findings(result), untested=Phrase("untested.corners"))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from photogram import _photocore
-from photogram.io import json
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.result import Result
@@ -13,52 +12,47 @@ from photogram.results.statement.budget import kind_of
 from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.request import lengths_in
 from photogram.results.statement.statement import Statement
-from photogram.show.methods import document_of
 from photogram.show.quantity import members
 
 
-@document_of.register(Statement)
-def to_json(found: Statement) -> bytes:
-    """Return everything as JSON (UTF-8). What is not a number, or is not defined, is null."""
+def statement_members(found: Statement) -> dict[str, Any]:
+    """Return the members of the document."""
     asked, result, standards = found.asked, found.result, found.standards
     unit = result.block.linear_unit
-    return json.to_json(
-        {
-            "program": f"photogram {_photocore.__version__}",
-            "title": asked.title or result.block.title,
-            **{name: own or None for name, own in members(asked, *_HEAD).items()},
-            "language": found.texts.language,
-            "units": {"length": unit, "angle": "rad", "image": result.block.image_unit},
-            "headline": found.headline,
-            "exit": found.exit,
-            "sentences": found.sentences,
-            "figures": found.figures,
-            "vegetated": figures_member(found.of_vegetated),
-            "check_points": point_rows(found.compared, None if found.of_all is None else found.of_all.points),
-            "without": {"points": dict(asked.without), "figures": figures_member(found.of_rest)}
-            if asked.without
-            else None,
-            "not_usable": [{"point": name, "reason": reason} for name, reason in found.compared.not_usable],
-            "leave_one_out": left_out_rows(found.left_out),
-            "budgets": {each.quantity: budget_member(each) for each in found.taken_apart},
-            "asprs": None if standards.asprs is None else standards.asprs.member(asked, lengths_in(unit)),
-            "nssda": standards.nssda_member if "nssda" in asked.standards else None,
-            "lengths": None if standards.lengths is None else standards.lengths.member(),
-            "iso_19157": standards.iso_19157 or None,
-            "layout": found.layout and members(found.layout, **_LAYOUT),
-            "camera": [
-                members(each, "name", parameters="names", value="values")
-                | members(each, "sd", "correlations")
-                for each in result.cameras
-            ],
-            "adjustment": _adjustment(result),
-            "assumptions": found.assumptions,
-            "remarks": found.judged.remarks,
-            "removed": [members(each, "name", "reason") for each in found.removed],
-            "files": [{"name": each.path.name, "sha256": each.sha256} for each in found.inputs],
-            "command": found.command or None,
-        }
-    )
+    return {
+        "program": f"photogram {_photocore.__version__}",
+        "title": asked.title or result.block.title,
+        **{name: own or None for name, own in members(asked, *_HEAD).items()},
+        "language": found.texts.language,
+        "units": {"length": unit, "angle": "rad", "image": result.block.image_unit},
+        "headline": found.headline,
+        "exit": found.exit,
+        "sentences": found.sentences,
+        "figures": found.figures,
+        "vegetated": figures_member(found.of_vegetated),
+        "check_points": point_rows(found.compared, None if found.of_all is None else found.of_all.points),
+        "without": {"points": dict(asked.without), "figures": figures_member(found.of_rest)}
+        if asked.without
+        else None,
+        "not_usable": [{"point": name, "reason": reason} for name, reason in found.compared.not_usable],
+        "leave_one_out": left_out_rows(found.left_out),
+        "budgets": {each.quantity: budget_member(each) for each in found.taken_apart},
+        "asprs": None if standards.asprs is None else standards.asprs.member(asked, lengths_in(unit)),
+        "nssda": standards.nssda_member if "nssda" in asked.standards else None,
+        "lengths": None if standards.lengths is None else standards.lengths.member(),
+        "iso_19157": standards.iso_19157 or None,
+        "layout": found.layout and members(found.layout, **_LAYOUT),
+        "camera": [
+            members(each, "name", parameters="names", value="values") | members(each, "sd", "correlations")
+            for each in result.cameras
+        ],
+        "adjustment": _adjustment(result),
+        "assumptions": found.assumptions,
+        "remarks": found.judged.remarks,
+        "removed": [members(each, "name", "reason") for each in found.removed],
+        "files": [{"name": each.path.name, "sha256": each.sha256} for each in found.inputs],
+        "command": found.command or None,
+    }
 
 
 _HEAD = ("client", "firm", "project", "surveyor", "date")

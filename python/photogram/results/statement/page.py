@@ -26,7 +26,6 @@ from photogram.results.statement.figures import Figures
 from photogram.results.statement.sheets import Written, decimals_for
 from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
-from photogram.show.methods import page_of
 from photogram.show.page import (
     Cell,
     Column,
@@ -47,9 +46,8 @@ _CLASSES = {"h": "v", "plan": "h", "all": "3d"}
 """Parts of the components with classes."""
 
 
-@page_of.register(Statement)
 @np.errstate(over="ignore", invalid="ignore")
-def statement_page(found: Statement) -> Document:
+def statement_document(found: Statement) -> Document:
     """Return the page of a statement, for the browser and for paper."""
     texts, asked, judged = found.texts, found.asked, found.judged
     names = ("project", "client", "firm", "surveyor")

@@ -11,6 +11,7 @@ import numpy as np
 
 from photogram.arguments.annotations import check_arguments
 from photogram.errors import AdjustmentError, InputError
+from photogram.io import json
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import nearest
 from photogram.results.result import Result
@@ -27,7 +28,7 @@ from photogram.results.statement.quantities import chosen, wanted
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import standards
 from photogram.results.statement.texts import Texts
-from photogram.show.methods import document_of, page_of, statement_of
+from photogram.show.page import Document
 from photogram.show.run import InputFile
 from photogram.show.summary import Brief, Rows
 from photogram.words import Phrase
@@ -140,6 +141,17 @@ class Statement(Grounds, Brief):
             ("see", ".figures, .check_points, .budget(..), .to_html(), .to_pdf()"),
         ]
 
+    def document(self) -> Document:
+        """Return the document: headline, sentences, figures, assumptions, annexes."""
+        from photogram.results.statement.page import statement_document
+
+        return statement_document(self)
+
+    def _members(self) -> dict[str, Any]:
+        from photogram.results.statement.document import statement_members
+
+        return statement_members(self)
+
     def to_html(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return the page as one HTML file that needs nothing else, and write it where a path is given.
 
@@ -147,7 +159,7 @@ class Statement(Grounds, Brief):
         """
         from photogram.show.html import page_html
 
-        return _written(page_html(page_of(self)), path)
+        return _written(page_html(self.document()), path)
 
     def to_pdf(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return the page as a PDF document, and write it where a path is given.
@@ -158,11 +170,11 @@ class Statement(Grounds, Brief):
             from photogram.show.pdf import page_pdf
         except ModuleNotFoundError:
             raise InputError("a PDF requires typst: pip install 'photogram[pdf]'") from None
-        return _written(page_pdf(page_of(self), author=self.asked.firm), path)
+        return _written(page_pdf(self.document(), author=self.asked.firm), path)
 
     def to_json(self, path: str | PathLike[str] | None = None) -> bytes:
         """Return everything as a JSON document (UTF-8), and write it where a path is given."""
-        return _written(document_of(self), path)
+        return _written(json.to_json(self._members()), path)
 
 
 def _written(content: bytes, path: str | PathLike[str] | None) -> bytes:
@@ -173,7 +185,6 @@ def _written(content: bytes, path: str | PathLike[str] | None) -> bytes:
     return content
 
 
-@statement_of.register(Result)
 def statement(
     result: Result,
     *,
