@@ -117,7 +117,7 @@ def _decimals(each: Quantity, by: Floats) -> list[int | None]:
         if alone and not (column > 0).any():
             found.append(None)
             continue
-        if each.kind == "value":
+        if each.kind == "value" and axis.angle:
             count = min(count + (4 if axis.angle == "deg" else 0), _MOST_OF_DEGREES)
         elif each.kind == "difference":
             count += 1
@@ -127,9 +127,10 @@ def _decimals(each: Quantity, by: Floats) -> list[int | None]:
 
 def _cells(each: Quantity) -> list[Written]:
     """Write names, and numbers that have no axis."""
-    plain = np.asarray(each.values).tolist()
     if each.kind != "name":
-        return [*plain]
+        values = np.asarray(each.values)
+        return [*(values if each.seen is None else np.where(each.seen, values, np.nan)).tolist()]
+    plain = np.asarray(each.values).tolist()
     if each.link is None:
         return [*map(str, plain)]
     ids = [f"{each.link.kind}-{row}" for row in each.link.rows.tolist()]

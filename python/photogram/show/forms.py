@@ -8,6 +8,7 @@ from typing import Any
 
 from photogram import _photocore
 from photogram.io import json
+from photogram.lazy_dataclasses import replace
 from photogram.show.cells import written
 from photogram.show.lines import fact_lines
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Section, Table, Text
@@ -56,7 +57,7 @@ def text(document: Document) -> str:
 def titled_lines(document: Document, *keys: str) -> list[tuple[str, list[str]]]:
     """Return titles and lines: verdict and advice, a line for each sentence, key figures, sections with keys.
 
-    All sections without keys.
+    All sections without keys; with keys sections have no introduction.
     """
     titled = [*_judged(document), *_sections(document, keys)]
     return [(title.translate(PLAIN), [line.translate(PLAIN) for line in lines]) for title, lines in titled]
@@ -76,7 +77,7 @@ def _sections(document: Document, keys: Sequence[str]) -> list[tuple[str, list[s
     """Return the lines of key figures and sections below their titles; none without lines."""
     figures = fact_lines([*document.head, *document.highlights])
     titled = [("Key figures", figures)] + [
-        (section.title, _section_lines(section))
+        (section.title, _section_lines(replace(section, intro="") if keys else section))
         for section in (*document.sections, *document.details)
         if section.key in keys or not keys
     ]
