@@ -211,7 +211,9 @@ def images_section(result: AdjustedNetwork) -> Section:
     columns = images(result)
     *_, residuals, redundancy, tests = columns
     sizes = np.nan_to_num(np.abs(tests.values)).max(axis=1, initial=0.0)
-    rows = np.sort(np.argsort(-sizes, kind="stable")[:IMAGES])
+    rows = np.arange(len(sizes))
+    if len(sizes) > IMAGES:
+        rows = np.sort(np.argpartition(-sizes, IMAGES)[:IMAGES])
     some = f"The {len(rows)} of {len(sizes)} with the largest test values. The table of images has all."
     note = "" if len(rows) == len(sizes) else some
     columns[2:] = [
