@@ -241,6 +241,7 @@ _GIVEN_SD: dict[str, Any] = {
     "name": "sd_given",
     "head": "sd given",
     "about": "standard deviation that was given: infinite free, 0 held",
+    "words": {np.inf: "free"},
 }
 
 
