@@ -65,13 +65,11 @@ def test_a_message_counts_the_outliers_of_its_kind(result):
 def test_the_table_of_the_worst_marks_outliers_only(result):
     every = {each.kind: each for each in rows_of.tested_singly(result)}
     marked = {kind: rows_of.outlying(result.verdict, each) for kind, each in every.items()}
-    tables = [part for section in result.document().sections for part in section.parts]
-    (table,) = [each for each in tables if getattr(each, "caption", "") == "Worst observations"]
-    shown = sum(bool(row[-1].tone) for row in table.rows)
+    *_, tests = result.document().table("worst").columns
     sizes = np.concatenate([np.nan_to_num(np.abs(each.values)).ravel() for each in every.values()])
     flags = np.concatenate([each.ravel() for each in marked.values()])
     order = np.argsort(-sizes, kind="stable")
-    assert shown == flags[order[: len(table.rows)]].sum()
+    assert tests.marked.sum() == flags[order[: len(tests.values)]].sum()
     for kind, own in marked.items():
         groups = next((group for group, single in SINGLE.items() if single == kind.code), None)
         if groups is not None:
@@ -86,5 +84,5 @@ def test_the_plot_of_tests_marks_outliers_only(result):
     count = sum(
         int((own & np.isfinite(each.values)).sum()) for own, each in zip(masks, drawn.tested, strict=True)
     )
-    labels = [getattr(mark, "label", "") for mark in PLOT.tests_sketch(result).panels[1].marks]
+    labels = [getattr(mark, "label", "") for mark in PLOT.tests(result).panels[1].marks]
     assert (f"outliers of the verdict ({count:,})" in labels) == (count > 0)
