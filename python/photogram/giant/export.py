@@ -76,7 +76,7 @@ def _write_refraction(common: Common, block: Block) -> list[Message]:
     )
     messages = []
     unit = block.linear_unit
-    if refraction.describe(unit) != said.describe(unit):
+    if refraction.phrase(unit) != said.phrase(unit):
         messages.append(
             Message(
                 f"COMMON can only switch refraction on: {refraction.describe(unit)} is read as"

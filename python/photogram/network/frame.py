@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import Phrase
 
 
 @dataclass(frozen=True)
@@ -26,10 +27,14 @@ class Frame:
     origin: tuple[float, float, float] | None = None
     ellipsoid: tuple[float, float] = (6378137.0, 6356752.314245179)
 
+    @property
+    def phrase(self) -> Phrase:
+        """The frame as a message."""
+        own = Phrase(f"frame.{self.kind}")
+        if self.origin is not None:
+            place = zip(("latitude", "longitude", "height"), self.origin, strict=True)
+            own = Phrase("frame.origin", {"frame": own, **dict(place)})
+        return Phrase("frame.crs", {"frame": own, "crs": self.crs}) if self.crs else own
+
     def __str__(self) -> str:
-        at = (
-            ""
-            if self.origin is None
-            else " at latitude {:.9g}, longitude {:.9g}, height {:.9g}".format(*self.origin)
-        )
-        return self.kind + at + (f" ({self.crs})" if self.crs else "")
+        return str(self.phrase)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 from photogram.arguments.annotations import check_arguments
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram._photocore import RefractionRow
@@ -18,9 +19,6 @@ Air = Literal["giant", "standard"]
 Water = Literal["giant", "snell"]
 
 METRES_PER_UNIT = {"m": 1.0, "ft": 0.3048}  # Linear units whose length is known
-
-_AIR_NAMES = {"giant": "GIANT guide, Appendix F", "standard": "standard atmosphere"}
-_WATER_NAMES = {"giant": "GIANT guide, Appendix G", "snell": "Snell's law"}
 
 
 @dataclass(frozen=True)
@@ -62,15 +60,17 @@ class Refraction:
         if not 1 <= self.refractive_index < math.inf:
             raise InputError(f"refractive_index must be finite and at least 1, not {self.refractive_index}")
 
+    def phrase(self, linear_unit: str) -> Phrase:
+        """Return the models of refraction as a message."""
+        parts = [Phrase(f"refraction.air.{self.air}")] if self.air else []
+        if self.water:
+            fields = {"level": self.water_level, "unit": linear_unit, "index": self.refractive_index}
+            parts.append(Phrase(f"refraction.water.{self.water}", fields))
+        return Phrase("refraction", {"parts": parts}) if parts else Phrase("assume.no_refraction")
+
     def describe(self, linear_unit: str) -> str:
         """Return what is in force, in a line."""
-        parts = [f"air: {_AIR_NAMES[self.air]}"] if self.air else []
-        if self.water:
-            parts.append(
-                f"water below {self.water_level:.3f} {linear_unit}: {_WATER_NAMES[self.water]},"
-                f" index {self.refractive_index:g}"
-            )
-        return "; ".join(parts) or "none"
+        return str(self.phrase(linear_unit))
 
     def row(self, linear_unit: str) -> RefractionRow:
         """Return what the core takes: models, level, index, metres in the linear unit.

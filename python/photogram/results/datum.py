@@ -10,7 +10,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message, counted, listed
+from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.datum import DatumRow, InnerConstraints
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
@@ -18,6 +18,7 @@ from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import RotationCoefficient
 from photogram.results.covariance import Failure
 from photogram.results.selection import photo_components
+from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockNetwork, BlockSolution
@@ -63,18 +64,20 @@ class ResultDatum:
     row: DatumRow | None = field(default=None, repr=False)
     """As the core knows it."""
 
+    @property
+    def phrase(self) -> Phrase:
+        """The datum as a message."""
+        counts = (("points", self.points), ("photos", self.photos), ("attitudes", self.attitudes))
+        scaled = self.kind == "inner constraints" and self.scale
+        fields = {
+            "held": held_unknowns(self.held),
+            "over": [Phrase(f"datum.over.{name}", {"n": len(own)}) for name, own in counts if own],
+            "names": [*self.photos, *self.points],
+        }
+        return Phrase(f"datum.{self.kind}{'.scale' if scaled else ''}", fields)
+
     def __str__(self) -> str:
-        if self.kind == "minimum constraints":
-            return f"minimum constraints: held are {held_lines(self.held)}"
-        if self.kind == "inner constraints":
-            parts = (("point", self.points), ("photo", self.photos), ("attitude", self.attitudes))
-            counts = [counted(len(names), kind) for kind, names in parts if names]
-            return f"inner constraints over {' and '.join(counts)}{', scale included' if self.scale else ''}"
-        if self.kind == "relative":
-            return f"relative to {listed([*self.photos, *self.points])}"
-        if self.kind == "minimal control":
-            return "given by control that is exactly minimal"
-        return "given by the observations"
+        return str(self.phrase)
 
     @property
     def is_chosen(self) -> bool:
@@ -102,12 +105,15 @@ def holds_scale(held: Sequence[tuple[str, str]]) -> bool:
     return any(names.count(name) == 1 and not unknown.startswith(TURNS) for name, unknown in held)
 
 
-def held_lines(held: Sequence[tuple[str, str]]) -> str:
-    """Name unknowns with their photos, those of one name together."""
-    unknowns = dict.fromkeys(unknown for _, unknown in held)
-    return "; ".join(
-        f"{unknown} of {listed([photo for photo, other in held if other == unknown])}" for unknown in unknowns
-    )
+def held_unknowns(held: Sequence[tuple[str, str]]) -> list[Phrase]:
+    """Return fixed unknowns with their photos, those of one name together."""
+    photos: dict[str, list[str]] = {}
+    for photo, unknown in held:
+        photos.setdefault(unknown, []).append(photo)
+    return [
+        Phrase("datum.held", {"unknown": Phrase(f"axis.{unknown}"), "photos": own})
+        for unknown, own in photos.items()
+    ]
 
 
 def datum_of(
@@ -184,10 +190,11 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
     if datum.kind == "relative":
         return [Message(f"standard deviations are {datum}"), *messages]
     if datum.kind == "minimum constraints":
+        fixed = "; ".join(map(str, held_unknowns(datum.held)))
         return [
             Message(
                 "there is no control, and nothing else gives a datum: held at their initial values are"
-                f" {held_lines(datum.held)}; coordinates and standard deviations refer to these"
+                f" {fixed}; coordinates and standard deviations refer to these"
                 f"{_levelled(block, len(datum.held))}"
             )
         ]

@@ -6,13 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from photogram.messages import listed
 from photogram.results.features import Feature, Features, Quantity, directions
 from photogram.show.page import Cell, Column, Drawing, Part, Row, Section, Table, Text, decimals_of, fixed
 from photogram.show.quantity import members
-
-SHOWN = 4
-"""Points that are named of each feature."""
+from photogram.words import Phrase
 
 
 def features_section(features: Features | None, picture: Drawing | None = None) -> Section:
@@ -38,7 +35,7 @@ def features_section(features: Features | None, picture: Drawing | None = None) 
             tested,
             [
                 (Column("Feature", text=True), lambda each: each.name),
-                (Column("What", text=True), through),
+                (Column("What", text=True), lambda each: str(through(each))),
                 (Column("T", figures=4), lambda each: each.statistic),
                 (Column("of", decimals=0), lambda each: each.freedom),
                 (Column("p", figures=2), lambda each: each.probability),
@@ -64,11 +61,13 @@ def expansion(features: Features) -> str:
     return f"{features.k:.3f} ({100 * features.coverage:g} %, {law})"
 
 
-def through(feature: Feature) -> str:
-    """Say what a feature is, and which points it goes through."""
+def through(feature: Feature) -> Phrase:
+    """Return the form of a feature and its points as a message."""
+    first, *_, last = points = list(feature.points)
     if feature.kind == "distance":
-        return f"distance from {feature.points[0]} to {feature.points[1]}"
-    return f"{feature.kind} through {len(feature.points)} points: {listed(list(feature.points), SHOWN)}"
+        return Phrase("feature.distance", {"first": first, "last": last})
+    form = Phrase(f"feature.{feature.kind}")
+    return Phrase("feature.through", {"feature": form, "count": len(points), "points": points})
 
 
 def written(feature: Feature, quantity: Quantity) -> list[str]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
+from photogram.network.refraction import Refraction
 from photogram.results.result import Result
 from photogram.results.statement import translation
 from photogram.results.statement.budget import Budget
@@ -143,14 +144,14 @@ def _adjustment(found: Grounds) -> Said:
     total, out = int(result.used_images.sum()), len(found.removed)
     block = result.block
     held = translation.held(texts, result)
-    refraction = translation.refraction(texts, block.refraction, block.linear_unit)
-    frame = f"{translation.frame(texts, block.frame)}, {block.linear_unit}"
+    refraction = (block.refraction or Refraction()).phrase(block.linear_unit)
+    frame = f"{texts.text(block.frame.phrase)}, {block.linear_unit}"
     return [
         texts.said("assume.removed", n=out, all=total + out, percent=texts.percent(out / (total + out)))
         if out
         else texts.said("assume.none_removed"),
         texts.said("assume.held", held=held) if held else texts.said("assume.none_held"),
-        texts.said("assume.datum", datum=translation.datum(texts, result.datum), frame=frame),
+        texts.said("assume.datum", datum=result.datum.phrase, frame=frame),
         texts.said("assume.refraction", refraction=refraction),
     ]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from photogram.results.features import Features
-from photogram.results.statement import translation
+from photogram.results.features_report import through
 from photogram.results.statement.annexes import (
     adjustment_annex,
     budgets_annex,
@@ -193,7 +193,7 @@ def _features(texts: Texts, features: Features) -> Table:
     ]
     rows: list[Row] = []
     for each in features:
-        name = f"{each.name}: {translation.feature(texts, each)}"
+        name = f"{each.name}: {texts.text(through(each))}"
         for own in each.quantities:
             alike = np.array([other.sd for other in each.quantities if other.unit == own.unit])
             decimals = decimals_of(alike, smallest=True)
