@@ -123,33 +123,15 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule of verdicts.
-
-    Attributes
-    ----------
-    code
-        Name of the rule.
-    message
-        The message on the evidence; None if the rule does not fit.
-    exit
-        Exit code, if `grave` holds of the evidence.
-    advice
-        Codes of the next steps, if it gives the headline.
-    warning
-        Whether a user should look although the exit code is 0.
-    grave
-        When the rule forbids the use.
-    also
-        Whether the message has the variant `.also` for verdicts that forbid the use.
-    """
+    """A rule of verdicts."""
 
     code: str
-    message: Callable[[Evidence], Phrase | None]
-    exit: int
-    advice: tuple[str, ...]
-    warning: bool = False
-    grave: Callable[[Evidence], bool] = lambda _: True
-    also: bool = False
+    message: Callable[[Evidence], Phrase | None]  # On the evidence; None if the rule does not fit
+    exit: int  # Exit code, if `grave` holds of the evidence
+    advice: tuple[str, ...]  # Codes of the next steps, if it gives the headline
+    warning: bool = False  # Whether a user should look although the exit code is 0
+    grave: Callable[[Evidence], bool] = lambda _: True  # Whether it forbids the use
+    also: bool = False  # Whether the message has the variant `.also` for verdicts that forbid the use
 
 
 def verdict(found: Findings) -> Verdict:
