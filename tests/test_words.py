@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 import photogram
 from photogram import words
 from photogram.cli import app
+from photogram.messages import Message
 from photogram.results.statement import texts
 from photogram.statistics.verdict import RULES
 from photogram.words import Phrase, Words, on_command_line, table_of
@@ -60,6 +61,13 @@ def test_a_phrase_is_a_value():
         "fields": {"point": "7", "photo": "3"},
         "text": "image of point 7 on photo 3",
     }
+
+
+def test_a_remark_has_a_code():
+    remark = Message.of("read.repeated", n=2, names=["A on 1", "A on 2"], option=Phrase("option.repeated"))
+    assert (remark.code, remark.phrase.fields["n"]) == ("read.repeated", 2)
+    assert str(remark) == str(remark.phrase)
+    assert Message("a text of a file").code == ""
 
 
 def test_advice_names_functions_in_python_and_options_on_the_command_line():
