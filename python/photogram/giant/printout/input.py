@@ -86,24 +86,14 @@ def control_pages(
 
     Components that are not held are listed as they stand; `default_sd` stands for deviations of zero.
     """
-    return paginate(headed("GROUND CONTROL DATA"), (_entry(space, point, default_sd) for point in ground))
-
-
-def _entry(space: Space, point: GroundPoint, default_sd: tuple[float, float, float]) -> list[str]:
-    sd = [given or default for given, default in zip(point.sd, default_sd, strict=True)]
-    first, second, third = (
-        f"{name} = {value}     ST. D. = {deviation}"
-        for name, value, deviation in zip(
-            space.names, space.values(point.position, 4), space.values(sd, 4), strict=True
-        )
-    )
-    return [
-        f"{'':10}{first}",
-        f"{point.name:<10}{second}     TYPE = {point.type_code}",
-        f"{'':10}{third}",
-        "",
-        "",
-    ]
+    entries = []
+    for point in ground:
+        deviations = [sd or default for sd, default in zip(point.sd, default_sd, strict=True)]
+        rows = zip(space.names, space.values(point.position, 4), space.values(deviations, 4), strict=True)
+        first, second, third = (f"{axis} = {value}     ST. D. = {sd}" for axis, value, sd in rows)
+        middle = f"{point.name:<10}{second}     TYPE = {point.type_code}"
+        entries.append([f"{'':10}{first}", middle, f"{'':10}{third}", "", ""])
+    return paginate(headed("GROUND CONTROL DATA"), entries)
 
 
 ACROSS = 4  # Plate coordinates, or names of points, on a line
@@ -173,15 +163,12 @@ def _plates(images: ImageFrame) -> list[Sequence[str]]:
 
 def warning_pages(warnings: Iterable[ErrorWarning]) -> list[Page]:
     """Return the pages of the warnings; none where there is nothing to warn of."""
-    entries = [entry for warning in warnings for entry in _entries(warning)]
+    entries: list[list[str]] = []
+    for warning in warnings:
+        # The heading is on one page with the first names.
+        heading = [*(["ERROR WARNINGS", ""] if warning.general else []), warning.heading, ""]
+        for row in range(0, len(warning.names), ACROSS):
+            names = "".join(f"{name:<20}" for name in warning.names[row : row + ACROSS])
+            entries.append([names] if row else [*heading, names])
+        entries.append(["", ""])
     return paginate([""], entries) if entries else []
-
-
-def _entries(warning: ErrorWarning) -> list[list[str]]:
-    """Keep the heading with the first names."""
-    heading = ["ERROR WARNINGS", ""] if warning.general else []
-    names = [
-        ["".join(f"{name:<20}" for name in warning.names[row : row + ACROSS])]
-        for row in range(0, len(warning.names), ACROSS)
-    ]
-    return [[*heading, warning.heading, "", *names[0]], *names[1:], ["", ""]]

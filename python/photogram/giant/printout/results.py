@@ -38,33 +38,25 @@ def station_pages(
         f"{'IDENT':<10}{'POSITION':^{POSITION}}{matrix}"
         f"   {f'ATT({attitude_name(photo_to_ground)})':^{ATTITUDE}}{matrix}".rstrip(),
     )
-    entries = (
-        _station(
-            space, name, positions[row], attitudes[row], None if covariances is None else covariances[row]
+    entries = []
+    for photo, name in enumerate(names):
+        covariance = None if covariances is None else covariances[photo]
+        rows = zip(
+            ("", name, ""),
+            space.names,
+            space.values(positions[photo], 4),
+            matrix_rows(None if covariance is None else covariance[:3, :3]),
+            ("OMEGA", "PHI", "KAPPA"),
+            attitude(attitudes[photo]),
+            matrix_rows(None if covariance is None else covariance[3:, 3:]),
+            strict=True,
         )
-        for row, name in enumerate(names)
-    )
+        lines = [
+            f"{ident:<10}{axis} ={value}{matrix}   {angle:<5} ={turn}{turn_matrix}"
+            for ident, axis, value, matrix, angle, turn, turn_matrix in rows
+        ]
+        entries.append([*lines, ""])
     return paginate(heading, entries)
-
-
-def _station(
-    space: Space, name: str, position: Floats, angles: Floats, covariance: Floats | None
-) -> list[str]:
-    rows = zip(
-        ("", name, ""),
-        space.names,
-        space.values(position, 4),
-        matrix_rows(None if covariance is None else covariance[:3, :3]),
-        ("OMEGA", "PHI", "KAPPA"),
-        attitude(angles),
-        matrix_rows(None if covariance is None else covariance[3:, 3:]),
-        strict=True,
-    )
-    lines = [
-        f"{ident:<10}{axis} ={value}{matrix}   {angle:<5} ={turn}{turn_matrix}"
-        for ident, axis, value, matrix, angle, turn, turn_matrix in rows
-    ]
-    return [*lines, ""]
 
 
 TITLE = "TRIANGULATED GROUND POINTS"
@@ -104,28 +96,19 @@ def propagated_point_pages(
         f"   {'STANDARD DEV':^{VALUE}}".rstrip(),
     )
     deviations = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    rows = zip(names, marks, positions.tolist(), covariances, deviations.tolist(), strict=True)
-    entries = (_entry(space, *row) for row in rows)
+    entries = []
+    points = zip(names, marks, positions.tolist(), covariances, deviations.tolist(), strict=True)
+    for name, mark, position, covariance, point_sd in points:
+        rows = zip(
+            ("", _ident(name, mark), ""),
+            _labelled(space, space.values(position, 4)),
+            matrix_rows(covariance),
+            space.values(point_sd, 4),
+            strict=True,
+        )
+        lines = [f"{ident:<{IDENT}}{value}{matrix}   {sd}" for ident, value, matrix, sd in rows]
+        entries.append([*lines, ""])
     return paginate(heading, entries, closing=_summary(space, deviations, ~held))
-
-
-def _entry(
-    space: Space,
-    name: str,
-    mark: str,
-    position: Iterable[float],
-    covariance: Floats,
-    deviations: Iterable[float],
-) -> list[str]:
-    rows = zip(
-        ("", _ident(name, mark), ""),
-        _labelled(space, space.values(position, 4)),
-        matrix_rows(covariance),
-        space.values(deviations, 4),
-        strict=True,
-    )
-    lines = [f"{ident:<{IDENT}}{value}{matrix}   {sd}" for ident, value, matrix, sd in rows]
-    return [*lines, ""]
 
 
 def _ident(name: str, mark: str) -> str:
