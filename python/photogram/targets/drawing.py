@@ -50,7 +50,13 @@ def plot_uncertainty(found: UncertaintyMap) -> Plot:
     found
         The map.
     """
-    marks = [*_known(found), *_seen(found.corners, found.coverage)]
+    marks, coverage = _known(found), found.coverage
+    if len(found.corners):
+        step = -(-len(found.corners) // MAX_DOTS)
+        marks += [
+            Markers(found.corners[::step], ".", 2.5, "white", edge=0.0, opacity=0.6),
+            Line(np.vstack([coverage, coverage[:1]]), VERMILION, 1.2),
+        ]
     panel = _map(found.size, found.columns, found.rows, found.sd, "px", marks)
     title = found.title + "\n" + found.model.replace("; ", "\n")
     return Plot(WIDTH_INCHES, _height(found.size), [replace(panel, title=title)])
@@ -204,16 +210,6 @@ def _known(found: UncertaintyMap) -> list[Mark]:
         along = half * [1 - right, 1 - up]
         ends.append(np.stack([middle - along, middle + along], axis=1))
     return [Line(np.concatenate(ends), INK, 0.9, "--")]
-
-
-def _seen(corners: Floats, coverage: Floats) -> list[Mark]:
-    if not len(corners):
-        return []
-    step = -(-len(corners) // MAX_DOTS)
-    return [
-        Markers(corners[::step], ".", 2.5, "white", edge=0.0, opacity=0.6),
-        Line(np.vstack([coverage, coverage[:1]]), VERMILION, 1.2),
-    ]
 
 
 def in_pixels(size: tuple[int, int]) -> Panel:

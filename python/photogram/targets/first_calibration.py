@@ -267,7 +267,16 @@ def first_values(
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
     for order, turn in seen.listings.turns.items():
         made[rig.turned == order] = made[rig.turned == order] @ inverted(turn)
-    remarks += [*of_orders, *_of_rig(rig, corners), *(_frontal(made, corners) if seen.is_flat else ())]
+    remarks += [*of_orders, *_of_rig(rig, corners)]
+    frontal = np.flatnonzero(frontal_tilts(made) < MIN_TILT_RAD).tolist() if seen.is_flat else []
+    if frontal:
+        names = listed([corners.pictures[row] for row in frontal])
+        remarks.append(
+            Message(
+                f"{counted(len(frontal), 'picture')} of a board that is parallel to the image within 3"
+                f" degrees, and says nothing of the focal length: {names}"
+            )
+        )
     made, numbers = made @ seen.axes, seen.listings.points
     point = numbers[rig.turned[corners.picture], numbers[orders[corners.picture], corners.point]]
     return FirstCalibration(
@@ -332,18 +341,6 @@ def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
         for k in alone
     ]
     return told
-
-
-def _frontal(made: Floats, corners: Corners) -> list[Message]:
-    names = [corners.pictures[row] for row in np.flatnonzero(frontal_tilts(made) < MIN_TILT_RAD).tolist()]
-    if not names:
-        return []
-    return [
-        Message(
-            f"{counted(len(names), 'picture')} of a board that is parallel to the image within 3 degrees, and"
-            f" says nothing of the focal length: {listed(names)}"
-        )
-    ]
 
 
 def _of_views(made: Floats, rig: Rig, corners: Corners) -> Floats:

@@ -27,26 +27,25 @@ def plot_planned_views(plan: ViewPlan) -> Plot:
     plan
         The plan.
     """
-    (size,) = plan.calibrated.calibration.corners.sizes
+    corners = plan.calibrated.calibration.corners
+    (size,) = corners.sizes
     assert size is not None
     rows = -(-len(plan.views) // PANELS_PER_ROW)
-    panels = [_view(plan, number, size) for number in range(len(plan.views))]
+    panels = list[Panel]()
+    for number in range(len(plan.views)):
+        own = corners.xy[corners.picture == number]
+        marks: list[Mark] = [
+            Polygons(hull(own)[np.newaxis], FAINT, 0.5, BLUE, 0.5, 1.0),
+            Markers(own, ".", 2.5, BLUE),
+        ]
+        if corners.point[corners.picture == number][0] == 0:
+            marks.append(Markers(own[:1], "o", 5.0, VERMILION))
+        title = f"{number + 1}"
+        panels.append(replace(in_pixels(size), marks=marks, title=title, across="", up="", unnumbered=True))
     every = [*panels, *[None] * (rows * PANELS_PER_ROW - len(panels))]
     return Plot(
         PANEL_INCHES * PANELS_PER_ROW, rows * (0.3 + PANEL_INCHES * size[1] / size[0]), every, PANELS_PER_ROW
     )
-
-
-def _view(plan: ViewPlan, number: int, size: tuple[int, int]) -> Panel:
-    corners = plan.calibrated.calibration.corners
-    own = corners.xy[corners.picture == number]
-    marks: list[Mark] = [
-        Polygons(hull(own)[np.newaxis], FAINT, 0.5, BLUE, 0.5, 1.0),
-        Markers(own, ".", 2.5, BLUE),
-    ]
-    if corners.point[corners.picture == number][0] == 0:
-        marks.append(Markers(own[:1], "o", 5.0, VERMILION))
-    return replace(in_pixels(size), marks=marks, title=f"{number + 1}", across="", up="", unnumbered=True)
 
 
 check_arguments(globals(), __all__)

@@ -86,18 +86,13 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
         weighted = weights[part] @ by_motion
         normal += weighted.reshape(-1, 6).T @ by_motion.reshape(-1, 6)
         if isinstance(images, Touched):
-            add_touched(right, weighted, images)
+            products = weighted.transpose(0, 2, 1) @ images.by_columns
+            columns = images.columns.ravel()
+            for row, own in enumerate(right):
+                own += np.bincount(columns, products[:, row].ravel(), minlength=len(own))
         else:
             right += weighted.reshape(-1, 6).T @ images.by_parameters.reshape(2 * len(weighted), -1)
     return _moved_back(normal, right, finite)
-
-
-def add_touched(sums: Floats, rows: Floats, images: Touched) -> None:
-    """Add rows' K, of (n, 2, m) rows, to (m, p) sums."""
-    products = rows.transpose(0, 2, 1) @ images.by_columns
-    columns = images.columns.ravel()
-    for row, own in enumerate(sums):
-        own += np.bincount(columns, products[:, row].ravel(), minlength=len(own))
 
 
 def housing_rows(housing: Housing) -> Floats:
@@ -140,7 +135,9 @@ def projection_cofactors(
     The distance is from the centre of this camera, infinite of directions; `rows` are (6, c + 6) the datum
     (:func:`datum_rows`).
     """
-    cofactors, own = with_motion(housing, camera, rows), housing.cameras[camera]
+    own, unknowns, moved = housing.cameras[camera], housing.parameters(camera), rows @ housing.cofactors
+    across = moved[:, unknowns]  # of the motion of the axes and of the parameters of the camera
+    cofactors = np.block([[housing.cofactors[unknowns, unknowns], across.T], [across, moved @ rows.T]])
     found = np.empty((len(pixels), 2, 2))
     for start in range(0, len(pixels), PIXELS_PER_BATCH):
         part = pixels[start : start + PIXELS_PER_BATCH]
@@ -163,12 +160,6 @@ def _of_touched(camera: Camera, pixels: Floats, distance: float, cofactors: Floa
     partials = np.concatenate([images.by_columns, by_motion], axis=2)
     own = cofactors[columns[:, :, np.newaxis], columns[:, np.newaxis]]
     return np.asarray(partials @ own @ partials.transpose(0, 2, 1))
-
-
-def with_motion(housing: Housing, camera: int, rows: Floats) -> Floats:
-    """Return the (p + 6, p + 6) cofactors of a camera's parameters and of the motion of its axes."""
-    own, moved = housing.parameters(camera), rows @ housing.cofactors
-    return np.block([[housing.cofactors[own, own], moved[:, own].T], [moved[:, own], moved @ rows.T]])
 
 
 def common_partials(housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats) -> Floats:

@@ -231,7 +231,13 @@ class Start(Valued, Brief):
         names = [*corners.pictures, *frames]
         alone = photo >= len(corners.pictures)
         centres, attitudes = photo_poses(np.concatenate([self.picture_poses(), poses[alone]]))
-        use = corners.use
+        use, mounts = corners.use, []
+        if self.sync == "known":
+            sensors = self._sensors()
+            mounts = [
+                Mount(names[row], names[photo[corners.views[row]]], sensors[corners.cameras[row]])
+                for row in np.flatnonzero(self.tied[corners.cameras]).tolist()
+            ]
         return Block(
             photo_ids=names,
             photo_positions=centres,
@@ -245,7 +251,7 @@ class Start(Valued, Brief):
             image_points=corners.point[use],
             image_xy=corners.xy[use],
             image_sd=np.repeat(corners.sd[use, np.newaxis] * (self.sd0 or self.assumed), 2, axis=1),
-            mounts=self._mounts(names, photo) if self.sync == "known" else [],
+            mounts=mounts,
             timed=self._timed() if self.sync == "offset" else [],
             linear_unit=self.board.unit,
             passages=[Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
@@ -278,13 +284,6 @@ class Start(Valued, Brief):
         return pictures_in_motion(
             self.corners, poses, np.asarray(self.motion), times, self._sensors(), clocks
         )
-
-    def _mounts(self, names: Sequence[str], photo: Indices) -> list[Mount]:
-        corners, sensors = self.corners, self._sensors()
-        return [
-            Mount(names[row], names[photo[corners.views[row]]], sensors[corners.cameras[row]])
-            for row in np.flatnonzero(self.tied[corners.cameras]).tolist()
-        ]
 
     def residuals(self) -> Floats:
         """Return (n, 2) observed less computed with the values that are given, pixels; no adjustment."""

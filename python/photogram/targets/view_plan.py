@@ -83,8 +83,10 @@ def plan_views(
         checked_distance(each)
     told = progress or (lambda _: None)
     board = board.replace(shape=board.shape_of(views))
-    held = sorted(away or _filling(camera, board, size))
-    middle = rays(camera, (np.array([size]) - 1) / 2)[0]
+    centre = (np.array(size) - 1) / 2
+    middle, beside = rays(camera, np.stack([centre, centre + np.array([1.0, 0.0])]))
+    pixels = float(np.ptp(board.places, axis=0).max() / np.linalg.norm(beside - middle))  # times distance
+    held = sorted(away or [pixels / (share * min(size)) for share in BOARD_OF_PICTURE])
     first = [held[len(held) // 2]]
     taken = views_towards(middle, "middle of the picture", board, first, FIRST_TILTS, [""])
     candidates = views_over_picture(camera, size, board, held, whole=board.found_whole)
@@ -108,15 +110,6 @@ def plan_views(
         distance=worst,
         need=need,
     )
-
-
-def _filling(camera: Camera, board: Board, size: tuple[int, int]) -> list[float]:
-    """Return the distances at which the longer side of a board takes its shares of a picture."""
-    middle = (np.array(size) - 1) / 2
-    ahead, beside = rays(camera, np.stack([middle, middle + np.array([1.0, 0.0])]))
-    pixels = 1 / float(np.linalg.norm(beside - ahead))
-    longer = float(np.ptp(board.places, axis=0).max())
-    return [longer * pixels / (share * min(size)) for share in BOARD_OF_PICTURE]
 
 
 def _predicted(
