@@ -119,7 +119,16 @@ class Board(Valued, Brief):
                 f" {MAX_POINTS} points are the most"
             )
         if self.kind == "aprilgrid":
-            self._check_tags()
+            for name in ("tag_size", "tag_spacing"):
+                if getattr(self, name) is None:
+                    raise InputError(f"an AprilGrid has a {name}")
+                self._set(name, _length(name, getattr(self, name)))
+            assert self.tag_size is not None
+            assert self.tag_spacing is not None
+            pitch = self.tag_size * (1 + self.tag_spacing)
+            if self.spacing not in (None, pitch, (pitch, pitch)):
+                raise InputError("the spacing of an AprilGrid is that of tag_size and tag_spacing")
+            self._set("spacing", (pitch, pitch))
             return
         self._refuse("tag_size", "tag_spacing")
         if self.spacing is None:
@@ -128,18 +137,6 @@ class Board(Valued, Brief):
         if len(both) != 2:
             raise InputError(f"the spacing of a board is one number, or two, not {len(both)}")
         self._set("spacing", (_length("spacing", both[0]), _length("spacing", both[1])))
-
-    def _check_tags(self) -> None:
-        for name in ("tag_size", "tag_spacing"):
-            if getattr(self, name) is None:
-                raise InputError(f"an AprilGrid has a {name}")
-            self._set(name, _length(name, getattr(self, name)))
-        assert self.tag_size is not None
-        assert self.tag_spacing is not None
-        pitch = self.tag_size * (1 + self.tag_spacing)
-        if self.spacing not in (None, pitch, (pitch, pitch)):
-            raise InputError("the spacing of an AprilGrid is that of tag_size and tag_spacing")
-        self._set("spacing", (pitch, pitch))
 
     def _check_points(self) -> None:
         self._refuse("tag_size", "tag_spacing", "spacing")

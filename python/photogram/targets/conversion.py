@@ -202,7 +202,11 @@ def convert_lens(
         infinite beside finite ones; a radius that leaves too few pixels.
     """
     size = (whole_number("size", size[0]), whole_number("size", size[1]))
-    apart = _checked_distances(distances)
+    apart = tuple(number("distance", each) for each in distances)
+    if not apart or not all(each > 0 for each in apart):
+        raise InputError(f"distances are positive, not {', '.join(map(str, apart)) or 'none'}")
+    if len({math.isfinite(each) for each in apart}) > 1:
+        raise InputError("distances: infinity does not go with finite ones: give a large one in its place")
     start = lens_of(model, source, size, knots)
     columns, rows, pixels = image_grid(size, GRID)
     known = _known(source, covariance)
@@ -244,15 +248,6 @@ def convert_lens(
         names=tuple(free),
         covariance=passed,
     )
-
-
-def _checked_distances(distances: Sequence[float]) -> tuple[float, ...]:
-    found = tuple(number("distance", each) for each in distances)
-    if not found or not all(each > 0 for each in found):
-        raise InputError(f"distances are positive, not {', '.join(map(str, found)) or 'none'}")
-    if len({math.isfinite(each) for each in found}) > 1:
-        raise InputError("distances: infinity does not go with finite ones: give a large one in its place")
-    return found
 
 
 def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tuple[list[int], Floats] | None:

@@ -102,12 +102,6 @@ class Corners(Valued, Brief):
         self._set("use", frozen(np.broadcast_to(np.asarray(self.use, dtype=bool), (corners,)).copy()))
         if self.times is not None:
             self._set("times", shaped("times", self.times, (pictures,)))
-        self._check_values()
-
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
-
-    def _check_values(self) -> None:
         for what, bad in (
             ("is not a finite position", ~np.isfinite(self.xy).all(axis=1)),
             ("has no positive standard deviation", ~((self.sd > 0) & np.isfinite(self.sd))),
@@ -121,6 +115,9 @@ class Corners(Valued, Brief):
             raise InputError(
                 f"the picture {self.pictures[row]} is the second of the camera {camera} in its view"
             )
+
+    def _set(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
 
     def title(self, row: int) -> str:
         """Return what a corner is called."""

@@ -80,7 +80,12 @@ def fitted_motion(
         moved = transformed(motion, towards)
         by_motion = motion_partials(moved, finite)[:, :, free]
         if criterion == "pixels":
-            normal, right = _pixel_step(b, moved, places, weights, by_motion)
+            images = imaged(b, moved)
+            known = np.isfinite(images.xy).all(axis=1)
+            partials = (images.by_point @ by_motion)[known]
+            weighted = (weights[known] @ partials).reshape(-1, partials.shape[2])
+            normal = weighted.T @ partials.reshape(weighted.shape)
+            right = weighted.T @ (places - images.xy)[known].ravel()
         else:
             normal, right = _angle_step(moved, aims, weights**2, by_motion)
         step = np.zeros(6)
@@ -89,18 +94,6 @@ def fitted_motion(
         if np.abs(step[3:]).max() < TOLERANCE and np.abs(step[:3]).max() < TOLERANCE * np.min(distances):
             break
     return Fitted(motion, finite, count)
-
-
-def _pixel_step(
-    b: Camera, moved: Floats, places: Floats, weights: Floats, by_motion: Floats
-) -> tuple[Floats, Floats]:
-    """Return normal equations of sum d' W d."""
-    images = imaged(b, moved)
-    known = np.isfinite(images.xy).all(axis=1)
-    partials = (images.by_point @ by_motion)[known]
-    weighted = (weights[known] @ partials).reshape(-1, partials.shape[2])
-    apart = (places - images.xy)[known].ravel()
-    return weighted.T @ partials.reshape(weighted.shape), weighted.T @ apart
 
 
 def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats) -> tuple[Floats, Floats]:

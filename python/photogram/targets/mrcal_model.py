@@ -106,7 +106,12 @@ def read_model(path: Path) -> Calibration:
     if seen is None or seen.ndim != 4:
         raise InputError(f"its {KEY} hold no corners of a board", file=path)
     observed = arrays.numbers("observations_board", None, None, None, 3)
-    indices = _indices(arrays, len(observed))
+    if INDICES not in arrays:
+        raise InputError(f"its {KEY} have no {INDICES}", file=path)
+    # View, camera and sensor of each picture; sensor -1 is at the reference
+    indices = arrays.numbers(INDICES, len(observed), 3).astype(np.int64)
+    if (indices[:, :2] < 0).any() or (indices[:, 2] < -1).any():
+        raise arrays.error(INDICES, "counts from 0, sensors from -1")
     for held in ("do_optimize_frames", "do_optimize_extrinsics"):
         if held in arrays and not arrays.says(held):
             raise arrays.error(held, "is false: poses that were held are not taken")
@@ -163,16 +168,6 @@ def _content(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or "lensmodel" not in content:
         raise InputError("is no camera model of mrcal: it has no lensmodel", file=path)
     return content
-
-
-def _indices(arrays: Arrays, count: int) -> Indices:
-    """Return (P, 3) view, camera and sensor of each picture; sensor -1 is at the reference."""
-    if INDICES not in arrays:
-        raise InputError(f"its {KEY} have no {INDICES}", file=arrays.path)
-    found = arrays.numbers(INDICES, count, 3).astype(np.int64)
-    if (found[:, :2] < 0).any() or (found[:, 2] < -1).any():
-        raise arrays.error(INDICES, "counts from 0, sensors from -1")
-    return found
 
 
 def _cameras(arrays: Arrays) -> list[Camera]:

@@ -207,7 +207,12 @@ class Listings:
         shapes: list[int] = []
         turns: dict[int, Floats] = {}
         for own, listed in enumerate(points):
-            turn = _turn(places, places[listed])
+            # The motion that takes places nearest to the listed ones, with z kept upright
+            middles = places.mean(axis=0), places[listed].mean(axis=0)
+            products = (places[listed] - middles[1]).T @ (places - middles[0])
+            products[2, 2] += WEIGHT_OF_FIXED_AXIS * np.abs(products).max()
+            rotation = nearest_rotations(products[np.newaxis])[0]
+            turn = composed(rotation, middles[1] - rotation @ middles[0])
             if np.abs(places @ turn[:3, :3].T + turn[:3, 3] - places[listed]).max() < tolerance:
                 turns[own] = turn
             with_one = np.column_stack([places[:, :2], np.ones(len(places))])
@@ -222,15 +227,6 @@ def _listed(i: Indices, j: Indices, columns: int, rows: int) -> list[Indices]:
     """Return the numbers of points in columns i and rows j, counted from either end."""
     last = [(i, j), (i, rows - 1 - j), (columns - 1 - i, j), (columns - 1 - i, rows - 1 - j)]
     return [row * columns + column for column, row in last]
-
-
-def _turn(places: Floats, listed: Floats) -> Floats:
-    """Return the (4, 4) motion that takes places nearest to others, their z kept upright."""
-    middles = places.mean(axis=0), listed.mean(axis=0)
-    products = (listed - middles[1]).T @ (places - middles[0])
-    products[2, 2] += WEIGHT_OF_FIXED_AXIS * np.abs(products).max()
-    rotation = nearest_rotations(products[np.newaxis])[0]
-    return composed(rotation, middles[1] - rotation @ middles[0])
 
 
 @dataclass(frozen=True, eq=False)

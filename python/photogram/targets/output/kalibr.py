@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from photogram.io.yaml_text import figures
 from photogram.targets.output.rig import Rig, Terms, terms_of
+from photogram.targets.vision import inverted
 
 TITLE = "camchain.yaml of Kalibr"
 TERMS = 4
@@ -30,7 +31,8 @@ def kalibr_camchain(rig: Rig) -> dict[str, bytes]:
             f"  rostopic: /{rig.files[row]}/image_raw",
         ]
         if row:
-            lines += ["  T_cn_cnm1:", *(f"  - {figures(each)}" for each in rig.from_before(row))]
+            from_before = rig.sensors[row] @ inverted(rig.sensors[row - 1])
+            lines += ["  T_cn_cnm1:", *(f"  - {figures(each)}" for each in from_before)]
     return {"camchain.yaml": "\n".join([*lines, ""]).encode()}
 
 

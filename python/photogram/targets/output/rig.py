@@ -15,7 +15,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.vision import inverted
 
 # Pinhole, in the order of OpenCV; k4, k5, k6 are in the denominator
 TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
@@ -101,10 +100,6 @@ class Rig:
     def tied(self, camera: int) -> bool:
         """Return whether the pose of a camera to camera 0 is known."""
         return bool(np.isfinite(self.sensors[camera]).all())
-
-    def from_before(self, camera: int) -> Floats:
-        """Return (4, 4) the camera before -> a camera."""
-        return np.asarray(self.sensors[camera] @ inverted(self.sensors[camera - 1]))
 
     def size(self, camera: int) -> tuple[int, int]:
         """Return width and height of the pictures of a camera; an InputError where they are not known."""
