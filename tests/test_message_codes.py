@@ -8,9 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 import photogram
-from photogram import words
+from photogram import Message, words
 from photogram.cli import app
-from photogram.messages import Message
 from photogram.results.statement import texts
 from photogram.statistics.verdict import RULES
 from photogram.words import Phrase, Words, on_command_line, table_of
