@@ -90,14 +90,7 @@ def read(
     path = Path(path)
     models, boards, corners = sorted_files(path)
     described = [board] if isinstance(board, Path) else boards if board is None else []
-    if len(described) > 1:
-        raise InputError(
-            f"there are {len(described)} boards, {listed([each.name for each in described])}: several boards"
-            " that are fixed to each other are one of the kind points; those whose relative pose is unknown"
-            " are not taken yet",
-            file=described[1],
-        )
-    own = board if isinstance(board, Board) else next(map(read_board, described), None)
+    own = board if isinstance(board, Board) else _only_board(described)
     size = size or next(map(picture_size, described), None)
     if knots is not None and (models or model != KNOTTED):
         raise InputError(f"knots: the lens has a number of them where it is {KNOTTED}, and no file says it")
@@ -152,6 +145,17 @@ def read(
 def _not_used(corners: Corners) -> list[Message]:
     left = int(np.count_nonzero(~corners.use))
     return [Message(f"{counted(left, 'corner')} not used, as the file says")] if left else []
+
+
+def _only_board(boards: Sequence[Path]) -> Board | None:
+    if len(boards) > 1:
+        names = listed([each.name for each in boards])
+        raise InputError(
+            f"there are {len(boards)} boards, {names}: several boards that are fixed to each other are one of"
+            " the kind points; those whose relative pose is unknown are not taken yet",
+            file=boards[1],
+        )
+    return read_board(boards[0]) if boards else None
 
 
 def _given(
