@@ -202,10 +202,7 @@ def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossVali
 def median_distance(calibrated: Calibrated, camera: int) -> float:
     """Return how far the middle of the board was from a camera in the median view, in two figures."""
     housing, own = housing_of(calibrated, camera)
-    views = np.unique(housing.seen.views[housing.seen.cameras == own])
-    middle = [*(housing.points.max(axis=0) + housing.points.min(axis=0)) / 2, 1.0]
-    places = (housing.sensors[own] @ housing.poses[views] @ middle)[:, :3]
-    return float(f"{np.median(np.linalg.norm(places, axis=1)):.{DISTANCE_FIGURES}g}")
+    return float(f"{np.median(housing.board_distances(own)):.{DISTANCE_FIGURES}g}")
 
 
 check_arguments(globals(), ["cross_validate"])

@@ -21,6 +21,7 @@ from photogram.statistics.verdict import LARGEST_FACTOR, verdict
 from photogram.targets.calibration_result import Calibrated, UnknownWeight, Worth, deviation_of_corners
 from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
+from photogram.targets.housing import middle_of
 from photogram.targets.picture_parts import PARTS, parts_of
 from photogram.targets.vision import rays
 from photogram.words import Phrase
@@ -76,8 +77,7 @@ def _rounded(value: float) -> str:
 def showings(calibrated: Calibrated) -> list[Showing]:
     """Return how the board was shown to each camera that saw it."""
     corners, board = calibrated.calibration.corners, calibrated.calibration.board
-    points = calibrated.points
-    middle = [*(points.max(axis=0) + points.min(axis=0)) / 2, 1.0]
+    middle = [*middle_of(calibrated.points), 1.0]
     # A picture whose corners were all taken out, or left out, shows nothing.
     shows = np.bincount(corners.picture[corners.use], minlength=len(corners.pictures)) > 0
     found = []

@@ -108,6 +108,17 @@ class Housing:
         poses = (self.sensors[camera] @ self.poses)[seen.views] if seen.poses is None else seen.poses
         return transformed(poses, self.points[seen.points]), seen.sd
 
+    def board_distances(self, camera: int) -> Floats:
+        """Return (v,) distances of the middle of the board from a camera, in the views that it has seen."""
+        views = np.unique(self.seen.views[self.seen.cameras == camera])
+        places = (self.sensors[camera] @ self.poses[views] @ [*middle_of(self.points), 1.0])[:, :3]
+        return np.asarray(np.linalg.norm(places, axis=1))
+
+
+def middle_of(points: Floats) -> Floats:
+    """Return (3,) the middle of (n, 3) points of a board."""
+    return np.asarray((points.max(axis=0) + points.min(axis=0)) / 2)
+
 
 def transformed(poses: Floats, points: Floats) -> Floats:
     """Return (n, 3) points by a pose (4, 4), or each by its own (n, 4, 4)."""

@@ -14,7 +14,7 @@ from photogram.errors import InputError
 from photogram.network.cameras import Camera
 from photogram.targets.board import Board
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.housing import Housing, transformed
+from photogram.targets.housing import Housing, middle_of, transformed
 from photogram.targets.housings import camera_number, housed_with, housing_of, size_of
 from photogram.targets.maps import image_grid
 from photogram.targets.new_views import Candidate, Suggestions, best_views, shown_of
@@ -94,11 +94,8 @@ def suggest_views(
 
 def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board: Board) -> list[Candidate]:
     """Return views of the board all over the picture of a camera, at three distances, tilted and turned."""
-    to_camera = housing.sensors[camera]
-    own = np.unique(housing.seen.views[housing.seen.cameras == camera])
-    places = (to_camera @ housing.poses[own] @ [*middle_of(housing.points), 1.0])[:, :3]
-    away = np.quantile(np.linalg.norm(places, axis=1), DISTANCE_QUANTILES).tolist()
-    to_first = inverted(to_camera)
+    away = np.quantile(housing.board_distances(camera), DISTANCE_QUANTILES).tolist()
+    to_first = inverted(housing.sensors[camera])
     counts = np.unique(housing.seen.views[housing.seen.cameras == camera], return_counts=True)[1]
     whole = board.found_whole and np.median(counts) == len(housing.points)
     found = views_over_picture(housing.cameras[camera], size, board, away, whole=bool(whole))
@@ -157,11 +154,6 @@ def views_towards(
         words = (place, f"{distance} {board.unit}", tilt, turn)
         found.append(Candidate(", ".join(filter(None, words)), pose))
     return found
-
-
-def middle_of(points: Floats) -> Floats:
-    """Return (3,) the middle of (n, 3) points of a board."""
-    return np.asarray((points.max(axis=0) + points.min(axis=0)) / 2)
 
 
 check_arguments(globals(), ["suggest_views"])
