@@ -94,7 +94,7 @@ def test_a_wrong_check_point_heads_the_verdict():
     page = result.document()
     assert page.judgements[0].tone == "bad"
     assert page.advice[0].code == "advice.wrong-checks"
-    assert not any("Nothing needs" in each for each in page.advice)
+    assert not any("Nothing needs" in str(each) for each in page.advice)
     good = adjust(block())
     assert good.verdict.exit == 0
     assert {"check points together"} < {test.name for test in good.verdict.tests}

@@ -38,7 +38,7 @@ def see(result, document=True):
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
     """Leave the pictures out that pages draw at once: they have no sentences."""
-    monkeypatch.setattr("photogram.comparator.document.sketches", lambda _: {})
+    monkeypatch.setattr("photogram.comparator.document.plotters", lambda _: {})
     monkeypatch.setattr("photogram.stellar.document.sketches", lambda _: {})
     monkeypatch.setattr("photogram.stellar.night_document.sketches", lambda _: {})
 

@@ -206,7 +206,7 @@ def test_a_project_declares_them(run, tmp_path):
     assert "bore" not in others.stdout
     assert "k = 3" in others.stdout
     again = run("features", "part-adjusted/adjusted", "--circle", "again=hole-*")
-    assert f"{diameter['value']:.6f}" in again.stdout
+    assert f"{diameter['value']:.7f}" in again.stdout
 
     for line, message in (
         ('bore = { circle = ["nobody-*"] }', "the feature bore: there is no point 'nobody-*'"),

@@ -128,9 +128,8 @@ def test_sentences_decide_nothing(command, tmp_path, monkeypatch):
         folder = tmp_path / str(number)
         own = [str(EXAMPLES / word) if (EXAMPLES / word).exists() else word for word in rest]
         own = [str(folder / word) if word == "o.json" else word for word in own]
-        out = () if command == "check" else ("--out", str(folder / "o"))
         try:
-            ends.append(run(folder, [name, *own, *out]))
+            ends.append(run(folder, [name, *own, "--out", str(folder / "o")]))
         finally:
             words.words_of.cache_clear()
     assert ends[0] == ends[1]

@@ -441,7 +441,7 @@ def test_plan_takes_motion(run):
     done = run("plan", *FLIGHT, "--readout", "0.03", "--against", "none")
     assert done.exit_code == 0, done.output
     assert "readout time, camera 1, ms" in done.output
-    assert "were the readout time known" in done.output
+    assert "if the readout time is known" in done.output
     done = run("plan", *PLANE, "--scanner", "3", "--every", "5")
     assert done.exit_code == 0, done.output
     assert "rotation of trajectories, arcsec" in done.output

@@ -110,6 +110,8 @@ def test_without_matplotlib_there_are_no_pictures(run, tables, monkeypatch):
     result = run(*tables, "--out", "out")
     assert result.exit_code == 0
     assert "report.html" in names("out")
+    monkeypatch.setitem(sys.modules, "typst", None)
+    monkeypatch.delitem(sys.modules, "photogram.show.pdf", raising=False)
     result = run(*tables, "--out", "out", "--pdf")
     assert result.exit_code == 0
     assert "pip install 'photogram[pdf]'" in result.stderr

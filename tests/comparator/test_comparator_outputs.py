@@ -131,7 +131,7 @@ def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
     points = list(full.pointing.points)
     expected = [full.pointing.points[point].ellipse.major_um for point in points]
     assert widths[0] / widths[0][0] == pytest.approx(np.array(expected) / expected[0])
-    panels = made["pooled-ellipses"]().panels
+    panels = made["pooled-ellipses"].panels
     assert [panel.title.split(":")[0] for panel in panels] == [
         *(f"case {case.number}" for case in full.cases),
         *(f"operator {operator}" for operator in operators),
@@ -162,11 +162,11 @@ def test_feature_18_pictures(full):
         "pooled-ellipses",
         "residual-histogram",
     } == set(made)
-    drawn = made["comparator-residuals"]().panels[0].marks[1].vectors
+    drawn = made["comparator-residuals"].panels[0].marks[1].vectors
     residuals = full.last_fits[0].residuals.comparator_um
     scale = drawn[0] / residuals[0]
     assert drawn == pytest.approx(residuals * scale[0], rel=1e-9)
-    widths = _widths(made["pointing-ellipses"]().panels[0])[0]
+    widths = _widths(made["pointing-ellipses"].panels[0])[0]
     expected = [readings.precision.ellipse.major_um for readings in full.cases[0].placed.readings]
     assert widths / widths[0] == pytest.approx(np.array(expected) / expected[0])
     page = full.to_html().decode()

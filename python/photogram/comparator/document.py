@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.comparator.joint import JointFit
-from photogram.comparator.pictures.book import sketches
+from photogram.comparator.pictures.book import plotters
 from photogram.comparator.pointing import Precision
 from photogram.comparator.tables import (
     LINEAR,
@@ -124,7 +124,7 @@ def _pictures(calibration: Calibration) -> list[Part]:
     """Return the pictures of the calibration as layers."""
     layers = [
         Drawing(f"picture-{name}", name.replace("-", " ").capitalize(), "", sketch)
-        for name, sketch in sketches(calibration).items()
+        for name, sketch in plotters(calibration).items()
     ]
     return [Layers("picture-layers", layers)]
 

@@ -26,7 +26,12 @@ if TYPE_CHECKING:
     from photogram.comparator import Calibration
 
 
-def sketches(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
+def sketches(calibration: Calibration) -> dict[str, Plot]:
+    """Return all plots of a calibration, by short names."""
+    return {name: plotter() for name, plotter in plotters(calibration).items()}
+
+
+def plotters(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
     """Return the functions that draw the plots of a calibration, by short names."""
     nonlinear, joint = calibration.nonlinear, calibration.joint
     made: dict[str, Callable[[], Plot]] = {
