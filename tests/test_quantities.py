@@ -15,7 +15,7 @@ from photogram.results.tables import TABLES
 from photogram.show.cells import page_table
 from photogram.show.forms import MAX_ROWS, record, summary, text
 from photogram.show.html import page_html
-from photogram.show.lines import fact_lines, field, marks, table_lines
+from photogram.show.lines import fact_lines, field, table_lines
 from photogram.show.page import Cell, Document, Fact, Layers, Section, probability_written
 from photogram.show.quantity import Axis, Quantity, Table, component, members_of_each, of_each, records, units
 
@@ -48,7 +48,6 @@ def test_what_is_to_be_looked_at_is_marked():
     tests = Quantity(np.array([1.0, -6.6]), head="t", decimals=2, marked=marked)
     cells = page_table("", [tests]).rows
     assert [cell.tone for (cell,) in cells if isinstance(cell, Cell)] == ["", "look"]
-    assert table_lines([*field(tests, 6, ".2f", "t"), marks(tests, " <--")])[1:] == ["  1.00", " -6.60 <--"]
 
 
 def test_facts_are_lines():

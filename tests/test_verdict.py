@@ -11,8 +11,10 @@ import pytest
 from contradictions import contradictions, sentences_of
 from photogram import adjust, resect, simulate
 from photogram.network import project
-from photogram.show.judgement import judged
-from photogram.show.sections import composed, verdict_sections
+from photogram.show.forms import table_text
+from photogram.show.forms import text as report_of
+from photogram.show.judgement import judged, verdict_table
+from photogram.show.page import Document
 from photogram.statistics import global_test, group_tests
 from photogram.statistics.findings import (
     Agreement,
@@ -199,11 +201,10 @@ def test_no_probability_is_lost():
     assert made.tests[1].p == 0.0
     assert made.tests[1].log10_p == pytest.approx(-(400**2) / 2 / math.log(10), rel=1e-3)
     assert math.isfinite(made.tests[0].log10_p)
-    (title, lines), (other, next_lines) = verdict_sections(made)
-    assert (title, other) == ("Verdict", "What to do next")
-    assert next_lines == list(map(str, made.next))
-    # The report says that it is tiny, the document how tiny.
-    assert any("< 1e-99" in line and "rejected" in line for line in lines)
+    # The report shows that it is tiny, the JSON document how tiny.
+    outcome = table_text(verdict_table(made))[2]
+    assert "< 1e-99" in outcome
+    assert "rejects" in outcome
 
 
 def test_the_worst_of_several_results():
@@ -457,7 +458,7 @@ def test_no_two_sentences_contradict_each_other(first):
         base = {**vars(findings(good())), **ways}
         made = verdict(Findings(**{**base, **situation}))
         told = judged(made)
-        text = composed("a report", verdict_sections(made))
+        text = report_of(Document("a report", "", [told], made.next, [], []))
         sentences = [*sentences_of(made, None, text, None), f"mark {told.mark}"]
         case = (first, second, third, sentences)
         assert not contradictions(sentences), (first, second, third, contradictions(sentences))

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram.results.iteration import Iteration
-from photogram.show.lines import field, table_lines
-from photogram.show.quantity import Quantities, Quantity
+from photogram.show.quantity import Quantity
 
 
 def iteration_table(iterations: Sequence[Iteration], start: float | None = None) -> list[Quantity]:
@@ -22,16 +21,3 @@ def iteration_table(iterations: Sequence[Iteration], start: float | None = None)
         Quantity(change, member="largest_change_sd", head="Largest change over sd"),
         Quantity(damping, member="damping", head="Damping", figures=2),
     ]
-
-
-def iteration_lines(table: Quantities, form: str) -> list[str]:
-    """Return the iterations as text, sums of squares in a form."""
-    number, squares, change, damping = table
-    return table_lines(
-        [
-            *field(number, 6, ".0f", "number"),
-            *field(squares, 24, form, "weighted sum of squares", " "),
-            *field(change, 20, ".3e", "largest change / sd", " "),
-            *field(damping, 9, ".1e", "damping", " "),
-        ]
-    )

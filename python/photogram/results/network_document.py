@@ -11,7 +11,6 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.messages import Message
 from photogram.plots.accessor import sketch_of
 from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
@@ -38,7 +37,6 @@ from photogram.show.cells import unit_written
 from photogram.show.judgement import judged, remarks_section, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, significant
 from photogram.show.quantity import Axis, Quantities, Quantity, members, records
-from photogram.show.sections import problems
 from photogram.statistics.evidence import GLOBAL
 from photogram.statistics.findings import Tested
 
@@ -120,12 +118,20 @@ def network_document(
 
 
 def problems_of(result: AdjustedNetwork) -> list[str]:
-    """Return what keeps a reader from using the values: a failed test and outliers before other remarks.
+    """Return the reasons against the use of the values, the gravest first, then all other remarks.
 
-    The tests of outliers are those of the verdict.
+    They begin with missing convergence, a rejecting global test and the outliers of the verdict.
     """
-    messages = [*(Message(str(outlier)) for outlier in result.verdict.outliers), *result.messages]
-    return problems(messages, result.status, result.variance_of_unit_weight, result.global_test)
+    test = result.global_test
+    problems = []
+    if result.status != "converged":
+        problems.append(f"the adjustment has {result.status}: do not use these values")
+    if test is not None and (failed := test.problem()):
+        problems.append(failed)
+    problems += [str(message) for message in (*result.verdict.outliers, *result.messages)]
+    if result.variance_of_unit_weight is None:
+        problems.append("there are no degrees of freedom: covariances are scaled by 1")
+    return problems
 
 
 def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> dict[str, Any]:

@@ -120,12 +120,6 @@ def degrees_written(angle: float, decimals: int) -> str:
     return f"{'-' if angle < 0 else ''}{degrees} {minutes:02d} {seconds:0{width}.{decimals}f}"
 
 
-def marks(quantity: Quantity, mark: str) -> Field:
-    """Return what stands behind the rows whose number is marked."""
-    rows = np.zeros(len(quantity.values), dtype=bool) if quantity.marked is None else quantity.marked
-    return Field("", [mark if row else "" for row in rows.tolist()])
-
-
 def fact_lines(facts: Sequence[Fact]) -> list[str]:
     """Return named figures, one under the other, with their units and, in brackets, what is said of them."""
     names = [

@@ -163,9 +163,6 @@ def board_fit(calibrated: Calibrated) -> BoardFit | None:
     return BoardFit(plane, float(np.sqrt(np.mean(away**2))), 1e6 * stretch, 1e6 * sd)
 
 
-MIN_SHIFT_SD = 0.2  # smaller shifts by priors are not listed
-
-
 def prior_shift(calibrated: Calibrated) -> list[Quantity]:
     """Return how far priors moved each unknown parameter, and that over its sd; nothing without priors.
 
