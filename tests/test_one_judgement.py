@@ -52,17 +52,18 @@ def result(request):
     return RESULTS[request.param]()
 
 
-def test_a_message_counts_the_outliers_of_its_kind(result):
-    verdict = result.verdict
+def assert_counts(verdict):
+    """Compare the counts in messages with the outliers of the verdict."""
     assert {line.fields["kind"]: line.fields["n"] for line in verdict.outliers} == {
         kind: len(places) for kind, places in verdict.outlying.items()
     }
     if verdict.code == "gross-errors":
-        tests = verdict.message.fields["suspects"][-1].fields["tests"]
-        assert len(tests) == sum(map(len, verdict.outlying.values()))
+        suspects = verdict.message.fields["suspects"][-1].fields
+        assert len(suspects["tests"]) == sum(map(len, verdict.outlying.values()))
 
 
-def test_the_table_of_the_worst_marks_outliers_only(result):
+def assert_marks(result):
+    """Compare the marked rows of the table of the worst observations with the outliers of the verdict."""
     every = {each.kind: each for each in rows_of.tested_singly(result)}
     marked = {kind: rows_of.outlying(result.verdict, each) for kind, each in every.items()}
     *_, tests = result.document().table("worst").columns
@@ -76,6 +77,33 @@ def test_the_table_of_the_worst_marks_outliers_only(result):
             rows = {place[0] for place in result.verdict.outlying.get(Phrase(groups), ())}
             rows |= {place[0] for place in result.verdict.outlying.get(kind, ())}
             assert set(np.flatnonzero(own.any(axis=1)).tolist()) == rows
+
+
+def test_a_message_counts_the_outliers_of_its_kind(result):
+    assert_counts(result.verdict)
+
+
+def test_the_table_of_the_worst_marks_outliers_only(result):
+    assert_marks(result)
+
+
+def test_simulated_errors_are_judged_once():
+    """In 200 blocks with up to three errors in images, and some in control, all marks are outliers."""
+    codes = set()
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        block = photogram.simulate(strips=2, photos_per_strip=3, points_per_photo=12, seed=seed).block
+        xy, positions = block.image_xy.copy(), block.point_positions.copy()
+        for row in rng.integers(len(xy), size=seed % 4):
+            xy[row, rng.integers(2)] += rng.uniform(5, 30) * block.image_sd[row, 0]
+        if seed % 5 == 0:
+            control = rng.choice(np.flatnonzero(np.isfinite(block.point_sd).all(axis=1)))
+            positions[control, rng.integers(3)] += 1.0
+        result = photogram.adjust(block.replace(image_xy=xy, point_positions=positions))
+        assert_counts(result.verdict)
+        assert_marks(result)
+        codes.add(result.verdict.code)
+    assert {"accepted", "gross-errors"} <= codes
 
 
 def test_the_plot_of_tests_marks_outliers_only(result):
