@@ -241,7 +241,9 @@ def test_adjusted_tables_make_a_block_again(result):
 
 def facts(result: Result, key: str) -> dict[str, str]:
     """Return the figures of a section by their names."""
-    parts = [part for section in result.document().sections if section.key == key for part in section.parts]
+    document = result.document()
+    sections = [*document.sections, *document.details]
+    parts = [part for section in sections if section.key == key for part in section.parts]
     return {fact.name: fact.value for part in parts for fact in getattr(part, "facts", ())}
 
 

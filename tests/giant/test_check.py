@@ -518,8 +518,8 @@ def test_section_11_warnings_stand_in_the_check(block):
     project.ground.append(type(project.ground[0])("NOWHERE", (1.0, 2.0, 3.0)))
     outcome = check(project, limits=Limits(photos_per_point=5))
     facts = {fact.name: fact.value for fact in outcome.sections[0].parts[1].facts}
-    assert facts["POINTS NOT PHOTOGRAPHED"] == "NOWHERE"
-    assert "PASS POINTS APPEARING ON MORE THAN 5 PHOTOGRAPHS" in facts
+    assert facts["Points not photographed"] == "NOWHERE"
+    assert "Pass points appearing on more than 5 photographs" in facts
     assert [finding.points for finding in found(outcome, "warning")][-1] == ["NOWHERE"]
 
 

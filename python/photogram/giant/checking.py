@@ -64,7 +64,7 @@ def check(project: Project, *, limits: Limits | None = None, threads: int | None
     )
     files.findings += [Finding("remark", "look", str(message)) for message in project.messages]
     for warning in error_warnings(project, block, limits):
-        files.figure(warning.heading, ", ".join(warning.names))
+        files.figure(warning.heading.capitalize(), ", ".join(warning.names))
         text = f"{warning.heading.lower()}: {len(warning.names)}"
         files.findings.append(Finding("warning", "look", text, [], warning.names))
     return Diagnosis(project.title, [files, *sections], result)
