@@ -64,9 +64,8 @@ def orientation_document(result: Orientation) -> Document:
         ],
         sections=[
             Section("residuals", "Residuals in plan", [drawing]),
-            Section("parameters", "Parameters", [of_parameters, rotation(result)], of_parameters.about),
+            Section.of(of_parameters),
             Section.of(control(result)),
-            Section.of(model_residuals(result)),
             Section.of(rejected(result)),
             Section("size", "How much, how good", [Facts("How much", size), Facts("How good", quality)]),
             tests_section(result.verdict),
@@ -74,6 +73,7 @@ def orientation_document(result: Orientation) -> Document:
             Section.of(cycles(result)),
             remarks_section(result.problems),
         ],
+        details=[Section.of(rotation(result)), Section.of(model_residuals(result))],
         members=_members(result),
     )
 

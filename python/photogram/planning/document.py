@@ -63,11 +63,13 @@ def plan_document(patterns: Sequence[Pattern]) -> Document:
             _comparison_section(patterns),
             Section("size", "How much", [_size(patterns)]),
             _layers("points", "New points", patterns, _shown_points, points),
-            _layers("multiples", "New points, in standard deviations of an image", patterns, _multiples),
             _layers("photos", "Photos", patterns, _photos),
             _layers("motion", "Motion", patterns, _motion),
             _layers("control", "Control", patterns, _shown_control, control),
             remarks_section(_remarks(patterns)),
+        ],
+        details=[
+            _layers("multiples", "New points, in standard deviations of an image", patterns, _multiples)
         ],
         members=_members(patterns),
     )
