@@ -8,7 +8,8 @@ import textwrap
 import numpy as np
 
 from photogram import Block, adjust, simulate
-from photogram.show.sections import verdict_sections
+from photogram.show.forms import table_text
+from photogram.show.judgement import verdict_table
 from photogram.statistics import (
     b_method,
     bonferroni,
@@ -86,8 +87,9 @@ def _block() -> Block:
 
 
 def _verdict(block: Block) -> list[str]:
-    (_, told), (title, steps) = verdict_sections(adjust(block).verdict)
-    lines = [*told, "", title, "-" * len(title), *steps]
+    verdict, title = adjust(block).verdict, "What to do next"
+    told = [f"{line}." for line in (verdict.headline, *verdict.lines)]
+    lines = [*told, "", *table_text(verdict_table(verdict)), "", title, "-" * len(title), *map(str, verdict.next)]
     return [part for line in lines for part in textwrap.wrap(line, 130, subsequent_indent="  ") or [""]]
 
 
