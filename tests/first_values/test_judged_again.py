@@ -79,7 +79,7 @@ def test_images_that_stay_out_head_the_verdict():
         f" {block.photo_ids[block.image_photos[row]]}"
         for row in (5, 70)
     ]
-    assert sorted(result.set_aside) == sorted(names)
+    assert sorted(map(str, result.set_aside)) == sorted(names)
     assert result.verdict.code == "set-aside"
     assert result.verdict.warning
     assert all(name in result.verdict.headline for name in names)

@@ -24,7 +24,7 @@ def test_maps_cross_validation_and_views_to_take_next(board, tmp_path):
     document = tmp_path / "left.json"
     asked = ("--distance", "inf,0.5", "--suggest", 1, "--plots", "--json", document)
     found = run(board, *asked, "--out", tmp_path / "out")
-    assert "worst where the board was seen" in found.output.splitlines()[1]
+    assert "worst where the board was seen" in found.output
     assert "cross-validation" in found.output
     assert "view to take next" in found.output
     written = {path.name for path in (tmp_path / "out").iterdir()}
@@ -47,7 +47,12 @@ def test_what_is_needed_decides_the_exit_code(board, tmp_path):
     usual = (board, "--loss", "cauchy", "--cross-validate", "none", "--no-html")
     plain = run(*usual, "--out", tmp_path / "plain").exit_code
     assert run(*usual, "--need", 100, "--out", tmp_path / "much").exit_code == plain
-    assert run(*usual, "--need", 0.001, "--out", tmp_path / "little").exit_code == 4
+    little = run(*usual, "--need", 0.001, "--out", tmp_path / "little", "--json", tmp_path / "little.json")
+    assert little.exit_code == 4
+    verdict = json.loads((tmp_path / "little.json").read_bytes())["verdict"]
+    codes = [message["code"] for message in verdict["messages"]]
+    assert "verdict.not-accurate-enough" in codes
+    assert "advice.nothing" not in codes
 
 
 @pytest.mark.parametrize(

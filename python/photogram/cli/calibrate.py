@@ -241,7 +241,7 @@ def calibrate(
             {target / name: content for name, content in files.items()} | drawn | page,
             documents.as_json(found),
             summary=lambda: print_summary(document, "report.txt", "uncertainty", "board", "views"),
-            code=uncertainty.exit_code(found, found.verdict.exit_code(strict=strict)),
+            code=found.verdict.exit_code(strict=strict),
         )
 
 

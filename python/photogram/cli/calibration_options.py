@@ -324,21 +324,14 @@ class Uncertainty:
         with job.status("uncertainty") as status:
             own = appraise(found, self.asked(), None if status is None else status.update)
         if self.compare_with is None:
-            return judged(found, own)
+            return judged(found, own, self.need)
         other = calibrated(self.compare_with)
         distances = self.distances or [math.inf]
         apart = [
             difference(found, other, distances, camera=number)
             for number in range(min(len(found.cameras), len(other.cameras)))
         ]
-        return judged(found, replace(own, differences=tuple(apart)))
-
-    def exit_code(self, found: Calibrated, code: int) -> int:
-        """Return the exit code: 4 where a map is above what is needed, or there is none to say so."""
-        worth = found.worth
-        if self.need is None or worth is None or code:
-            return code
-        return code if worth.largest <= self.need else NOT_GOOD_ENOUGH
+        return judged(found, replace(own, differences=tuple(apart)), self.need)
 
 
 def distances_of(text: str | None, option: str) -> list[float]:

@@ -260,6 +260,7 @@ class Findings:
     undetermined: Sequence[Text] = ()  # Unknowns that the observations do not determine, or hardly
     hints: Sequence[Text] = ()  # Accepted hypotheses on mistakes in the data
     exchanged: Sequence[Text] = ()  # Names that are probably exchanged
+    shortfall: Phrase | None = None  # A required accuracy that the result misses
     spoiled: Text = ""  # Why gross errors make the result unusable, if the program has found that itself
     doubtful: Sequence[Text] = ()  # Stars: exposures whose identification is doubtful or rejected
     # How known values that took no part agree with the result; None if there are none, or untested

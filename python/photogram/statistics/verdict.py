@@ -460,6 +460,7 @@ RULES = (
         warning=True,
         grave=_is_far,
     ),
+    Rule("not-accurate-enough", lambda e: e.found.shortfall, EXIT_NOT_USABLE, ("more-views",)),
     Rule("look-at", _look_at, 0, ("look-at",), warning=True, also=True),
     Rule("weights-pessimistic", _too_low, 0, ("scaled", "smaller-sd")),
     Rule("accepted", _accepted, 0, ()),

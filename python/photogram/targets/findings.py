@@ -22,6 +22,7 @@ from photogram.targets.calibration_result import Calibrated, UnknownWeight, Wort
 from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.housing import middle_of
+from photogram.targets.maps import distance_text
 from photogram.targets.picture_parts import PARTS, parts_of
 from photogram.targets.vision import rays
 from photogram.words import Phrase
@@ -115,15 +116,28 @@ def unknown_weight_findings(result: UnknownWeight) -> Findings:
     return replace(block_findings(result), untested=Phrase("untested.corners"))
 
 
-def judged(calibrated: Calibrated, worth: Worth | None = None) -> Calibrated:
-    """Return a calibration whose parts all have the verdict on it, by what it is worth if that is known."""
-    own = verdict(_findings(calibrated, worth))
+def judged(calibrated: Calibrated, worth: Worth | None = None, need: float | None = None) -> Calibrated:
+    """Return a calibration whose parts all have the verdict on it, also by its maps of uncertainty.
+
+    `need` is the largest standard deviation of projection that is accepted, px.
+    """
+    own = verdict(replace(_findings(calibrated, worth), shortfall=_shortfall(worth, need)))
     result, snooped = copy(calibrated.result), calibrated.snooped
     vars(result)["verdict"] = own
     if snooped is not None:
         snooped = replace(snooped, result=copy(snooped.result))
         vars(snooped.result)["verdict"] = own
     return replace(calibrated, result=result, snooped=snooped, worth=worth)
+
+
+def _shortfall(worth: Worth | None, need: float | None) -> Phrase | None:
+    """Return the map with the largest standard deviation, if that is above what is accepted."""
+    if worth is None or need is None or worth.largest <= need:
+        return None
+    worst = max(worth.maps, key=lambda found: found.largest)
+    distance = distance_text(worst.distance, worst.unit)
+    fields = {"camera": worst.camera, "sd": worst.largest, "distance": distance, "need": need}
+    return Phrase("verdict.not-accurate-enough", fields)
 
 
 def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
