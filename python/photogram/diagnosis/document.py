@@ -26,6 +26,8 @@ def check_document(title: str, verdict: Verdict, parts: Sequence[Section], resul
     findings = [(finding, part.title) for part in parts for finding in part.findings]
     grave = sum(finding.level == "grave" for finding, _ in findings)
     look = len(findings) - grave
+    texts = {str(finding.text) for finding, _ in findings}
+    lines = [line for line in verdict.lines if str(line) not in texts]  # the table has the findings
     plan = [] if result is None else [drawings(result)["network"]]
     about = (
         "Grave findings make results wrong or impossible. Look at the others. The check corrects a mistake"
@@ -35,7 +37,7 @@ def check_document(title: str, verdict: Verdict, parts: Sequence[Section], resul
     return Document(
         what="Check of a network before its adjustment",
         title=title,
-        judgements=[replace(judged(verdict), lines=())],  # the table of findings has them
+        judgements=[replace(judged(verdict), lines=[*map(str, lines)])],
         advice=verdict.next,
         highlights=[
             Fact("Grave", f"{grave}", tone="bad" if grave else ""),
