@@ -21,7 +21,6 @@ COMMANDS = [
     "stellar-camera --example --out out --plots --no-html",
     "stellar-camera exposures --example --out out --plots --no-html",
     "plan --strips 2 --photos-per-strip 4 --out out --plots --no-html",
-    "comparator --example --out out --pdf --no-html",
 ]
 
 

@@ -41,7 +41,6 @@ def test_new_begins_a_project_of_each_kind(run, tmp_path, kind):
         assert done.exit_code == 0, done.output
         assert "47 observations of the kind fiducial" in done.output
         assert "Accepted" in done.output
-        assert "Problems\n  none" in done.output
     else:
         night = tmp_path / "own" / "night.toml"
         assert inputs(night) == [night, night.with_name("images.csv")]

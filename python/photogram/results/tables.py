@@ -54,7 +54,7 @@ _FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
 def _terms(result: Result) -> Terms:
     block, axes = result.block, point_axes(result.block)
     lengths = None
-    if block.geographic:
+    if block.geographic and len(result.photo_positions):
         lengths = lengths_of_units(result.photo_positions.mean(axis=0, keepdims=True), block.spheroid)[0]
     return Terms(
         photos=np.array(block.photo_ids, dtype=object),
