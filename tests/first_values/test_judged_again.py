@@ -133,4 +133,4 @@ def test_the_command_takes_all_that_fits_in(run, tmp_path, options, said):
     assert f"2 images do not fit and {said}" in done.output
     assert done.exit_code == 4
     report = (tmp_path / "out" / "report.txt").read_text().splitlines()
-    assert any(line.split() == "image points 2074 used of 2074".split() for line in report)
+    assert any(line.split() == ["image", "points", "2074", "used", "of", "2074"] for line in report)
