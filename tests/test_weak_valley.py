@@ -9,6 +9,7 @@ import photogram
 from golden_data import shared
 from photogram import Camera, adjust, formats
 from photogram.formats.supplements import self_calibrated
+from photogram.words import on_command_line
 
 WORDS = "(principal distance and "
 
@@ -112,7 +113,9 @@ def test_what_iterations_leave_open_has_figures_and_a_remedy(project):
     camera = result.cameras[0]
     for figure in (f"{camera.value('f'):.6g} px", f"{camera.deviation('f'):.3g} px", "with k1", "with k2"):
         assert figure in weak
-    assert any("--iterations N" in each and "--self-calibrate" in each for each in result.verdict.next)
+    with on_command_line():
+        steps = [str(each) for each in result.verdict.next]
+    assert any("--iterations N" in step and "--self-calibrate" in step for step in steps)
 
 
 def test_a_camera_that_is_unknown_too_comes_to_rest_with_a_loss(project):
