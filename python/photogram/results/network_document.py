@@ -108,10 +108,10 @@ def network_document(
             *given,
             photos_section(result, worst_photos, f"{datum} {poses}".strip()),
             points_section(result, worst_points, datum),
+            Section("weakest", "Weakest points and photos", tables),
             _iterations_section(result),
         ],
         details=[
-            Section("weakest", "Weakest points and photos", tables),
             Section("work", "Work", [Facts("Work", [*_work(result), *work])]),
             *details,
             images_section(result),
