@@ -89,7 +89,15 @@ def _block() -> Block:
 def _verdict(block: Block) -> list[str]:
     verdict, title = adjust(block).verdict, "What to do next"
     told = [f"{line}." for line in (verdict.headline, *verdict.lines)]
-    lines = [*told, "", *table_text(verdict_table(verdict)), "", title, "-" * len(title), *map(str, verdict.next)]
+    lines = [
+        *told,
+        "",
+        *table_text(verdict_table(verdict)),
+        "",
+        title,
+        "-" * len(title),
+        *map(str, verdict.next),
+    ]
     return [part for line in lines for part in textwrap.wrap(line, 130, subsequent_indent="  ") or [""]]
 
 
