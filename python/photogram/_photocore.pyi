@@ -2588,6 +2588,7 @@ def read_numbers(text: bytes) -> tuple[_Floats, bool]:
     (k,) numbers, and whether they are the whole text.
     """
 
+@final
 class TableReader:
     """Columns of a table of text whose lines are all regular.
 
@@ -2603,7 +2604,7 @@ class TableReader:
         For each column, whether its cells are numbers.
     """
 
-    def __init__(self, delimiter: int, numeric: Sequence[bool]) -> None: ...
+    def __new__(cls, delimiter: int, numeric: Sequence[bool]) -> TableReader: ...
     def add(self, lines: bytes) -> bool:
         """Append whole lines. Return False if a line is irregular; the reader then has no columns."""
 
