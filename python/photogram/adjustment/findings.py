@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.adjustment.resection import Resection
 from photogram.arguments.types import Floats
 from photogram.results.observation_kinds import parts_of
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Resection
 
 UNKNOWNS = ("X", "Y", "Z", "omega", "phi", "kappa")
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.collection.result import AdjustedCollection
 from photogram.results.network_document import drawings, network_document, network_members, size_section
 from photogram.results.network_sections import control_section, stations_section
 from photogram.show.page import Document, Fact, Section, significant
+
+if TYPE_CHECKING:
+    from photogram.collection import AdjustedCollection
 
 
 @np.errstate(over="ignore", invalid="ignore")

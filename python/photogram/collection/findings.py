@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.collection.collection import POSE
-from photogram.collection.result import AdjustedCollection
 from photogram.results.findings import network_findings
 from photogram.results.fixed_tests import SUSPECTED, Held, held_tests
 from photogram.results.patterns import CameraImages, patterns
 from photogram.statistics.findings import Findings, Tested
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram.collection import AdjustedCollection
 
 FIRST_OF_TRANSLATION = 3
 STEP = 1e-6
