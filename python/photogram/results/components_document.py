@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from photogram.lazy_dataclasses import replace
-from photogram.results.components import VarianceComponents, components_table, statement
+from photogram.results.components_table import components_table, statement
 from photogram.show.judgement import judged
 from photogram.show.page import Document, Drawing, Part, Remarks, Section
+
+if TYPE_CHECKING:
+    from photogram import VarianceComponents
 
 _INTRO = (
     "By which factors the standard deviations of groups of observations are wrong, as their residuals say."
