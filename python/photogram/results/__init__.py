@@ -4,7 +4,8 @@ import lazy_loader
 
 WAYS = {
     "pictured": ("picture_data",),
-    "terms_of": ("tables",),
+    "determined": ("block_terms",),
+    "terms_of": ("block_terms",),
 }
 """The files that show a result, by the names of the ways: see `photogram.show.methods`."""
 

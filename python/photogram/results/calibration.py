@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.distortion import INTERIOR
 from photogram.results.model_tests import TermsTest, groups_of_terms, terms_test
-from photogram.results.result import Result
 from photogram.results.scores import quadratic
 from photogram.results.selection import photo_components
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 

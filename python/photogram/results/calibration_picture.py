@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photogram.plots.distortion import side_by_side
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import distortion_curve, lens_field
 from photogram.results.picture_data import curves_of
-from photogram.results.result import Result
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, around
 from photogram.show.sketch.marks import Arrows, Ellipses, ellipse_axes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 def plot_distortion(result: Result, camera: AdjustedCamera) -> Plot:

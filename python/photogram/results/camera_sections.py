@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.network.cameras import Camera
 from photogram.results.calibration import Calibration, GroupTest, ParameterTest, calibrations
 from photogram.results.distortion import DistortionCurve, LensField, distortion_curve, lens_field
-from photogram.results.result import Result
 from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each, records
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 LISTED = 12
 """Cameras with a table of their own."""

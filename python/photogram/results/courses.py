@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +11,12 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import Knot
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
-from photogram.results.result import Result
 from photogram.results.trajectories import corrections
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.quantity import Axis, Quantity, of_each
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 POSES = (
     "Of photos on trajectories these are the poses at their own times; of scanners without one, in the middle"

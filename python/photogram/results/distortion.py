@@ -16,6 +16,7 @@ the vector there has the covariance sigma0^2 J Q J'.
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,7 +26,9 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
-from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 __all__ = [
     "INTERIOR",

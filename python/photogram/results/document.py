@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from photogram.results.network_sections import (
     stations_section,
 )
 from photogram.results.network_tables import control, terms_of
-from photogram.results.result import Result
 from photogram.results.tables import (
     camera_parameters,
     check_points,
@@ -44,6 +43,9 @@ from photogram.results.tables import (
 from photogram.show.cells import unit_written
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Quantity, Table, chosen, members, named, records
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what is too large for its unit is infinite

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network import geometry
-from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 __all__ = ["CONFIDENCE", "Ellipses", "ellipses", "fitting_scale", "metric_covariances"]
 

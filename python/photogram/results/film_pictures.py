@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photogram import _photocore
@@ -12,8 +14,10 @@ from photogram.network.observations import Fiducial
 from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
 from photogram.results.network_trial import OBSERVATION
-from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 STEPS = 9
 """Places of a pattern along a side of the format."""

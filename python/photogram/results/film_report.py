@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.network.films import Scanner
 from photogram.network.observations import FILM
 from photogram.results.film_pictures import MarkResiduals, mark_residuals
-from photogram.results.result import Result
 from photogram.show.page import Drawing, Part, Section
 from photogram.show.quantity import Axis, Quantity, Table, members
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 _UNITS = ("mm", "mm", "rad", "", "", "")
 _SAID = (*(Axis("scale x"), Axis("scale y")), *(Axis.of("between axes", "rad"), Axis.of("rotation", "rad")))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,12 +18,14 @@ from photogram.results.network_trial import KINDS, OBSERVATION
 from photogram.results.observation_kinds import kind_words
 from photogram.results.patterns import CameraImages, patterns
 from photogram.results.reliability_summary import ReliabilitySummary
-from photogram.results.result import Result
 from photogram.results.suspects import observations_of_core
 from photogram.results.tested_observations import tested_singly
 from photogram.statistics.findings import Findings, Removed, Systematic, Tested, by_f
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 HARMFUL = {
     "its rays do not meet: it ran off": Phrase("harmful.off"),

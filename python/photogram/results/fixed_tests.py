@@ -9,7 +9,7 @@ residuals, c = B' ~v and C = B' R B: the weighted sum of squares would fall by T
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from photogram.network.rays import Rays
 from photogram.network.wider_models import calibration_words
 from photogram.results.group_sums import factored
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.results.scores import score
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 HELD = Phrase("test.held")
 """The kind of these tests."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from photogram.network.block import Block
 from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners
 from photogram.network.rays import LocalAxes, local_axes
-from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 __all__ = ["Footprints", "footprints", "grounds", "picture_frames"]
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,10 +24,12 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.motion import focal_images
 from photogram.results.group_sums import factored
-from photogram.results.result import Result
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.patterns import durbin_watson, frame_pattern, moran
 from photogram.statistics.reliability import TESTABLE
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 CLIPPED = 3.0
 """Larger test values count as this one."""

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.network.geometry import lengths_of_units
 from photogram.results import network_tables
-from photogram.results.axes import TURNS, component_axis, image_axes, point_axes
+from photogram.results.axes import component_axis, point_axes
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.features import Features
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
 from photogram.results.network_tables import (
-    Terms,
     deviation,
     difference,
     names,
@@ -27,10 +25,12 @@ from photogram.results.network_tables import (
     test_value,
 )
 from photogram.results.observation_kinds import ObservedKind
-from photogram.results.result import Result
 from photogram.results.unknowns import AdjustedUnknown
 from photogram.show.quantity import Axis, Quantity, component, joined, long
 from photogram.statistics.reliability import TESTABLE
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 _EITHER = "standard deviation that was given, or is assumed: {}"
 _FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
@@ -48,38 +48,6 @@ _FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
     "deviation": ("value", "distance of the point from the feature"),
 }
 """What the columns of features have."""
-
-
-@terms_of.register(Result)
-def _terms(result: Result) -> Terms:
-    block, axes = result.block, point_axes(result.block)
-    lengths = None
-    if block.geographic and len(result.photo_positions):
-        lengths = lengths_of_units(result.photo_positions.mean(axis=0, keepdims=True), block.spheroid)[0]
-    return Terms(
-        photos=np.array(block.photo_ids, dtype=object),
-        points=np.array(block.point_ids, dtype=object),
-        photo_axes=(*axes, *TURNS),
-        point_axes=axes,
-        image_axes=image_axes(block.image_unit),
-        photo_values=np.hstack([result.photo_positions, result.photo_attitudes]),
-        layers={"Positions": slice(0, 3), "Attitudes": slice(3, 6)},
-        parts={"position": slice(0, 3), "attitude_rad": slice(3, 6)},
-        of_points=(
-            Quantity(
-                result.point_kinds[result.used_points],
-                kind="name",
-                name="kind",
-                member="kind",
-                about="what it is",
-                head="Kind",
-            ),
-        ),
-        kinds=result.kinds.values(),
-        lengths=lengths,
-        linear_unit=block.linear_unit,
-        split=True,
-    )
 
 
 def check_points(result: Result) -> list[Quantity]:

@@ -6,10 +6,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.geometry import geographic_to_geocentric, lengths_of_units
-from photogram.network.motion import scanners
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.show.methods import Way
 
 WORST = 10
@@ -63,21 +60,6 @@ class Determined:
 def determined(result: AdjustedNetwork) -> Determined:
     """Return where points and photos are, and how well that is known."""
     raise NotImplementedError(type(result).__name__)
-
-
-@determined.register
-def _(result: Result) -> Determined:
-    block, points, stations = result.block, result.point_positions, result.photo_positions
-    cofactors = result.point_cofactors
-    if block.spheroid is not None:
-        units = lengths_of_units(points, block.spheroid)
-        cofactors = cofactors * units[:, :, np.newaxis] * units[:, np.newaxis, :]
-        points, stations = (
-            geographic_to_geocentric(np.array(each), block.spheroid) for each in (points, stations)
-        )
-    poses = result.photo_cofactors[:, :6, :6]
-    ranks = (np.diagonal(poses, axis1=1, axis2=2) > 0).sum(axis=1)
-    return Determined(stations, points, poses, ranks, cofactors, scanners(block))
 
 
 @np.errstate(all="ignore")

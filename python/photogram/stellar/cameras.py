@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from photogram.stellar.parameters import GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.plate_model import plate_camera
 from photogram.stellar.pointing import transformed_angles
 from photogram.stellar.problem import Problem
-from photogram.stellar.result import Result
 from photogram.stellar.sky_cameras import (
     BrownCamera,
     SkyCamera,
@@ -28,6 +27,9 @@ from photogram.stellar.sky_cameras import (
     read_document,
     weight_of,
 )
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 __all__ = ["BrownCamera", "PlateCamera", "SkyCamera", "camera_document", "camera_from"]
 

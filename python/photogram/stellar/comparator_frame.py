@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
-from photogram.stellar.result import Result
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 __all__ = ["ComparatorFrame", "comparator_frame"]
 

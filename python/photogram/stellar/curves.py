@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.stellar.parameters import INDEX
-from photogram.stellar.result import Result
 from photogram.stellar.sky import TAU, refraction
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 
 @dataclass(frozen=True, eq=False)

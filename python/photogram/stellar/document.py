@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,8 +21,10 @@ from photogram.stellar.night_document import pictures
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX
 from photogram.stellar.plots import sketches
 from photogram.stellar.printout import descriptors, have_common_weight
-from photogram.stellar.result import Result
 from photogram.stellar.sky import Site
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 MAX_WORST_COORDINATES = 25
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.statistics.findings import Findings, Observations, Tested, by_t
 from photogram.statistics.reliability import TESTABLE
-from photogram.stellar.night_result import CalibratedNight
 from photogram.stellar.outliers import studentized
-from photogram.stellar.result import SIGNIFICANT, Result
+from photogram.stellar.result import SIGNIFICANT
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram.stellar import CalibratedNight, Result
 
 Named = Callable[[tuple[int, ...]], str]
 

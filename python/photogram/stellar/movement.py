@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,11 @@ from photogram.arguments.types import Floats
 from photogram.stellar import report_iteration, strict
 from photogram.stellar.parameters import GROUPS, NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.result import FictitiousPoint, Movement, Result
+from photogram.stellar.result import FictitiousPoint, Movement
 from photogram.stellar.state import Solved
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 _DIAGONAL = np.arange(9) * 0.01
 """x = y of the fictitious points, metres."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,9 @@ from photogram.stellar import night_tables as tables
 from photogram.stellar.camera_tables import correlated_members, correlations, matrix_table
 from photogram.stellar.lens_choice import LensTest
 from photogram.stellar.night_plots import sketches
-from photogram.stellar.night_result import CalibratedNight
+
+if TYPE_CHECKING:
+    from photogram.stellar import CalibratedNight
 
 MAX_WORST_IMAGES = 25
 MAX_EXPOSURES = 200

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from photogram.show.sketch.marks import Arrows, Level, Line, Mark, Markers
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.drawing import band, bells, curves, vectors
-from photogram.stellar.night_result import CalibratedNight
+
+if TYPE_CHECKING:
+    from photogram.stellar import CalibratedNight
 
 _MAX_COLOURS = len(COLOURS)  # More exposures are drawn alike
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +21,12 @@ from photogram.stellar.camera_tables import (
     parameter_table,
 )
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE
-from photogram.stellar.night_result import CalibratedNight, Night
+from photogram.stellar.night_result import Night
 from photogram.stellar.odds import ACCEPTED, LOG_ODDS
 from photogram.stellar.pointing import axis_of
+
+if TYPE_CHECKING:
+    from photogram.stellar import CalibratedNight
 
 _PIXELS = (Axis.of("x", "px", "_px"), Axis.of("y", "px", "_px"))
 _DEGREES = ("deg", "deg", 1.0)

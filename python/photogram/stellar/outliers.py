@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from photogram.messages import listed
 from photogram.statistics.limits import externally_studentized, normal_limit, studentized_limit
 from photogram.stellar.parameters import INDEX, NAMES
 from photogram.stellar.problem import Problem
-from photogram.stellar.result import Result
 from photogram.stellar.state import Solved
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 __all__ = ["Tests", "culprits", "harm", "outliers", "studentized"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from photogram.show.style import COLOURS, FAINT
 from photogram.stellar.curves import distortion_curves, refraction_curves, residual_classes
 from photogram.stellar.drawing import band, bells, curves, vectors
 from photogram.stellar.parameters import GROUPS
-from photogram.stellar.result import Result
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 
 def sketches(result: Result) -> dict[str, Plot]:

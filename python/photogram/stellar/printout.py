@@ -7,6 +7,7 @@ their headings. What pages 3 to 6 held stands in `listing.txt`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,11 @@ from photogram.arguments.types import Floats
 from photogram.show.angles import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.curves import star_means
 from photogram.stellar.parameters import GROUPS
-from photogram.stellar.result import Result, Stage
+from photogram.stellar.result import Stage
 from photogram.stellar.sky import Site
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 WIDTH = 132
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,7 +36,10 @@ from photogram.stellar.movement import fictitious_points
 from photogram.stellar.outliers import studentized
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.pointing import transformed_angles
-from photogram.stellar.result import Ellipse, Result, ellipse
+from photogram.stellar.result import Ellipse, ellipse
+
+if TYPE_CHECKING:
+    from photogram.stellar import Result
 
 _AZIMUTHS = "Azimuths from south, positive west; elevations above the horizon."
 _NONE = np.zeros(0)

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.results.document import block_members
 from photogram.show.quantity import Quantity, records
 from photogram.targets.calibration_difference import CameraDifference
-from photogram.targets.calibration_result import Calibrated, Worth
+from photogram.targets.calibration_result import Worth
 from photogram.targets.cross_validation import CrossValidation, DifferenceTest, changes_between
 from photogram.targets.maps import UncertaintyMap, map_name
 from photogram.targets.new_views import Suggestions
 from photogram.targets.tables import STRETCHES, board_fit, prior_shift, splines, views
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 
 def calibration_members(calibrated: Calibrated) -> dict[str, Any]:

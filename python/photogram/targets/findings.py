@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from photogram.results.findings import block_findings
 from photogram.show.methods import findings_of
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.verdict import LARGEST_FACTOR, verdict
-from photogram.targets.calibration_result import Calibrated, UnknownWeight, Worth, deviation_of_corners
+from photogram.targets.calibration_result import UnknownWeight, Worth, deviation_of_corners
 from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.housing import middle_of
@@ -26,6 +26,9 @@ from photogram.targets.maps import distance_text
 from photogram.targets.picture_parts import PARTS, parts_of
 from photogram.targets.vision import rays
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 MIN_TILT_DEG, MIN_TILTED_VIEWS = 15.0, 3  # separate focal length and distance
 MIN_DISTANCE_RATIO = 1.3  # farthest over nearest view

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -9,9 +10,11 @@ import numpy as np
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
 from photogram.targets.vision import sensor_steps, unknown_of
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 
 def camera_number(calibrated: Calibrated, camera: int | str) -> int:

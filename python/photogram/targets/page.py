@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.show.cells import page_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Remarks, Section
 from photogram.targets.calibration_difference import CameraDifference
-from photogram.targets.calibration_result import Calibrated, Worth
+from photogram.targets.calibration_result import Worth
 from photogram.targets.drawing import plot_cross_validation, plot_difference, plot_uncertainty
 from photogram.targets.grouping import Groups, residual_groups
 from photogram.targets.maps import UncertaintyMap, distance_text, map_name
 from photogram.targets.residual_drawing import plot_board_residuals, plot_poorest_views
 from photogram.targets.tables import board_facts, prior_shift, spline_lines, views, worst_points
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
@@ -12,7 +14,9 @@ from photogram.show.sketch.marks import Mark, Markers, Polygons
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.targets.drawing import in_pixels
-from photogram.targets.view_plan_result import ViewPlan
+
+if TYPE_CHECKING:
+    from photogram.targets import ViewPlan
 
 __all__ = ["plot_planned_views"]
 

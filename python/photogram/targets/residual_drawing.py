@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photogram.arguments.annotations import check_arguments
@@ -12,10 +14,12 @@ from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Arrows, Mark, Markers
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.drawing import in_pixels
 from photogram.targets.grouping import CRITICAL_TEST_VALUE, mean_residuals
 from photogram.targets.tables import view_rms
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 __all__ = ["plot_board_residuals", "plot_poorest_views"]
 

@@ -6,7 +6,7 @@ Of splined lenses what is to be said of knots that hang on their priors, and of 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,9 +17,11 @@ from photogram.network.knots import Knot, beyond_knots
 from photogram.network.observations.unknowns import Prior
 from photogram.show.page import Fact, Tone, significant
 from photogram.show.quantity import Axis, Quantity
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.lens_fit import field_of, grid_of_pixels
 from photogram.targets.vision import TURNED
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 MAX_POINTS_LISTED = 10
 CRITICAL_TEST_VALUE = 3.0

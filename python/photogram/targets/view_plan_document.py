@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from photogram.show.quantity import Axis, Quantity, Table, of_each
 from photogram.targets.document import worth_members
 from photogram.targets.page import drawings, worth_facts
 from photogram.targets.plan_drawing import plot_planned_views
-from photogram.targets.view_plan_result import ViewPlan
+
+if TYPE_CHECKING:
+    from photogram.targets import ViewPlan
 
 CAPTION = "Where the corners of the board are in each picture; red: its point 0."
 PREDICTED = "This is a plan: the standard deviations follow from the planned board poses only."

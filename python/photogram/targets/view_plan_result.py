@@ -9,12 +9,12 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import counted
 from photogram.show.methods import Documented
 from photogram.show.summary import Brief, Rows
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.maps import UncertaintyMap, distance_text
 from photogram.targets.new_views import Candidate
 
 if TYPE_CHECKING:
     from photogram.show.page import Document
+    from photogram.targets import Calibrated
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,13 +22,15 @@ from photogram.results.covariance import Covariances
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, grouped
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, KINDS, OBSERVATION, POSITION
-from photogram.results.result import Result
 from photogram.results.statement.quantities import Wanted, component_of
 from photogram.results.statement.texts import Texts
 from photogram.results.suspects import block_suspects, observations_of_core
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 LARGEST = 5
 """Single observations that are listed."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,8 +24,11 @@ from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengt
 from photogram.network.observations import Control
 from photogram.network.rays import local_axes
 from photogram.results.covariance import Covariances
-from photogram.results.result import NOT_PHOTOGRAPHED, Result
+from photogram.results.result import NOT_PHOTOGRAPHED
 from photogram.results.statement.request import METRES, Asked
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
 """Components that are tested together."""

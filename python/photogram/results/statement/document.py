@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from photogram import _photocore
 from photogram.results.group_sums import observables, sums_of
 from photogram.results.grouping import grouped
-from photogram.results.result import Result
 from photogram.results.statement.budget import kind_of
 from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.request import lengths_in
 from photogram.results.statement.statement import Statement
 from photogram.show.quantity import members
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 def statement_members(found: Statement) -> dict[str, Any]:

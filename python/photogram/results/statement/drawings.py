@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import replace
 from photogram.results.footprints import footprints
-from photogram.results.result import Result
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.standards import Lengths
 from photogram.show.pictures import round_length
@@ -27,6 +28,9 @@ from photogram.show.sketch.marks import (
 )
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 WIDTH = 6.3
 """Inches of a picture."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,8 +11,10 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations import Control
 from photogram.results.axes import point_axes
-from photogram.results.result import Result
 from photogram.results.statement.comparison import Compared, in_order
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
-from photogram.results.result import Result
 from photogram.results.statement import translation
 from photogram.results.statement.budget import Budget
 from photogram.results.statement.comparison import Compared
@@ -20,6 +20,9 @@ from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import Standards
 from photogram.results.statement.texts import Texts
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 Said = list[tuple[str, str]]
 """Keys of the table of words, and texts."""

@@ -9,6 +9,7 @@ has in common stays hidden.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +17,11 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations import Control
-from photogram.results.result import Result
 from photogram.results.statement.comparison import in_order, turned_to_east
 from photogram.results.statement.honest import LEVEL
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 PREDICTABLE = 0.01
 """Eigenvalue of R_g below which the rest does not predict a direction: the point holds the datum along it."""

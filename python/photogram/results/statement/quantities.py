@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +15,12 @@ from photogram.messages import nearest
 from photogram.network.block import Block
 from photogram.network.rays import local_axes
 from photogram.results.cameras import units
-from photogram.results.result import Result, adjusted
+from photogram.results.result import adjusted
 from photogram.results.selection import Item
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
 """What coordinates may be called, beside the names that they have in the block."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import counted
 from photogram.network.observations import Control
-from photogram.results.result import Result
 from photogram.results.statement import asprs
 from photogram.results.statement.comparison import Compared, plan_positions, turned_jointly, turned_to_east
 from photogram.results.statement.figures import Figures, root_mean
@@ -32,6 +31,9 @@ from photogram.results.statement.nssda import Nssda, nssda
 from photogram.results.statement.quantities import hint
 from photogram.results.statement.request import Asked, lengths_in
 from photogram.show.quantity import members
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 _METRES_OF = {"h": "class_h_m", "v": "class_v_m", "3d": "class_3d_m"}
 _NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.results.result import Result
 from photogram.results.statement.texts import Texts
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 LISTED = 20
 """Fixed values that are named at most."""
