@@ -17,6 +17,8 @@ from photogram.results.selection import Adjusted, Things
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import pandas as pd
+
     from photogram.io.writing import Content
     from photogram.results.network_trial import NetworkTrial
     from photogram.show.page import Document
@@ -61,6 +63,15 @@ class AdjustedCollection(AdjustedNetwork):
     datum: list[tuple[int, str]]
 
     KNOWN: ClassVar[bool] = False
+
+    def _table(self, what: str) -> pd.DataFrame:
+        """Return the table of one kind of thing as a data frame; pandas takes long to import."""
+        import pandas as pd
+
+        from photogram.results.network_tables import TABLES
+        from photogram.show.quantity import frame
+
+        return pd.DataFrame(frame(TABLES[what](self)))
 
     def _findings(self) -> Findings:
         from photogram.collection.findings import collection_findings

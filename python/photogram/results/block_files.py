@@ -2,33 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.parquet import Column, Repeated, Sheet
+from photogram.io.parquet import Column, Repeated
 from photogram.io.structure import Stand
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import Message, Undetermined
 from photogram.network.block import Block
-from photogram.network.cameras import Camera
-from photogram.network.core_arrays import CoreOptions
-from photogram.network.films import Film, Pattern, Readings, Reseau
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
 from photogram.network.lens import Lens
 from photogram.network.motion import scanners
 from photogram.network.moving_photos import Lines, LineSensor, Shutter, Timed
-from photogram.network.observations import Observation
-from photogram.network.passages import Passage
-from photogram.network.refraction import Refraction
-from photogram.network.rigs import Mount
 from photogram.network.trajectories import (
     Angles,
     Basis,
@@ -39,13 +28,6 @@ from photogram.network.trajectories import (
     Table,
     Trajectory,
 )
-from photogram.network.unknowns import Unknown
-from photogram.results.cameras import AdjustedCamera
-from photogram.results.datum import ResultDatum
-from photogram.results.features import Feature, Features, Quantity
-from photogram.results.iteration import Iteration
-from photogram.results.observation_kinds import ObservedKind
-from photogram.results.result import Result
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -53,46 +35,17 @@ from photogram.results.result_files import (
     Part,
     image_parts,
     point_parts,
-    read_saved,
-    rows_of,
     sheet,
     written,
 )
-from photogram.results.sums import Redundancies, SumsOfSquares
 from photogram.results.tables import TABLES
-from photogram.results.unknowns import AdjustedUnknown
-from photogram.statistics.findings import Removed
-from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
 CHECK_SD = "standard deviation of the given {} of a check point; NaN where not known"
-_CLASSES = (
-    AdjustedCamera,
-    AdjustedUnknown,
-    Film,
-    Pattern,
-    Readings,
-    Reseau,
-    Camera,
-    CoreOptions,
-    Feature,
-    Features,
-    Frame,
-    Iteration,
-    Message,
-    Mount,
-    ObservedKind,
-    Phrase,
-    Quantity,
-    Redundancies,
-    Refraction,
-    Removed,
-    ResultDatum,
-    Spheroid,
-    SumsOfSquares,
-    Undetermined,
-)
 _TABLES = {
     "control": "control",
     "check_points": "check",
@@ -137,43 +90,11 @@ def block_files(result: Result) -> dict[str, Content]:
     return written(result, KIND, "block", _parts(block), leading, tables, block.frame, summary, STANDS)
 
 
-def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
-    """Return the result of a block that a folder keeps; refuse files that lack, are damaged, or disagree."""
-    saved = read_saved(
-        folder, [*_CLASSES, *CLASSES, *_below(Observation), *_below(Unknown), *_below(Passage)], document
-    )
-    given = saved.members("block", Block)
-    images, names = saved.sheets["images"], {}
-    for kind in ("photo", "point"):
-        sheet = saved.sheets[f"{kind}s"]
-        own = sheet.names(kind)
-        names[kind] = (
-            own.names if (own.rows == np.arange(len(own))).all() else [own.names[k] for k in own.rows]
-        )
-        given[f"{kind}_ids"] = names[kind]
-        given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
-    parts = _parts_of(
-        geographic=given["spheroid"] is not None,
-        unit=given["linear_unit"],
-        image_unit=str(document["image_unit"]),
-        distances="principal_distance" in saved.sheets["photos"].columns,
-        observed=_observed(saved.sheets["photos"]),
-    )
-    own_arrays, block_arrays = saved.arrays(parts, "block")
-    block = Block(**given, **block_arrays)
-    members = saved.members("result", Result)
-    if block.timed or any(each.knot_unknowns for each in block.cameras):
-        # Coefficients of photos with trajectories of their own, and knots, are made with their block.
-        pairs = zip(members["unknowns"], block.unknowns, strict=True)
-        members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
-    return Result(**members, **own_arrays, block=block, state=saved.state())
-
-
 def _parts(block: Block) -> dict[str, list[Part]]:
     observed = [
         name for name in ("positions", "attitudes") if getattr(block, f"photo_{name}_observed") is not None
     ]
-    parts = _parts_of(
+    parts = parts_of_block(
         geographic=block.geographic,
         unit=block.linear_unit,
         image_unit=block.image_unit,
@@ -192,7 +113,7 @@ def _parts(block: Block) -> dict[str, list[Part]]:
     return parts
 
 
-def _parts_of(
+def parts_of_block(
     *, geographic: bool, unit: str, image_unit: str, distances: bool, observed: list[str]
 ) -> dict[str, list[Part]]:
     """Return what the tables of a block have."""
@@ -232,12 +153,6 @@ def _parts_of(
     }
 
 
-def _observed(photos: Sheet) -> list[str]:
-    """Return which observed values a table of photos has."""
-    first = {"positions": ("observed_x", "observed_longitude"), "attitudes": ("observed_omega",)}
-    return [name for name, columns in first.items() if any(each in photos.columns for each in columns)]
-
-
 def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
     return Column(kind, Repeated(names, rows), "", f"name of the {kind}")
 
@@ -247,13 +162,6 @@ def _camera_column(block: Block) -> list[Column]:
         return []
     names = block.camera_names
     return [Column("camera", Repeated(names, block.photo_cameras), "", "name of the camera")]
-
-
-def _below(base: type) -> Iterator[type]:
-    subclasses: list[type] = base.__subclasses__()
-    for each in subclasses:
-        yield each
-        yield from _below(each)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,7 @@ def block_document(result: Result) -> Document:
     """Return the document of an adjusted block."""
     pictures, (about, figures) = drawings(result), bandwidths(result)
     given = [
-        control_section(result),
+        control_section(result, unheld(result)),
         check_section(result),
         beside_section(result),
         stations_section(result),

@@ -464,13 +464,8 @@ class AdjustedNetwork(Valued, Brief, Judged, Documented, ABC):
         raise NotImplementedError
 
     def _table(self, what: str) -> pd.DataFrame:
-        """Return the table of one kind of thing as a data frame; pandas takes long to import."""
-        import pandas as pd
-
-        from photogram.results.network_tables import TABLES
-        from photogram.show.quantity import frame
-
-        return pd.DataFrame(frame(TABLES[what](self)))
+        """Return the table of one kind of thing as a data frame."""
+        raise NotImplementedError
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values and standard deviations, attitudes in degrees."""

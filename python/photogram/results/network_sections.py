@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,12 +24,14 @@ from photogram.results.network_tables import (
     stations,
     terms_of,
 )
-from photogram.results.result import Result
-from photogram.results.tables import check_points, observations, unheld
+from photogram.results.tables import check_points, observations
 from photogram.results.weakest import WeakestPhoto, WeakestPoint
 from photogram.show.cells import unit_written
 from photogram.show.page import Layers, Part, Section, Text
 from photogram.show.quantity import Link, Quantity, Table, named, of_each
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 ALL = 200
 """Photos or points up to which all have a row."""
@@ -64,13 +67,16 @@ def is_held(control: Observed) -> Bools:
     return found
 
 
-def control_section(result: AdjustedNetwork) -> Section:
-    """Return control: prior, posterior, difference, test; what is held has none."""
+def control_section(result: AdjustedNetwork, free: Sequence[Quantity] = ()) -> Section:
+    """Return control: prior, posterior, difference, test; what is held has none.
+
+    `free` are the columns of components of control that are not held.
+    """
     columns, held = control(result), is_held(result.control)
     own = replace(result.control, sd=np.where(held[:, np.newaxis], np.nan, result.control.sd))
     tables = _observed("control", "Control points", columns, own, result.point_sd)
-    if isinstance(result, Result):
-        tables += _compared("unheld", "Components of control that are not held", unheld(result))
+    if free:
+        tables += _compared("unheld", "Components of control that are not held", free)
     intro = (
         "What was given for the control points, and what the adjustment made of it. A component with a"
         " redundancy"

@@ -423,9 +423,9 @@ class Result(OnFilm, AdjustedNetwork):
         It has `figures`, `sentences`, `assumptions`, `exit`, `budget(..)`, `check_points`, `leave_one_out`,
         `to_html()`, `to_pdf()` and `to_json()`; options and errors are those of :func:`photogram.statement`.
         """
-        from photogram.results.statement.statement import statement
+        import photogram  # the package names the function that reads results
 
-        return statement(self, **asked)
+        return photogram.statement(self, **asked)
 
     def check_table(self) -> pd.DataFrame:
         """Return check points as a data frame: adjusted minus supplied coordinates, standard deviations."""
