@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from photogram.results.statement.drawings import overlap
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.leave_one_out import limit_of
 from photogram.results.statement.sheets import Written, decimals_for
-from photogram.results.statement.statement import Statement
 from photogram.show.judgement import signs_of
 from photogram.show.page import (
     Cell,
@@ -34,6 +33,9 @@ from photogram.show.page import (
     decimals_of,
 )
 from photogram.statistics.evidence import Test
+
+if TYPE_CHECKING:
+    from photogram import Statement
 
 SOURCES = 12
 """Sources of a budget at a finer level than kinds that the page lists, those that contribute most."""

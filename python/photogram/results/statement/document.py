@@ -10,11 +10,10 @@ from photogram.results.grouping import grouped
 from photogram.results.statement.budget import kind_of
 from photogram.results.statement.members import budget_member, figures_member, left_out_rows, point_rows
 from photogram.results.statement.request import lengths_in
-from photogram.results.statement.statement import Statement
 from photogram.show.quantity import members
 
 if TYPE_CHECKING:
-    from photogram import Result
+    from photogram import Result, Statement
 
 
 def statement_members(found: Statement) -> dict[str, Any]:

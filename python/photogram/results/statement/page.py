@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from photogram.results.statement.drawings import differences
 from photogram.results.statement.drawings import lengths as drawn_lengths
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.sheets import Written, decimals_for
-from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
 from photogram.show.page import (
     Cell,
@@ -41,6 +40,9 @@ from photogram.show.page import (
     Text,
     decimals_of,
 )
+
+if TYPE_CHECKING:
+    from photogram import Statement
 
 _CLASSES = {"h": "v", "plan": "h", "all": "3d"}
 """Parts of the components with classes."""

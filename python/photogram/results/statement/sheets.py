@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from photogram.results.statement.budget import Budget
 from photogram.results.statement.comparison import Compared
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.leave_one_out import LeftOut
-from photogram.results.statement.statement import Statement
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Cell, Column, decimals_of
+
+if TYPE_CHECKING:
+    from photogram import Statement
 
 _AXES = ("e", "n", "h")
 decimals_for = partial(decimals_of, smallest=True, unknown=3, most=6)
