@@ -8,11 +8,12 @@ import pytest
 from typer.testing import CliRunner
 
 import photogram
-from photogram import Message, words
+from photogram import InputError, Message, words
 from photogram.cli import app
+from photogram.io.places import Place, at_place
 from photogram.results.statement import texts
 from photogram.statistics.verdict import RULES
-from photogram.words import Phrase, Words, on_command_line, table_of
+from photogram.words import Phrase, Words, on_command_line, phrase, table_of
 
 EXAMPLES = Path(photogram.__file__).parent / "examples"
 FORMATS = ("number.", "date")
@@ -67,6 +68,28 @@ def test_a_remark_has_a_code():
     assert (remark.code, remark.phrase.fields["n"]) == ("read.repeated", 2)
     assert str(remark) == str(remark.phrase)
     assert Message("a text of a file").code == ""
+
+
+def test_an_error_has_a_code_at_each_place():
+    error = InputError(phrase("error.at", what="b", message=phrase("error.document")), file=Path("a.json"))
+    assert (error.code, error.message, str(error)) == (
+        "error.at",
+        "b: the document",
+        "a.json: b: the document",
+    )
+    again = pickle.loads(pickle.dumps(error))
+    assert (again.phrase, again.file, str(again)) == (error.phrase, error.file, str(error))
+    with pytest.raises(InputError) as raised, at_place(Place(Path("b.csv"), 3)):
+        raise InputError(phrase("error.document"))
+    assert (raised.value.code, raised.value.record) == ("error.document", 3)
+    assert Words()("error.at", what=Phrase("error.document"), message="") == "the document: "
+
+
+def test_a_quoted_field_is_escaped_and_short():
+    assert (
+        Words("en", {"a": "{value:'}"})("a", value="x\n" * 30)
+        == repr(("x\n" * 30)[:40]) + "... (60 characters)"
+    )
 
 
 def test_advice_names_functions_in_python_and_options_on_the_command_line():

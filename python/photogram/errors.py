@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from photogram.messages import locate
+from photogram.words import Phrase
 
 __all__ = [
     "AdjustmentError",
@@ -18,7 +19,30 @@ __all__ = [
 
 
 class PhotogramError(Exception):
-    """Base of every exception that photogram raises on purpose; all can be pickled."""
+    """Base of every exception that photogram raises on purpose; all can be pickled.
+
+    Parameters
+    ----------
+    message
+        What is wrong: a sentence, or its code with fields.
+
+    Attributes
+    ----------
+    phrase
+        The message as a code with fields; None if it has none.
+    """
+
+    phrase: Phrase | None = None
+
+    def __init__(self, message: str | Phrase = "", *more: object) -> None:
+        super().__init__(str(message), *more)
+        if isinstance(message, Phrase):
+            self.phrase = message
+
+    @property
+    def code(self) -> str:
+        """The code of the message in the files of words; empty if it has none."""
+        return "" if self.phrase is None else self.phrase.code
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Not by what the class is called with, which differs from one to the other.
@@ -39,16 +63,22 @@ class InputError(PhotogramError, ValueError):
     Parameters
     ----------
     message
-        What is wrong, in a sentence.
+        What is wrong: a sentence, or its code with fields.
     file, record, text
         The file, the number of the record in it (from 1) and the record itself, as far as they apply.
     """
 
     def __init__(
-        self, message: str, *, file: Path | None = None, record: int | None = None, text: str | None = None
+        self,
+        message: str | Phrase,
+        *,
+        file: Path | None = None,
+        record: int | None = None,
+        text: str | None = None,
     ) -> None:
-        super().__init__(locate(message, file, record, text))
-        self.message = message
+        super().__init__(message)
+        self.message = str(message)
+        self.args = (locate(self.message, file, record, text),)
         self.file = file
         self.record = record
         self.text = text
@@ -59,8 +89,8 @@ class ContradictionError(InputError):
 
     @classmethod
     def of(cls, error: InputError) -> Self:
-        """Return it at the place of another error, with its words."""
-        return cls(error.message, file=error.file, record=error.record, text=error.text)
+        """Return it at the place of another error, with its message."""
+        return cls(error.phrase or error.message, file=error.file, record=error.record, text=error.text)
 
 
 class AdjustmentError(PhotogramError):
@@ -77,7 +107,7 @@ class RankError(AdjustmentError):
     Parameters
     ----------
     message
-        What is undetermined, in a sentence.
+        What is undetermined: a sentence, or its code with fields.
     photos, points
         Identifiers of the photos and points concerned.
     cameras
@@ -88,7 +118,7 @@ class RankError(AdjustmentError):
 
     def __init__(
         self,
-        message: str,
+        message: str | Phrase,
         photos: list[str],
         points: list[str],
         cameras: list[str] | None = None,
@@ -98,4 +128,4 @@ class RankError(AdjustmentError):
         self.photos = photos
         self.points = points
         self.cameras = cameras or []
-        self.what = what or message
+        self.what = what or str(message)

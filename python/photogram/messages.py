@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from photogram.lazy_dataclasses import dataclass
-from photogram.words import Phrase
+from photogram.words import Phrase, quoted
 
-__all__ = ["Message", "Undetermined"]
+__all__ = ["Message", "Undetermined", "quoted"]
 
 MOST_NAMES = 12
 """Names that a message lists at most."""
@@ -17,19 +17,10 @@ MOST_NAMES = 12
 MOST_CHARACTERS = 200
 """Characters of a record that a message shows at most; the cards of all programs have fewer."""
 
-MOST_QUOTED = 40
-"""Characters of a field that a message quotes at most."""
-
 
 def shortened(text: str, most: int = MOST_CHARACTERS) -> str:
     """Return the beginning of a long text, and how long it is; a short one as it is."""
     return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
-
-
-def quoted(text: str) -> str:
-    """Return a field between quotation marks as messages show it: escaped, and shortened where it is long."""
-    rest = "" if len(text) <= MOST_QUOTED else f"... ({len(text)} characters)"
-    return f"{text[:MOST_QUOTED]!r}{rest}"
 
 
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
@@ -78,24 +69,28 @@ class Message:
     Attributes
     ----------
     text
-        The remark, in a sentence.
+        The remark: a sentence, or its code with fields, of which this is the sentence.
     file, record, record_text
         The file, the number of the record in it (from 1) and the record itself, as far as they apply.
     phrase
         The remark as a code with fields; None if it has none.
     """
 
-    text: str
+    text: str | Phrase
     file: Path | None = None
     record: int | None = None
     record_text: str | None = None
     phrase: Phrase | None = None
 
+    def __post_init__(self) -> None:
+        if isinstance(self.text, Phrase):
+            object.__setattr__(self, "phrase", self.text)
+            object.__setattr__(self, "text", str(self.text))
+
     @classmethod
-    def of(cls, code: str, /, **fields: Any) -> Message:
+    def of(cls, code: str, file: Path | None = None, /, **fields: Any) -> Message:
         """Return the remark of a code with its fields."""
-        phrase = Phrase(code, fields)
-        return cls(str(phrase), phrase=phrase)
+        return cls(Phrase(code, fields), file)
 
     @property
     def code(self) -> str:
@@ -103,7 +98,7 @@ class Message:
         return "" if self.phrase is None else self.phrase.code
 
     def __str__(self) -> str:
-        return locate(self.text, self.file, self.record, self.record_text)
+        return locate(str(self.text), self.file, self.record, self.record_text)
 
 
 @dataclass(frozen=True)

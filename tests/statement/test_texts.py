@@ -19,7 +19,9 @@ SOURCES = Path(package.__file__).parent
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_languages_have_the_same_keys_and_fields(language):
     english, own = table_of("en"), table_of(language)
-    assert sorted(own) == sorted(english)
+    families = {key.partition(".")[0] for key in own}
+    # Only the statement has other languages: they lack whole families, such as input errors.
+    assert sorted(own) == sorted(key for key in english if key.partition(".")[0] in families)
     for key, sentence in own.items():
         assert fields_of(sentence) == fields_of(english[key]), key
     assert Texts(language).missing == []

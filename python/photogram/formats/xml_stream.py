@@ -18,6 +18,7 @@ from photogram.io.files import reading
 from photogram.io.numbers import finite_number, whole_number
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
+from photogram.words import Phrase
 
 SUFFIXES = (".xml", ".psz")
 """The endings of documents, and of archives with a document."""
@@ -48,7 +49,7 @@ class Element:
         """Where it stands."""
         return Place(self.file, self.line, f"<{self.name}> {self.text.strip()}"[:120])
 
-    def error(self, message: str) -> InputError:
+    def error(self, message: str | Phrase) -> InputError:
         """Return an error that names the line."""
         return self.place.error(message)
 

@@ -16,6 +16,7 @@ from photogram.io.numbers import Marks, finite_number, marks_of
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import listed, quoted
+from photogram.words import Phrase
 
 TRUE, FALSE = (
     frozenset({"true", "yes", "on", "1", "t", "y"}),
@@ -76,7 +77,7 @@ class ColumnTable:
         text = self._lines[record - 1] if record <= len(self._lines) else None
         return Place(self.path, record, text)
 
-    def error(self, row: int, message: str) -> InputError:
+    def error(self, row: int, message: str | Phrase) -> InputError:
         """Return an error that names the place of a row."""
         return self.place(row).error(message)
 

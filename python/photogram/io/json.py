@@ -16,6 +16,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import quoted
+from photogram.words import Phrase, phrase
 
 _FORM = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS | orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE
 LARGEST = 1e300
@@ -58,11 +59,10 @@ class Tree:
     file: Path
     path: str = ""
 
-    def error(self, message: str) -> InputError:
+    def error(self, message: str | Phrase) -> InputError:
         """Return an error that names file and path."""
-        return InputError(
-            f"{self.path or 'the document'}: {message}", file=self.file, text=repr(self.value)[:120]
-        )
+        located = phrase("error.at", what=self.path or phrase("error.document"), message=message)
+        return InputError(located, file=self.file, text=repr(self.value)[:120])
 
     def _as(self, kind: type, word: str) -> Any:
         if not isinstance(self.value, kind) or isinstance(self.value, bool):

@@ -11,12 +11,13 @@ from typing import Protocol
 from photogram.errors import InputError
 from photogram.io.numbers import LARGEST_INTEGER, finite_number, whole_number
 from photogram.messages import Message
+from photogram.words import Phrase
 
 
 class Failing(Protocol):
     """What can tell where it stands in a file: a place, an element of XML, a member of JSON."""
 
-    def error(self, message: str, /) -> InputError:
+    def error(self, message: str | Phrase, /) -> InputError:
         """Return an error that names the place."""
 
 
@@ -26,7 +27,7 @@ def at_place(place: Failing) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise (error if error.file else place.error(error.message)) from None
+        raise (error if error.file else place.error(error.phrase or error.message)) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class Place:
     record: int | None = None
     text: str | None = None
 
-    def error(self, message: str) -> InputError:
+    def error(self, message: str | Phrase) -> InputError:
         """Return an error that names the place."""
         return InputError(message, file=self.file, record=self.record, text=self.text)
 
@@ -55,6 +56,6 @@ class Place:
         except ValueError as error:
             raise self.error(f"{what}: {error}" if what else str(error)) from None
 
-    def message(self, message: str) -> Message:
+    def message(self, message: str | Phrase) -> Message:
         """Return a remark that names the place."""
         return Message(message, self.file, self.record, self.text)

@@ -13,6 +13,7 @@ from typing import NamedTuple, TypeAlias
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import quoted
+from photogram.words import Phrase
 
 
 class Quantity(NamedTuple):
@@ -102,7 +103,7 @@ class _Reader:
         self.known = at, line + self.text.count("\n", known, at)
         return self.known[1]
 
-    def error(self, message: str, at: int | None = None) -> InputError:
+    def error(self, message: str | Phrase, at: int | None = None) -> InputError:
         return InputError(message, file=self.file, record=self.line(self.token.start if at is None else at))
 
     def take(self) -> _Token:

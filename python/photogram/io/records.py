@@ -13,6 +13,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.messages import Message
+from photogram.words import Phrase
 
 WIDTH = 80
 WIDE = 0.25  # Zero bytes that no text of one byte a character has, as a part of all
@@ -55,7 +56,7 @@ class Source:
         """Return the numbers of the records that are not blank."""
         return [number for number, line in enumerate(self.lines, 1) if line.strip(" ")]
 
-    def error(self, text: str) -> InputError:
+    def error(self, text: str | Phrase) -> InputError:
         """Return an error about the file as a whole."""
         return InputError(text, file=self.path)
 
@@ -77,15 +78,15 @@ class Record:
         """Where the record stands."""
         return Place(self.source.path, self.number, self.text)
 
-    def error(self, text: str) -> InputError:
+    def error(self, text: str | Phrase) -> InputError:
         """Return an error that names file, record number and record."""
         return self.place.error(text)
 
-    def message(self, text: str) -> Message:
+    def message(self, text: str | Phrase) -> Message:
         """Return a remark that names file, record number and record."""
         return self.place.message(text)
 
-    def remark(self, text: str) -> None:
+    def remark(self, text: str | Phrase) -> None:
         """Add a remark on this record to the messages of the file."""
         self.source.messages.append(self.message(text))
 

@@ -16,6 +16,7 @@ from photogram.errors import InputError
 from photogram.io.files import read_bytes
 from photogram.io.places import Place
 from photogram.messages import nearest
+from photogram.words import Phrase
 
 MOST_DIGITS = 1000
 _ENDLESS = re.compile(rf"\d[\d_]{{{MOST_DIGITS}}}")
@@ -53,7 +54,7 @@ class TomlFile:
         known = record is not None and record <= len(self.lines)
         return Place(self.path, record, self.lines[record - 1] if record and known else None)
 
-    def error(self, key: str, message: str, section: str = "") -> InputError:
+    def error(self, key: str, message: str | Phrase, section: str = "") -> InputError:
         """Return an error at the first line that has a key or table: of the section, if there."""
         return self.place(key, section).error(message)
 
@@ -119,7 +120,7 @@ class Sections(TomlFile):
             self._said[section, key] = each
         self.content = content
 
-    def fail(self, section: str, key: str, message: str) -> NoReturn:
+    def fail(self, section: str, key: str, message: str | Phrase) -> NoReturn:
         """Raise an error at the first line of a section that has the key; without a section, of the file."""
         given = [each for (own, name), each in self._said.items() if (own, name) == (section, key)]
         given += [each for (own, _), each in self._said.items() if (section, key) == ("", own)]

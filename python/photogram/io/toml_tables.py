@@ -10,6 +10,7 @@ from typing import Any
 from photogram.errors import InputError
 from photogram.io.toml import TomlFile, float_of
 from photogram.messages import listed
+from photogram.words import Phrase, phrase
 
 _LONGEST = 60  # Characters of a value that an error shows
 
@@ -27,9 +28,9 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return key in self.values
 
-    def error(self, key: str, text: str) -> InputError:
+    def error(self, key: str, text: str | Phrase) -> InputError:
         """Return an error that names file, table and key."""
-        return InputError(f"[{self.name}] {key} {text}", file=self.file)
+        return InputError(phrase("error.key", table=self.name, key=key, message=text), file=self.file)
 
     def table(self, key: str) -> Table:
         """Return a table within this one; an empty one where it is missing."""

@@ -16,6 +16,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.archives import UNPACKABLE, check_unpacked_size
 from photogram.memory import require
+from photogram.words import Phrase
 
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
@@ -30,7 +31,7 @@ class Arrays:
         # Empty text stands for None, as mrcal writes it.
         return name in self.arrays and not (self.arrays[name].dtype.kind == "U" and self.text(name) == "")
 
-    def error(self, name: str, message: str) -> InputError:
+    def error(self, name: str, message: str | Phrase) -> InputError:
         """Return an error that names file and array."""
         return InputError(f"{name} {message}", file=self.path)
 

@@ -6,7 +6,8 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
 * that of a number, such as `{factor:.3g}`;
 * that of a list: the greatest number of its parts (`{names:5}`), `;`, `&` (and) or `|` (or) between them in
   place of commas, and `#` for parts with numbers;
-* `^` begins with a capital letter, `+` puts `; ` before a text that is not empty.
+* `^` begins with a capital letter, `+` puts `; ` before a text that is not empty;
+* `'` quotes a text of the input: escaped, and shortened if it is long.
 
 `code.one` is the sentence if the field `n` is 1, `code.one.name` if the field `name` is 1, and `code.cli` the
 sentence on the command line: it names options, the other one functions of Python.
@@ -19,6 +20,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
+from numbers import Real
 from pathlib import Path
 from string import Formatter
 from typing import Any
@@ -27,6 +29,9 @@ from photogram.lazy_dataclasses import dataclass, field
 
 MAX_NAMES = 12
 """Names that a list has at most."""
+
+MAX_QUOTED = 40
+"""Characters of a field that a message quotes at most."""
 
 _on_command_line: ContextVar[bool] = ContextVar("on_command_line", default=False)
 _SENTENCE = re.compile(r'^("\S.*?") = (".*")$', re.MULTILINE)
@@ -62,6 +67,17 @@ class Phrase:
     def document(self) -> dict[str, Any]:
         """Return code, fields and sentence as JSON documents have them."""
         return {"code": self.code, "fields": self.fields, "text": str(self)}
+
+
+def quoted(text: str) -> str:
+    """Return a field of the input between quotation marks: escaped, and shortened if it is long."""
+    rest = "" if len(text) <= MAX_QUOTED else f"... ({len(text)} characters)"
+    return f"{text[:MAX_QUOTED]!r}{rest}"
+
+
+def phrase(code: str, /, **fields: Any) -> Phrase:
+    """Return the message of a code with its fields."""
+    return Phrase(code, fields)
 
 
 def option_sd(kind: str) -> Phrase:
@@ -130,10 +146,12 @@ class Words:
             text = self._composed(value.code, value.fields)
         elif isinstance(value, list | tuple):
             text = self._list(value, form)
-        elif isinstance(value, str):
-            text = value
-        else:
+        elif isinstance(value, Real):
             return self._number(value, form)
+        else:
+            text = str(value)
+        if "'" in form:
+            return quoted(text)
         text = f"{text[:1].upper()}{text[1:]}" if "^" in form else text
         return f"; {text}" if text and "+" in form else text
 
@@ -182,5 +200,5 @@ class Words:
         most = "".join(filter(str.isdigit, form))
         return self.listed(parts, int(most) if most else MAX_NAMES)
 
-    def _number(self, value: float, form: str) -> str:
+    def _number(self, value: Any, form: str) -> str:
         return self.numeral(format(value, form))

@@ -53,7 +53,7 @@ def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
 
 def _printed(calibration: Calibration) -> list[str]:
     """Return the remarks of the program itself, which are in capitals; that on placements has its page."""
-    remarks = [each.text for each in calibration.messages if each.code != "comparator.rotations"]
+    remarks = [str(each.text) for each in calibration.messages if each.code != "comparator.rotations"]
     found = [text.upper() for text in remarks if (own := text.split(": ", 1)[-1]) == own.upper()]
     return ["", *(f"  {text}" for text in found)] if found else []
 

@@ -24,6 +24,7 @@ from photogram.io.pvl import Group, Quantity, Value, parsed
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation, increasing, rotations
+from photogram.words import Phrase
 
 PIECE = 1 << 16
 LONGEST = 1 << 26
@@ -101,7 +102,7 @@ class _Table:
                 raise self.error(f"the column {each['Name'].value} is none of single doubles")
         self.rows = self._rows()
 
-    def error(self, message: str) -> InputError:
+    def error(self, message: str | Phrase) -> InputError:
         return InputError(f"the table {self.name}: {message}", file=self.path, record=self.label.line)
 
     def _rows(self) -> Floats:

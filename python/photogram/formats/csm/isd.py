@@ -15,6 +15,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation
+from photogram.words import Phrase
 
 Pixels = Literal["isis", "csm"]
 """How pixels are counted: the middle of the first is 1 (ISIS) or 0.5, half a pixel of the detector apart."""
@@ -191,7 +192,7 @@ class Isd:
         """(3,) factors from the axes of the camera to those of photos, which look along -z; and back."""
         return np.array([1.0, -self.look, -self.look])
 
-    def error(self, message: str) -> InputError:
+    def error(self, message: str | Phrase) -> InputError:
         """Return an error that names the file."""
         return InputError(message, file=self.path)
 

@@ -65,7 +65,9 @@ class Texts(Words):
             if any(form or conversion for *_, form, conversion in Formatter().parse(sentence)):
                 raise InputError(f"{sentence!r}: a field is a name in braces, such as {{n}}")
         super().__init__(language, own)
-        self.missing = sorted(set(english) - set(table_of(language)))
+        own = table_of(language)
+        families = {key.partition(".")[0] for key in own}  # The others are of no statement
+        self.missing = sorted(key for key in set(english) - set(own) if key.partition(".")[0] in families)
         """Keys that are said in English for want of a sentence in the language."""
 
     def said(self, key: str, **values: Any) -> tuple[str, str]:
