@@ -3,22 +3,22 @@
 use std::hash::{BuildHasher, RandomState};
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 /// Bytes of a line at most.
 const LONGEST_LINE: usize = 100_000;
 /// Bytes of a number at most.
 const LONGEST_NUMBER: usize = 1_000;
 
+/// Bytes of the parts of a piece, which threads read at the same time.
+const PART: usize = 1 << 18;
+
 /// A table of text, which grows piece by piece.
 #[derive(Debug)]
 pub struct Table {
     delimiter: u8,
-    /// The decimal mark of all numbers, from the first number that has one.
-    mark: Option<u8>,
     columns: Vec<Column>,
-    /// Cells in the last piece of the columns of names.
-    cells: Vec<Vec<Range<usize>>>,
-    /// A blank line was read: no other line may follow.
-    ended: bool,
+    state: State,
 }
 
 /// A column of a table.
@@ -30,14 +30,36 @@ pub enum Column {
     Names(Names),
 }
 
+/// What the lines so far require of the next ones.
+#[derive(Debug, Default)]
+struct State {
+    /// The decimal mark of all numbers, from the first number that has one.
+    mark: Option<u8>,
+    /// A blank line was read: no other line may follow.
+    ended: bool,
+}
+
+/// The cells of some lines.
+struct Part {
+    columns: Vec<Cells>,
+    state: State,
+    /// Lines that are not blank.
+    lines: usize,
+}
+
+enum Cells {
+    Numbers(Vec<f64>),
+    /// Places of the names in the piece, and their hashes.
+    Names(Vec<(Range<usize>, u64)>),
+}
+
 impl Table {
     /// An empty table; `numeric` of a column is whether its cells are numbers.
     pub fn new(delimiter: u8, numeric: &[bool]) -> Self {
         let column = |&numeric: &bool| {
             if numeric { Column::Numbers(vec![]) } else { Column::Names(Names::default()) }
         };
-        let columns = numeric.iter().map(column).collect();
-        Self { delimiter, mark: None, columns, cells: vec![vec![]; numeric.len()], ended: false }
+        Self { delimiter, columns: numeric.iter().map(column).collect(), state: State::default() }
     }
 
     /// The columns.
@@ -45,36 +67,45 @@ impl Table {
         self.columns
     }
 
-    /// Appends whole lines. The result is `None`, and the table is useless, if a line is irregular.
+    /// Appends whole lines, in the threads of the current pool. The result is `None`, and the table is useless, if a line is irregular.
     pub fn add(&mut self, piece: &[u8]) -> Option<()> {
-        self.cells.iter_mut().for_each(Vec::clear);
-        let mut at = 0;
-        while at < piece.len() {
-            let first = after_blanks(piece, at, b'\n');
-            if let Some(next) = after_line_end(piece, first) {
-                (self.ended, at) = (true, next);
+        let parts: Vec<Part> =
+            parts_of(piece).into_par_iter().map(|lines| self.part(piece, lines)).collect::<Option<_>>()?;
+        for part in &parts {
+            self.state.follow(part)?;
+        }
+        self.columns.par_iter_mut().enumerate().try_for_each(|(k, column)| {
+            let mut cells = parts.iter().map(|part| &part.columns[k]);
+            cells.try_for_each(|cells| column.extend(piece, cells))
+        })
+    }
+
+    /// Reads whole lines of a piece.
+    fn part(&self, piece: &[u8], lines: Range<usize>) -> Option<Part> {
+        let columns = self.columns.iter().map(Column::cells).collect();
+        let mut part = Part { columns, state: State::default(), lines: 0 };
+        let (mut at, text) = (lines.start, &piece[..lines.end]);
+        while at < text.len() {
+            let first = after_blanks(text, at, b'\n');
+            if let Some(next) = after_line_end(text, first) {
+                (part.state.ended, at) = (true, next);
                 continue;
             }
-            if self.ended || piece[first] == b'#' {
+            if part.state.ended || text[first] == b'#' {
                 return None;
             }
-            let next = self.line(piece, at)?;
+            let next = self.line(text, at, &mut part)?;
             if next - at > LONGEST_LINE {
                 return None;
             }
-            at = next;
+            (part.lines, at) = (part.lines + 1, next);
         }
-        for (column, cells) in self.columns.iter_mut().zip(&self.cells) {
-            if let Column::Names(names) = column {
-                names.extend(piece, cells)?;
-            }
-        }
-        Some(())
+        Some(part)
     }
 
-    /// Appends a line, and returns where the next one begins.
-    fn line(&mut self, piece: &[u8], mut at: usize) -> Option<usize> {
-        for k in 0..self.columns.len() {
+    /// Appends a line to a part, and returns where the next one begins.
+    fn line(&self, piece: &[u8], mut at: usize, part: &mut Part) -> Option<usize> {
+        for (k, (column, cells)) in self.columns.iter().zip(&mut part.columns).enumerate() {
             if k > 0 {
                 if piece.get(at) != Some(&self.delimiter) {
                     return None;
@@ -83,11 +114,15 @@ impl Table {
             }
             let (cell, end) = self.cell(piece, at)?;
             at = end;
-            match &mut self.columns[k] {
-                Column::Numbers(numbers) => {
-                    numbers.push(number(&piece[cell], self.delimiter, &mut self.mark)?)
+            match (column, cells) {
+                (Column::Names(names), Cells::Names(cells)) => {
+                    let hash = names.hashes.hash_one(&piece[cell.clone()]);
+                    cells.push((cell, hash));
                 }
-                Column::Names(_) => self.cells[k].push(cell),
+                (_, Cells::Numbers(numbers)) => {
+                    numbers.push(number(&piece[cell], self.delimiter, &mut part.state.mark)?)
+                }
+                (Column::Numbers(_), Cells::Names(_)) => return None,
             }
         }
         if piece.get(at) == Some(&self.delimiter) {
@@ -117,6 +152,50 @@ impl Table {
         (piece[closing] == b'"')
             .then(|| (without_blanks(piece, content), after_blanks(piece, closing + 1, self.delimiter)))
     }
+}
+
+impl Column {
+    fn cells(&self) -> Cells {
+        match self {
+            Self::Numbers(_) => Cells::Numbers(vec![]),
+            Self::Names(_) => Cells::Names(vec![]),
+        }
+    }
+
+    fn extend(&mut self, piece: &[u8], cells: &Cells) -> Option<()> {
+        match (self, cells) {
+            (Self::Numbers(column), Cells::Numbers(numbers)) => column.extend_from_slice(numbers),
+            (Self::Names(column), Cells::Names(names)) => column.extend(piece, names)?,
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+impl State {
+    /// Continues with the lines of a part; `None` if they may not follow.
+    fn follow(&mut self, part: &Part) -> Option<()> {
+        let marks = self.mark.is_none() || part.state.mark.is_none() || self.mark == part.state.mark;
+        if !marks || (self.ended && part.lines > 0) {
+            return None;
+        }
+        self.mark = self.mark.or(part.state.mark);
+        self.ended |= part.state.ended;
+        Some(())
+    }
+}
+
+/// Parts of a piece that end with a line each.
+fn parts_of(piece: &[u8]) -> Vec<Range<usize>> {
+    let (mut parts, mut start) = (vec![], 0);
+    while start < piece.len() {
+        let near = (start + PART).min(piece.len());
+        let end =
+            piece[near..].iter().position(|&byte| byte == b'\n').map_or(piece.len(), |at| near + at + 1);
+        parts.push(start..end);
+        start = end;
+    }
+    parts
 }
 
 fn is_blank(byte: u8) -> bool {
@@ -195,12 +274,10 @@ impl Names {
         !self.doubtful && !mixed
     }
 
-    fn extend(&mut self, piece: &[u8], cells: &[Range<usize>]) -> Option<()> {
-        // All hashes first: then the processor waits for the memory of several slots at a time.
-        let hashes: Vec<u64> = cells.iter().map(|cell| self.hashes.hash_one(&piece[cell.clone()])).collect();
+    fn extend(&mut self, piece: &[u8], cells: &[(Range<usize>, u64)]) -> Option<()> {
         self.rows.reserve(cells.len());
-        for (cell, hash) in cells.iter().zip(hashes) {
-            let row = self.number(&piece[cell.clone()], hash)?;
+        for (cell, hash) in cells {
+            let row = self.number(&piece[cell.clone()], *hash)?;
             self.rows.push(row);
         }
         Some(())
@@ -266,5 +343,124 @@ impl Names {
             }
         }
         Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers, or names by row, of each column.
+    #[derive(Debug, PartialEq)]
+    enum Read {
+        Numbers(Vec<f64>),
+        Names(Vec<String>, bool),
+    }
+
+    fn read(pieces: &[&str], numeric: &[bool]) -> Option<Vec<Read>> {
+        let mut table = Table::new(b',', numeric);
+        for piece in pieces {
+            table.add(piece.as_bytes())?;
+        }
+        let columns = table.columns().into_iter().map(|column| match column {
+            Column::Numbers(numbers) => Read::Numbers(numbers),
+            Column::Names(names) => {
+                let text = String::from_utf8_lossy(&names.text).into_owned();
+                let all: Vec<&str> = text.lines().collect();
+                let rows = names.rows.iter().map(|&row| all[row as usize].to_owned()).collect();
+                Read::Names(rows, names.are_distinct())
+            }
+        });
+        Some(columns.collect())
+    }
+
+    fn names(names: &[&str], distinct: bool) -> Read {
+        Read::Names(names.iter().map(|&name| name.to_owned()).collect(), distinct)
+    }
+
+    #[test]
+    fn cells_have_quotes_blanks_and_line_ends() {
+        let expected = || Some(vec![names(&["a b", "2", "a b"], false), Read::Numbers(vec![1.5, -2e3, 7.0])]);
+        let numeric = [false, true];
+        assert_eq!(read(&["a b,1.5\n2,-2e3\na b,7\n"], &numeric), expected());
+        assert_eq!(read(&["a b,1.5\r\n2,-2e3\r\na b,7"], &numeric), expected());
+        assert_eq!(
+            read(&["\"a b\" , 1.5,\n", " 2 ,\t\"-2e3\"\n a b, 7\r\n", "\n  \n"], &numeric),
+            expected()
+        );
+    }
+
+    #[test]
+    fn an_empty_number_is_nan() {
+        let columns = read(&["p,,2\n"], &[false, true, true]);
+        assert!(matches!(&columns.unwrap()[1], Read::Numbers(x) if x.len() == 1 && x[0].is_nan()));
+    }
+
+    #[test]
+    fn irregular_lines_are_rejected() {
+        let lines = [
+            "p\n",
+            "p,1,2\n",
+            "p,x\n",
+            "p,inf\n",
+            "p,1_0\n",
+            "# p,1\n",
+            "\n p,1\n",
+            "\"p,1\n",
+            "p\"q,1\n",
+            "\"a\"b,1\n",
+            "\x01,1\n",
+        ];
+        for line in lines {
+            assert_eq!(read(&["a,1\n", line], &[false, true]), None, "{line:?}");
+            assert_eq!(read(&[&format!("a,1\n{line}")], &[false, true]), None, "{line:?}");
+        }
+        let long = format!("{},1\n", "x".repeat(LONGEST_LINE));
+        assert_eq!(read(&[&long], &[false, true]), None);
+    }
+
+    #[test]
+    fn a_table_has_one_decimal_mark() {
+        let read = |pieces: &[&str]| {
+            let mut table = Table::new(b';', &[true, true]);
+            pieces.iter().try_for_each(|piece| table.add(piece.as_bytes()))?;
+            match &table.columns()[1] {
+                Column::Numbers(numbers) => Some(numbers.clone()),
+                Column::Names(_) => None,
+            }
+        };
+        assert_eq!(read(&["1;2,5\n", "3;4,5\n"]), Some(vec![2.5, 4.5]));
+        assert_eq!(read(&["1;2,5\n", "3;4.5\n"]), None);
+        assert_eq!(read(&["1;2,5\n3;4.5\n"]), None);
+    }
+
+    #[test]
+    fn names_of_one_spelling_are_distinct() {
+        for (text, distinct) in [("a\nb\n", true), ("a\nB\n", false), ("7\nnan\n", false), ("ä\n", false)] {
+            let columns = read(&[text], &[false]).unwrap();
+            assert!(matches!(columns[0], Read::Names(_, same) if same == distinct), "{text:?}");
+        }
+    }
+
+    /// Parts that threads read at the same time give the columns of one part, and their faults.
+    #[test]
+    fn parts_are_joined_in_order() {
+        let line = |k: usize| format!("DJI_{:05},{},{}.25,{}\n", k / 100, k % 7919, k, k as f64 / 3.0);
+        let rows = 40_000;
+        let text: String = (0..rows).map(line).collect();
+        assert!(parts_of(text.as_bytes()).len() > 3);
+        let numeric = [false, false, true, true];
+        let columns = |threads: usize, pieces: &[&str]| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| read(pieces, &numeric))
+        };
+        let one = columns(1, &[&text]).unwrap();
+        let half = text.len() / 2 + text[text.len() / 2..].find('\n').unwrap() + 1;
+        assert_eq!(columns(3, &[&text]).unwrap(), one);
+        assert_eq!(columns(2, &[&text[..half], &text[half..]]).unwrap(), one);
+        assert!(matches!(&one[0], Read::Names(names, _) if names[rows - 1] == "DJI_00399"));
+        assert!(matches!(&one[2], Read::Numbers(x) if x.len() == rows && x[123] == 123.25));
+        assert_eq!(columns(2, &[&format!("{text}\n{text}")]), None);
+        assert_eq!(columns(2, &[&format!("{text}1,2,\"3,5\",4\n")]), None);
     }
 }
