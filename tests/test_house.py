@@ -112,7 +112,6 @@ KNOWS = {
     "adjustment": {"normals"},
     "normals": set(),
     "geometry": set(),
-    "files": set(),
 }
 """What a folder of the crate may know of the others."""
 

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use crate::arrays::Vector;
 use numpy::{PyArray1, PyReadonlyArray1};
-use photocore::files::delimited::{self, Table};
+use photogram_files::delimited::{self, Table};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
