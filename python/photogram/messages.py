@@ -52,7 +52,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def unknown_name(kind: str | Phrase, name: str, names: Iterable[str]) -> Phrase:
-    """Return the message that there is no thing of a kind with a name: with the nearest name, or all names."""
+    """Return the message that there is no thing with a name: with the nearest name, or all names."""
     import difflib  # a wrong name is rare
 
     known = list(names)
