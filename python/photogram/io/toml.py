@@ -96,7 +96,7 @@ def quoted_text(text: str) -> str:
 class Sections(TomlFile):
     """A file of sections with keys; errors name file, line and text.
 
-    `said` are values that replace those of the file: `section.key=value`, texts with or without quotation marks.
+    `said` are values that replace those of the file: `section.key=value`, texts with or without quotes.
     """
 
     def __init__(self, path: Path, said: Sequence[str] = ()) -> None:
