@@ -78,52 +78,29 @@ class Link:
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """What is known of n things: one number or name of each, or k components.
+    """What is known of n things: one number or name of each, or k components."""
 
-    Attributes
-    ----------
-    values
-        (n,), or (n, k) with k axes; (n,), too, with the one axis of all of them.
-    axes
-        The components; also of what has one of them in each row, as `of` says.
-    kind
-        `value`: in the unit of its axis, angles as people write them; `deviation`, `difference`: in its small
-        unit; `number`: without a unit; `name`: text, or the number of a thing.
-    name
-        Of its columns in files and data frames, before the names of the axes; None: it is not there.
-    member
-        Its name in JSON documents, or names of parts of its components; empty: it is not there.
-    about
-        A line for Parquet; `{}` stands for the name of an axis.
-    head, decimals, figures
-        Of its columns on a page; `{}` stands for the name of an axis. Significant figures where decimals are
-        None, and nothing else tells them. Without a head it is not there.
-    words
-        What stands for single numbers: `fixed` for 0.
-    seen
-        Where people see a number, of the form of the values; None: everywhere.
-    marked
-        Which numbers are to be looked at, of the form of the values; None: no one more than others.
-    link
-        What a name leads to on a page.
-    of
-        (n,) which of the axes each row is of.
-    """
-
-    values: Any
-    axes: tuple[Axis, ...] = ()
+    values: Any  # (n,), or (n, k) with k axes; (n,) also with one common axis
+    axes: tuple[Axis, ...] = ()  # The components, also if each row is of one of them (`of`)
+    # `value`: in the unit of its axis, angles in degrees; `deviation`, `difference`: in the small unit;
+    # `number`: without a unit; `name`: text, or the number of a thing
     kind: Kind = "number"
+    # Prefix of columns in files and data frames; None: omitted there
     name: str | None = None
+    # Name in JSON, or names of parts of its components; empty: omitted there
     member: str | Mapping[str, slice] = ""
-    about: str = ""
+    about: str = ""  # Description in Parquet; `{}` is the name of an axis
+    # Columns of pages; `{}` is the name of an axis. `figures` significant figures if nothing fixes the
+    # decimals. A quantity without a head is omitted.
     head: str = ""
     decimals: int | None = None
     figures: int = 3
-    words: Mapping[float, str] | None = None
-    seen: Bools | None = None
+    words: Mapping[float, str] | None = None  # Texts for single numbers, such as `fixed` for 0
+    seen: Bools | None = None  # Which values are visible; None: all
+    # Which values are marked; None: none
     marked: Bools | None = None
-    link: Link | None = None
-    of: Indices | None = None
+    link: Link | None = None  # Target of a name on a page
+    of: Indices | None = None  # (n,) the axis of each row
 
     @property
     def single(self) -> bool:
