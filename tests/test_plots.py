@@ -17,7 +17,6 @@ from photogram.giant import read_project
 from photogram.plots import Plot
 from photogram.plots.accessor import PLOTS
 from photogram.plots.cells import cells
-from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Names
 
@@ -100,8 +99,6 @@ def test_plots_without_data_are_refused(galveston):
         galveston.plot.distortion()
     with pytest.raises(InputError, match="plane is one of XY, XZ, YZ"):
         galveston.plot.network(plane="up")
-    with pytest.raises(TypeError, match="no pictures of str"):
-        PLOTS["network"]("galveston")
     bare = adjust(galveston.block, covariance=False)
     assert set(bare.plot.available()) == {"network", "residuals"}
 
@@ -114,7 +111,7 @@ def test_the_network_shows_what_it_is_of(galveston):
     assert "2 rays (21)" in said
     assert "semi-axes of error ellipses, 95%" in said
     names = galveston.block.point_ids
-    in_plan = pictured(galveston).covariances(np.arange(len(names)))[:, :2, :2]
+    in_plan = galveston._plot_data().covariances(np.arange(len(names)))[:, :2, :2]
     sizes = np.sqrt(np.linalg.eigvalsh(in_plan)[:, 1])
     worst = int(np.nanargmax(sizes))
     assert f"{2.4477 * sizes[worst]:.3g} m, point {names[worst]}" in said

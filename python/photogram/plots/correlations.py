@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.picture_data import Correlated, pictured
+from photogram.plots.picture_data import Correlated
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Mesh, Shades, Texts
 from photogram.show.sketch.plot import Plot
@@ -23,7 +23,7 @@ def correlations(result: object) -> Plot:
     InputError
         No camera has two estimated parameters, or there are no covariances.
     """
-    cameras = pictured(result).correlations
+    cameras = result._plot_data().correlations
     if not cameras:
         raise InputError("there are no correlations to draw: no camera has two estimated parameters")
     shown = cameras[:MAX_CAMERAS]

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import Curve, Curves, pictured
+from photogram.plots.picture_data import Curve, Curves
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, band
 from photogram.show.sketch.plot import Plot
@@ -27,7 +27,7 @@ def distortion(result: object) -> Plot:
     InputError
         No camera has radial distortion.
     """
-    cameras = pictured(result).distortion[:MAX_CAMERAS]
+    cameras = result._plot_data().distortion[:MAX_CAMERAS]
     if not cameras:
         raise InputError("there is no distortion to draw: no camera has radial terms, or they are all zero")
     found = side_by_side(cameras)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.picture_data import Deviations, pictured
+from photogram.plots.picture_data import Deviations
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers
 from photogram.show.sketch.plot import Plot
@@ -23,7 +23,7 @@ def features(result: object) -> Plot:
     InputError
         No feature has deviations.
     """
-    every = pictured(result).deviations
+    every = result._plot_data().deviations
     if not every:
         raise InputError("there are no deviations to draw: no feature is fitted to more than two points")
     shown = every[:MAX_FEATURES]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from photogram.errors import InputError
-from photogram.plots.picture_data import VectorField, pictured
+from photogram.plots.picture_data import VectorField
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Names
@@ -25,7 +25,7 @@ def films(result: object) -> Plot:
     InputError
         No marks and no patterns.
     """
-    every = pictured(result).films
+    every = result._plot_data().films
     if not every:
         raise InputError("there are neither residuals of marks nor patterns of films to draw")
     shown = every[:MAX_FIELDS]

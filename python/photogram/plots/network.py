@@ -7,7 +7,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
-from photogram.plots.picture_data import Pictured, Plan, pictured
+from photogram.plots.picture_data import Pictured, Plan
 from photogram.show.pictures import round_length
 from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.declared import Panel, ScaleBar
@@ -52,7 +52,7 @@ def network(result: object, *, plane: str | None = None) -> Plot:
     InputError
         `plane` is another text.
     """
-    drawn = pictured(result)
+    drawn = result._plot_data()
     plan = drawn.plan
     seen = _plane(plan, plane)
     limits = _limits(plan, seen, drawn.footprints if seen[2] == 2 else None)

@@ -9,7 +9,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
 from photogram.plots.network import thinned, view_of_plan
-from photogram.plots.picture_data import Images, Pictured, pictured
+from photogram.plots.picture_data import Images, Pictured
 from photogram.plots.residuals import frame
 from photogram.show.sketch.declared import Panel
 from photogram.show.sketch.marks import Mark, Markers, Mesh, Shades
@@ -34,7 +34,7 @@ def redundancy(result: object) -> Plot:
     InputError
         The adjustment gave no redundancy numbers (`covariance=False`).
     """
-    drawn = pictured(result)
+    drawn = result._plot_data()
     images = drawn.images
     values = images.redundancy.mean(axis=1)
     if not np.isfinite(values).any():

@@ -7,7 +7,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.cells import Cells, cells
-from photogram.plots.picture_data import Images, pictured
+from photogram.plots.picture_data import Images
 from photogram.show.pictures import round_length
 from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import Arrows, Mark, Markers
@@ -29,7 +29,7 @@ def residuals(result: object) -> Plot:
 
     Means that errors by chance would hardly give (1 percent for all cells together) are coloured.
     """
-    images = pictured(result).images
+    images = result._plot_data().images
     cameras, left_out = largest_cameras(images)
     columns = min(3, len(cameras))
     rows = -(-len(cameras) // columns)

@@ -10,7 +10,6 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, band, bars
 from photogram.show.sketch.plot import Plot
@@ -40,7 +39,7 @@ def tests(result: object) -> Plot:
     InputError
         The adjustment gave no test values (`covariance=False`).
     """
-    drawn = pictured(result)
+    drawn = result._plot_data()
     groups = [_speaking(each) for each in drawn.tested]
     values = np.concatenate([each.values.ravel() for each in groups])
     values = values[np.isfinite(values)]
