@@ -67,8 +67,9 @@ def test_plots_are_drawn_on_axes(calibrated):
     calibrated.plot.residuals().on(axes[1, 0])
     calibrated.plot.tests().on(axes[2])
     assert [each.has_data() for each in axes.flat] == [True, False, True, False, True, True]
-    with pytest.raises(InputError, match="2 panels and needs as many axes, got 1"):
+    with pytest.raises(InputError) as error:
         calibrated.plot.redundancy().on(axes[1, 1])
+    assert error.value.code == "plot.axes"
     empty = Figure()
     calibrated.plot.redundancy().on(empty)
     assert len(empty.axes) == 3
@@ -93,10 +94,10 @@ def test_methods_have_the_arguments_and_docstrings_of_their_functions(galveston)
 
 
 def test_plots_without_data_are_refused(galveston):
-    with pytest.raises(InputError, match="no correlations to draw"):
-        galveston.plot.correlations()
-    with pytest.raises(InputError, match="no distortion to draw"):
-        galveston.plot.distortion()
+    for name in ("correlations", "distortion"):
+        with pytest.raises(InputError) as error:
+            getattr(galveston.plot, name)()
+        assert error.value.code == f"plot.{name}"
     with pytest.raises(InputError, match="plane is one of XY, XZ, YZ"):
         galveston.plot.network(plane="up")
     bare = adjust(galveston.block, covariance=False)

@@ -20,8 +20,9 @@ from photogram.network.tables import numbered
 from photogram.show.summary import Brief, Rows
 
 if TYPE_CHECKING:
-    from photogram import Diagnosis, Snooped
+    from photogram import Snooped
     from photogram.collection import AdjustedCollection
+    from photogram.diagnosis import Diagnosis
     from photogram.network.core_arrays import CoreOptions
     from photogram.results.grouping import Grouping, Observables
     from photogram.statistics.snooping.taking_out import Settings

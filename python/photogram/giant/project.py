@@ -22,7 +22,7 @@ from photogram.io.writing import write_whole
 from photogram.network.block import Block
 
 if TYPE_CHECKING:
-    from photogram import Diagnosis
+    from photogram.diagnosis import Diagnosis
 
 
 class Project(Contents):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.errors import InputError
@@ -11,13 +13,14 @@ from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import Arrows, Mark, Markers, Names
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import FAINT, INK
+from photogram.words import phrase
 
 MAX_FIELDS = 6
 MARGIN = 0.14  # Around the places, as a part of their extent
 LONGEST_VECTOR = 0.11  # As a part of the extent of the places
 
 
-def films(result: object) -> Plot:
+def films(result: Any) -> Plot:
     """Plot residuals of fiducial marks, mean over the photos of each camera, and patterns of films.
 
     Raises
@@ -27,7 +30,7 @@ def films(result: object) -> Plot:
     """
     every = result._plot_data().films
     if not every:
-        raise InputError("there are neither residuals of marks nor patterns of films to draw")
+        raise InputError(phrase("plot.films"))
     shown = every[:MAX_FIELDS]
     columns = min(2, len(shown))
     said = f"the first {MAX_FIELDS} of {len(every)} fields are drawn" if len(every) > MAX_FIELDS else ""

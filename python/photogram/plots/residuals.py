@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
@@ -24,7 +26,7 @@ LONGEST_VECTOR = 2.5  # Multiple of the typical vector; longer vectors are cut s
 LEVEL = 0.01  # Probability of a false alarm in any cell of a panel
 
 
-def residuals(result: object) -> Plot:
+def residuals(result: Any) -> Plot:
     """Plot image residuals over the frame of each camera: one by one, or means of cells if they are many.
 
     Means that errors by chance would hardly give (1 percent for all cells together) are coloured.

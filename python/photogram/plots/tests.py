@@ -16,6 +16,7 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.statistics.patterns import SPEAKING
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.statistics.findings import Observations
@@ -28,7 +29,7 @@ LEVEL = 0.05
 MAX_TEST_VALUE = 6.0  # The histogram counts test values beyond at its ends
 
 
-def tests(result: object) -> Plot:
+def tests(result: Any) -> Plot:
     """Plot test values w of all observations: their histogram, and their quantiles, against the normal.
 
     w = residual / (standard deviation x root of redundancy number) is standard normal where the given
@@ -44,7 +45,7 @@ def tests(result: object) -> Plot:
     values = np.concatenate([each.values.ravel() for each in groups])
     values = values[np.isfinite(values)]
     if len(values) < 2:
-        raise InputError("there are no test values: adjust with covariance=True, and with redundancy")
+        raise InputError(phrase("plot.tests"))
     weight = drawn.unit_weight
     return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(groups, drawn.outlying, weight)], 2)
 

@@ -22,18 +22,36 @@ __all__ = ["AdjustedCamera", "adjusted_cameras", "units"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdjustedCamera(Brief):
-    """A camera after the adjustment, with k parameters. Arrays cannot be written."""
+    """A camera after the adjustment, with k parameters. Arrays cannot be written.
 
-    name: str  # Name in the block
-    given: Camera  # Input camera: initial values, observed if weighted
-    camera: Camera  # The camera with adjusted parameters
-    cofactors: Floats  # (k, k) for a priori unit weight; zero if fixed, NaN without covariances
-    covariance: Floats  # (k, k) cofactors times the variance of unit weight
-    redundancy: Floats  # (k,) redundancy numbers of weighted parameters as observations; 0 unless weighted
-    # (k,) diagonal of the normal equations, weights counted: reciprocal cofactors that the parameters would
-    # have if all other unknowns were known; 0 if fixed
+    Attributes
+    ----------
+    name
+        What the block calls it.
+    given
+        The camera as it was given: initial values, observed where weighted.
+    camera
+        The same with the adjusted parameters.
+    cofactors
+        (k, k) for a priori unit weight; zero for held parameters, NaN without covariances.
+    covariance
+        (k, k) cofactors times the variance of unit weight.
+    redundancy
+        (k,) redundancy numbers of weighted parameters as observations; 0 unless weighted.
+    information
+        (k,) diagonal of the normal equations, weights counted: reciprocal cofactors that the parameters would
+        have if all other unknowns were known; 0 for held ones.
+    photos, images
+        How many photos have it, and how many images on these took part.
+    """
+
+    name: str
+    given: Camera
+    camera: Camera
+    cofactors: Floats
+    covariance: Floats
+    redundancy: Floats
     information: Floats
-    # Numbers of its photos and of their used image observations
     photos: int
     images: int
 

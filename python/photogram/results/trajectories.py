@@ -39,15 +39,23 @@ Joint = Callable[[list[str]], Floats]
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryPoses:
-    """Poses of a trajectory at n times. Arrays cannot be written."""
+    """Poses of a trajectory at n times. Arrays cannot be written.
 
-    times: Floats  # (n,) seconds
-    # (n, 3) projection centres in the object space (X, Y, Z; geocentric if it is geographic), and (n, 3,
-    # 3) matrices whose columns are the axes of the photo there
+    Attributes
+    ----------
+    times
+        (n,) seconds.
+    positions, attitudes
+        (n, 3) projection centres in the object space (X, Y, Z; geocentric where that is geographic), and
+        (n, 3, 3) matrices whose columns are the axes of the photo there.
+    covariances
+        (n, 6, 6) of the step of a pose: its position in the same axes, then the rotation rho about the
+        photo's own axes, A Exp(rho), in radians.
+    """
+
+    times: Floats
     positions: Floats
     attitudes: Floats
-    # (n, 6, 6) of the step of a pose: its position in the same axes, then the rotation rho about the photo's
-    # own axes, A Exp(rho), in radians
     covariances: Floats
 
     def __post_init__(self) -> None:
@@ -61,19 +69,30 @@ class TrajectoryPoses:
 
 @dataclass(frozen=True, eq=False)
 class AdjustedTrajectory:
-    """A trajectory after the adjustment. Arrays cannot be written."""
+    """A trajectory after the adjustment. Arrays cannot be written.
 
-    given: Trajectory  # Input trajectory
-    # (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians
+    Attributes
+    ----------
+    given
+        The trajectory as it was given.
+    position, rotation
+        (K, 3) adjusted coefficients c_k in the linear unit, and r_k in radians.
+    position_sd, rotation_sd
+        (K, 3) their standard deviations; 0 for known ones.
+    position_redundancy, rotation_redundancy
+        (K, 3) redundancy numbers of what was given of them; 0 unless weighted.
+    joint
+        Gives covariances of common unknowns, by their names, all with all.
+    """
+
+    given: Trajectory
     position: Floats
     rotation: Floats
-    # (K, 3) standard deviations; 0 if fixed
     position_sd: Floats
     rotation_sd: Floats
-    # (K, 3) redundancy numbers of weighted coefficients; 0 unless weighted
     position_redundancy: Floats
     rotation_redundancy: Floats
-    joint: Joint  # Joint covariances of common unknowns by name
+    joint: Joint
 
     def __post_init__(self) -> None:
         freeze_fields(self)

@@ -30,11 +30,18 @@ Said = list[tuple[str, str]]
 
 @dataclass(frozen=True)
 class RemovedObservation:
-    """An observation that did not take part in the adjustment."""
+    """An observation that did not take part in the adjustment.
 
-    subject: Phrase | str  # Its name as a message, such as `image of point C04 on photo 301`
-    # `snooping`: data snooping removed it. `first values`: it does not fit the initial values. `earlier`: it
-    # was removed before.
+    Attributes
+    ----------
+    subject
+        Its name as a message, such as `image of point C04 on photo 301`.
+    reason
+        `snooping`: data snooping removed it. `first values`: it does not fit the initial values. `earlier`:
+        it was removed before.
+    """
+
+    subject: Phrase | str
     reason: str
 
     @property
@@ -52,23 +59,41 @@ def removed_observations(result: Result, earlier: Sequence[Phrase | str]) -> tup
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Grounds:
-    """All that was found of an adjusted block and its check points, and what was asked of it."""
+    """All that was found of an adjusted block and its check points, and what was asked of it.
 
-    # Adjusted block, options, sentences
+    Attributes
+    ----------
+    result, asked, texts
+        The adjusted block, what was asked for, and its words.
+    compared
+        Check points with their joint covariance.
+    of_all, of_rest, of_vegetated
+        Figures of all check points, of those that are left without some, and of heights in vegetation; None
+        where there are none.
+    left_out
+        Control points as the others predict them.
+    taken_apart
+        Budgets of uncertainty.
+    standards
+        What standards say.
+    layout
+        How check points lie; None without any.
+    removed
+        Observations that did not take part in the adjustment.
+    """
+
     result: Result
     asked: Asked
     texts: Texts
-    compared: Compared  # Check points with their joint covariance
-    # Figures of all check points, of those without `asked.without`, of heights in vegetation; None without
-    # points
+    compared: Compared
     of_all: Figures | None
     of_rest: Figures | None
     of_vegetated: Figures | None
-    left_out: tuple[LeftOut, ...]  # Control points predicted by the others
-    taken_apart: tuple[Budget, ...]  # Budgets of uncertainty
-    standards: Standards  # Results of the standards
-    layout: Layout | None  # Distribution of check points; None without check points
-    removed: tuple[RemovedObservation, ...]  # Observations that did not take part in the adjustment
+    left_out: tuple[LeftOut, ...]
+    taken_apart: tuple[Budget, ...]
+    standards: Standards
+    layout: Layout | None
+    removed: tuple[RemovedObservation, ...]
 
 
 def assumptions(found: Grounds, assumed: Sequence[Phrase | str]) -> Said:
