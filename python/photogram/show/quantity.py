@@ -21,34 +21,21 @@ from photogram.show.angles import ARCSEC
 if TYPE_CHECKING:
     import pandas as pd
 
-Kind = Literal["value", "deviation", "difference", "number", "name"]
+Kind = Literal["value", "deviation", "difference", "number", "probability", "name"]
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A component of positions, attitudes, parameters or image coordinates.
-
-    Attributes
-    ----------
-    name
-        What it is called.
-    unit
-        Of its numbers; empty where it has none.
-    angle
-        How an angle is written for people: in degrees, minutes and seconds (`dms`), in degrees (`deg`), or as
-        it is.
-    suffix
-        What the names of its columns say of the unit.
-    small, factor
-        The unit in which people read its differences and deviations, and what leads to it.
-    """
+    """A component of positions, attitudes, parameters or image coordinates."""
 
     name: str
-    unit: str = ""
-    angle: Literal["", "dms", "deg"] = ""
-    suffix: str = ""
+    unit: str = ""  # Empty without a unit
+    angle: Literal["", "dms", "deg"] = ""  # Notation for people: degrees, minutes, seconds; degrees; radians
+    suffix: str = ""  # Unit in the names of columns
+    # Unit of differences and deviations for people, and its factor
     small: str = ""
     factor: float = 1.0
+    label: str = ""  # Name on pages if it differs from `name`
 
     @classmethod
     def of(cls, name: str, unit: str, suffix: str = "") -> Axis:

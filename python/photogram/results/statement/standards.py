@@ -88,29 +88,6 @@ class Lengths:
     test: LengthTest
     expansion: float | None
 
-    def member(self) -> dict[str, Any]:
-        """Return what the JSON document has."""
-        test, together = self.test, self.test.together
-        columns = {
-            "line": self.lines,
-            "from": [first for first, _ in self.ends],
-            "to": [last for _, last in self.ends],
-            "calibrated": self.calibrated,
-            "error": test.errors,
-            **members(test, "sd", "normalised"),
-            "limit": [None] * len(self.lines) if test.limits is None else test.limits,
-        }
-        return {
-            "lengths": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
-            **members(test, "largest", rmse="rms", met="met", lines="lines"),
-            "arrangement": test.enough and test.long_enough and test.along_diagonal,
-            "angle_to_diagonal": test.off_diagonal,
-            "at_reference_temperature": self.expansion is not None,
-            "T": together and together.weighted_sum_of_squares,
-            "rank": together and together.degrees_of_freedom,
-            "p_high": together and together.probability_above,
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class Standards:
