@@ -62,14 +62,8 @@ def test_every_kind_of_observation_has_a_word(result):
     assert not lacking("one", singles)
     assert GERMAN.kind("prior, lever arm") == "Vorwerte, Hebelarm"
     assert GERMAN.kind("images, 2, x") == "Bildpunkte, 2, x"
-    assert (
-        ENGLISH.kind("smoothness, 4 position coefficients")
-        == "smoothness, 4 position coefficients"
-    )
-    assert (
-        GERMAN.kind("smoothness, 4 position coefficients")
-        == "Glattheit, 4 Positionskoeffizienten"
-    )
+    assert ENGLISH.kind("smoothness, 4 position coefficients") == "smoothness, 4 position coefficients"
+    assert GERMAN.kind("smoothness, 4 position coefficients") == "Glattheit, 4 Positionskoeffizienten"
 
 
 def test_every_component_has_a_word_or_is_a_letter():

@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.show import quantity
-from photogram.show.lines import degrees_written, unit_of
+from photogram.show.angles import degrees_written
 from photogram.show.page import Cell, Column, Table, decimals_of, fixed, probability_written, significant
 from photogram.show.quantity import Axis, Quantities, Quantity, chosen, long
 
@@ -100,7 +100,7 @@ def _column(each: Quantity, head: str, unit: str, decimals: int | None) -> Colum
 def _unit(each: Quantity, axis: Axis) -> str:
     if each.kind == "value" and axis.angle == "dms":
         return "° ′ ″"
-    return unit_written(unit_of(each, axis))
+    return unit_written(each.unit(axis))
 
 
 def _decimals(each: Quantity, by: Floats) -> list[int | None]:

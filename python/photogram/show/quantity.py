@@ -1,7 +1,7 @@
 """Quantities: each declared once, as arrays with a name and a unit, and written everywhere from here.
 
 A table is a list of quantities of the same n things. `frame` makes files of commas and data frames of it,
-`records` JSON documents, `results.saved` Parquet, `show.lines` text, `show.cells` pages for the browser.
+`records` JSON documents, `results.saved` Parquet, `show.forms` text, `show.cells` pages for the browser.
 """
 
 from __future__ import annotations
@@ -93,6 +93,14 @@ class Quantity:
     def single(self) -> bool:
         """Whether each thing has one value."""
         return not self.axes or self.of is not None or np.ndim(self.values) == 1
+
+    def unit(self, axis: Axis) -> str:
+        """Return the unit of a component for people."""
+        if self.kind == "number":
+            return ""
+        if self.kind == "value":
+            return {"dms": "", "deg": "deg"}.get(axis.angle, axis.unit)
+        return axis.small
 
     def outward(self) -> Floats:
         """Return the numbers that people see, in the units in which they read them.
