@@ -8,7 +8,6 @@ import pytest
 
 import photogram
 from photogram import collection, formats
-from photogram.plots.picture_data import pictured
 from photogram.results import tested_observations as rows_of
 from photogram.words import Phrase
 
@@ -107,7 +106,7 @@ def test_simulated_errors_are_judged_once():
 
 
 def test_the_plot_of_tests_marks_outliers_only(result):
-    drawn = pictured(result)
+    drawn = result._plot_data()
     masks = [rows_of.outlying(result.verdict, each) for each in rows_of.tested_observations(result)]
     count = sum(
         int((own & np.isfinite(each.values)).sum()) for own, each in zip(masks, drawn.tested, strict=True)

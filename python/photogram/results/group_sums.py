@@ -21,7 +21,6 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.network.core_arrays import core_network
 from photogram.network.motion import on_shared
 from photogram.network.observations import moments
 from photogram.network.rays import local_axes
@@ -30,7 +29,7 @@ from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
-from photogram.show.methods import Documented, Way
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Section
 from photogram.show.quantity import Quantity, Table, of_each
 from photogram.show.summary import Brief
@@ -257,13 +256,17 @@ def _weighted_squares(residuals: Floats, sd: Floats) -> Floats:
     return np.where((sd > 0) & np.isfinite(sd), (residuals / sd) ** 2, np.nan)
 
 
-@Way
 def observables(network: object) -> Observables:
     """Return what a block, a collection or an adjusted one has observations of."""
-    raise InputError(f"no block or collection, nor the result of one: {shown(network)}")
+    given = network.given if isinstance(network, AdjustedNetwork) else network
+    if isinstance(given, Block):
+        return block_observables(given)
+    if not hasattr(given, "_observables"):
+        raise InputError(f"no block or collection, nor the result of one: {shown(network)}")
+    found: Observables = given._observables()
+    return found
 
 
-@observables.register
 def block_observables(block: Block) -> Observables:
     """Return what a block has observations of."""
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
@@ -298,14 +301,9 @@ def _strips(block: Block) -> list[Indices]:
     return [*(others[strip] for strip in found), *(np.array(rows, dtype=np.int64) for rows in flown.values())]
 
 
-@observables.register
-def _(result: AdjustedNetwork) -> Observables:
-    return observables(result.given)
-
-
 def factored(result: AdjustedNetwork) -> _photocore.BlockCovariances:
     """Return the factor of the normal equations of an adjusted network."""
-    return core_network(result.given, result.options).covariances(result.state, threads=0, progress=None)
+    return result._core_network().covariances(result.state, threads=0, progress=None)
 
 
 def group_sums(

@@ -28,7 +28,6 @@ from photogram.results.network_tables import (
     photos,
     points,
     stations,
-    terms_of,
 )
 from photogram.results.tested_observations import IMAGE_COORDINATES, outlying, tested_singly
 from photogram.results.weakest import weakest_photos, weakest_points
@@ -87,7 +86,7 @@ def network_document(
         " goes into the unknowns. Their sum is the number of observations beyond what is needed."
     )
     summary = result.reliability_summary
-    reliability = [] if summary is None else summary.parts(terms_of(result).linear_unit)
+    reliability = [] if summary is None else summary.parts(result._terms().linear_unit)
     tables = [table for table in weakest_tables(result, *weak) if len(table.columns[0].values)]
     return Document(
         what=what,
@@ -178,7 +177,7 @@ def size_section(
 
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     """Return what a reader wants first of every network, with its number of photos."""
-    used, (axis, _) = result.used_images, terms_of(result).image_axes
+    used, (axis, _) = result.used_images, result._terms().image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
     found = [
         _unit_weight(result),
@@ -206,7 +205,7 @@ def _unit_weight(result: AdjustedNetwork) -> Fact:
 
 def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     """Return how well images fit and are checked."""
-    used, (axis, _) = result.used_images, terms_of(result).image_axes
+    used, (axis, _) = result.used_images, result._terms().image_axes
     unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
     if not len(residuals):
         return []
@@ -245,7 +244,7 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
 
 def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
     """Return how the standard deviations of adjusted values are spread; none where none were computed."""
-    terms, rows = terms_of(result), list[tuple[Any, ...]]()
+    terms, rows = result._terms(), list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
         ("photos", terms.photo_axes, result.photo_sd),
@@ -346,7 +345,7 @@ def _worst_table(
     """Return the observations whose test values are the largest, of all kinds; none without test values."""
     if not worst:
         return []
-    terms, marks = terms_of(result), {each.kind: outlying(result.verdict, each) for each in every}
+    terms, marks = result._terms(), {each.kind: outlying(result.verdict, each) for each in every}
     numbers = dict(zip((each.kind for each in every), _numbers(result), strict=True))
     rows: list[tuple[Any, ...]] = []
     for _, tested, place in worst:
@@ -383,7 +382,7 @@ def _worst_table(
 
 def _numbers(result: AdjustedNetwork) -> list[tuple[Floats, Floats, Floats, tuple[Axis, ...]]]:
     """Return residuals, standard deviations, redundancy numbers and components of every kind."""
-    terms = terms_of(result)
+    terms = result._terms()
     return [
         (result.residuals, result.image_given_sd, result.redundancy, terms.image_axes),
         (result.point_residuals, result.point_given_sd, result.point_redundancy, terms.point_axes),

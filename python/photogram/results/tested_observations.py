@@ -8,7 +8,6 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import terms_of
 from photogram.results.observation_kinds import parts_of, tested_kind
 from photogram.statistics.findings import Observations, Tested, by_t, by_w
 from photogram.statistics.reliability import TESTABLE
@@ -21,7 +20,7 @@ IMAGE_COORDINATES = Phrase("test.image_coordinates")
 
 def tested_observations(result: AdjustedNetwork) -> list[Observations]:
     """Return all observations with their standardized residuals, where these say something, kind by kind."""
-    terms = terms_of(result)
+    terms = result._terms()
     photos, points = terms.photos, terms.points
 
     def image(index: tuple[int, ...]) -> Phrase:
