@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.methods import Way
-from photogram.statistics.findings import Observations
+from photogram.statistics.findings import Tested
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class Pictured(Protocol):
         """The image observations that took part."""
 
     @property
-    def tested(self) -> list[Observations]:
+    def tested(self) -> Sequence[Tested]:
         """All observations with their standardized residuals, by kind."""
 
     @property

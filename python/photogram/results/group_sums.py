@@ -29,7 +29,7 @@ from photogram.network.strips import strips_of
 from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
+from photogram.results.network_tables import terms_of
 from photogram.show.methods import Documented, Way
 from photogram.show.page import Document, Section
 from photogram.show.quantity import Quantity, Table, of_each
@@ -235,20 +235,17 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
         "points": np.where(np.isfinite(squares["points"]), result.point_redundancy, np.nan),
         "photos": np.where(np.isfinite(squares["photos"]), result.photo_redundancy, np.nan),
     }
-    if isinstance(result, Result):
-        count = len(result.block.observations)
-        of_observations, own = np.full(count, np.nan), np.full(count, np.nan)
-        for kind in result.kinds.values():
-            of_observations[kind.rows] = kind.squares
-            own[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
-        squares["observations"] = of_observations
-        redundancy["observations"] = np.where(np.isfinite(of_observations), own, np.nan)
+    kinds = [*terms_of(result).kinds]
+    size = sum(len(kind.rows) for kind in kinds)
+    of_observations, shares, components = np.full(size, np.nan), np.full(size, np.nan), np.ones(size)
+    for kind in kinds:
+        of_observations[kind.rows] = kind.squares
+        shares[kind.rows] = np.nansum(np.where(np.isfinite(kind.sd), kind.redundancy, 0.0), axis=1)
+        components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
+    squares["observations"] = of_observations
+    redundancy["observations"] = np.where(np.isfinite(of_observations), shares, np.nan)
     ones = {name: np.where(np.isfinite(values), 1.0, np.nan) for name, values in redundancy.items()}
-    if isinstance(result, Result):
-        components = np.ones(len(result.block.observations))
-        for kind in result.kinds.values():
-            components[kind.rows] = np.isfinite(kind.residuals).sum(axis=1)
-        ones["observations"] *= components
+    ones["observations"] *= components
     counts = np.round(grouping.summed(ones)).astype(np.int64)
     return counts, grouping.summed(squares), grouping.summed(redundancy)
 

@@ -31,15 +31,18 @@ from photogram.network.motion import focal_images
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import INTERIOR, rows_of_images
 from photogram.results.group_sums import factored
-from photogram.results.result import Result
+from photogram.results.network import AdjustedNetwork
 from photogram.results.scores import quadratic, score
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Remarks, Section
 from photogram.show.quantity import Table, of_each
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from photogram import Result
 
 __all__ = ["Comparison", "Model", "TermsTest", "compare", "groups_of_terms", "score_test", "terms_test"]
 
@@ -281,9 +284,8 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
     """
     if not isinstance(results, Mapping) or len(results) < 2:
         raise InputError("compare takes two results at least, by the names of their models")
-    for name, result in results.items():
-        if not isinstance(result, Result):
-            raise InputError(f"{shown(name)} is not the result of the adjustment of a block: {shown(result)}")
+    for result in results.values():
+        _require_block(result)
     names, all_results = list(results), list(results.values())
     first = all_results[0]
     for name, other in zip(names[1:], all_results[1:], strict=True):
@@ -368,12 +370,16 @@ def _corrected(camera: Camera, measured: Floats) -> Floats:
 
 
 def _camera(result: Result, name: str | None) -> AdjustedCamera:
-    if not isinstance(result, Result):
-        raise InputError(f"not the result of the adjustment of a block: {shown(result)}")
+    _require_block(result)
     for each in result.cameras:
         if each.name == name or (name is None and len(result.cameras) == 1):
             return each
     raise InputError(f"the block has no camera {shown(name)}" if name else "which camera? name it")
+
+
+def _require_block(result: object) -> None:
+    if not (isinstance(result, AdjustedNetwork) and hasattr(result, "block")):
+        raise InputError(phrase("result.not-a-block", value=shown(result)))
 
 
 def _rows(camera: AdjustedCamera, names: Sequence[str]) -> list[int]:

@@ -11,14 +11,12 @@ from photogram.arguments.arrays import freeze_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
-    from photogram.statistics.findings import Observations
 
-__all__ = ["ObservedKind", "observed_kinds", "tested_kind"]
+__all__ = ["ObservedKind", "observed_kinds"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,18 +135,6 @@ def _together(first: ObservedKind, second: ObservedKind) -> ObservedKind:
         units=first.units,
         **{name: joined(name) for name in numbers},
     )
-
-
-def tested_kind(kind: ObservedKind) -> Observations:
-    """Return the components of a kind with their standardized residuals, where these say something."""
-    from photogram.statistics.findings import Observations
-
-    def named(index: tuple[int, ...]) -> Phrase:
-        return parts_of([kind.components[index[1]]], named_observation(kind.kind, kind.names[index[0]]))
-
-    standardized = np.where(kind.redundancy > TESTABLE, kind.standardized, np.nan)
-    own = Phrase("test.components", {"kind": kind_words(kind.kind)})
-    return Observations(own, standardized, named)
 
 
 def named_observation(kind: str, of: str) -> Phrase:

@@ -17,7 +17,7 @@ from photogram.statistics.distributions import (
     critical_normal,
     critical_student,
 )
-from photogram.statistics.findings import Findings, Observations, Systematic, Tested, Text, by_f, by_t
+from photogram.statistics.findings import Findings, Systematic, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
@@ -210,7 +210,7 @@ class Evidence:
         test = self.test
         assert test is not None
         omega, f = test.weighted_sum_of_squares, test.degrees_of_freedom
-        studentized = [_studentized(each, omega, f) for each in self.found.observations]
+        studentized = [each.studentized(omega, f) for each in self.found.observations]
         return Evidence(replace(self.found, observations=studentized)).beyond()
 
     def _common(self, robust: float) -> float:
@@ -357,13 +357,6 @@ def _relative(tested: Tested) -> Floats:
     for each in np.unique(dimension).tolist():
         medians[dimension == each] = critical_chi_square(0.5, each)
     return np.asarray(np.sqrt(values / medians))
-
-
-def _studentized(tested: Tested, omega: float, f: float) -> Tested:
-    """Return tests with the unit weight that the others give."""
-    if tested.statistic == "w":
-        return by_t(Observations(tested.kind, tested.values, tested.name), omega, f)
-    return by_f(tested, omega, f) if tested.statistic == "T" else tested
 
 
 def _distribution(

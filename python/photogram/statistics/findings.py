@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,46 +23,22 @@ Text = str | Phrase
 """A message or a name: a code with fields, or a text of a user or of a program that has no code for it."""
 
 
-@dataclass(frozen=True)
-class Observations:
-    """Observations of one kind and their test values."""
-
-    kind: Text  # What they are, in the plural
-    values: Floats  # Test values in any shape, of either sign; NaN where nothing is tested
-    name: Callable[[tuple[int, ...]], Text]  # Names the observation at an index of `values`
-
-
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """Test values of one kind of observations.
+    """Tests of the observations of one type: of single components, or of groups that may err together."""
 
-    Attributes
-    ----------
-    kind
-        What they are, in the plural.
-    values
-        Test values in any shape, NaN where nothing is tested.
-    name
-        Names the observation at an index of `values`.
-    statistic
-        `w` (standard normal), `t` (Student with `second` degrees of freedom), `T` (chi-square with
-        `dimension`) or `F` (`dimension` and `second`).
-    dimension, second
-        Degrees of freedom.
-    held
-        Whether these are no observations but held values, which nothing takes out.
-    rows
-        (k,) row of each group among images, points, photos or observations; None if these are the indices.
-    """
-
-    kind: Text
-    values: Floats
-    name: Callable[[tuple[int, ...]], Text]
-    statistic: str
+    kind: Text  # What they are, in the plural
+    values: Floats  # Test values in any shape; NaN where nothing is tested
+    name: Callable[[tuple[int, ...]], Text]  # Names the observation at an index of `values`
+    # `w` (standard normal), `t` (Student with `second` degrees of freedom), `T` (chi-square with `dimension`)
+    # or `F` (`dimension` and `second`)
+    statistic: str = "w"
     dimension: ArrayLike = 1.0
     second: ArrayLike = math.inf
-    held: bool = False
-    rows: Indices | None = None
+    held: bool = False  # Whether these are fixed values, which cannot be removed
+    rows: Indices | None = (
+        None  # (k,) rows of groups among images, points, ...; None if these are the indices
+    )
 
     def at(self, place: tuple[int, ...]) -> Tested:
         """Return the test of one observation."""
@@ -125,26 +101,20 @@ class Tested:
             return log_chi_square(squares / factor**2, self.dimension)
         return log_fisher(squares, self.dimension, self.second)
 
-
-def by_w(observations: Observations) -> Tested:
-    """Return observations tested with a known unit weight; their values are Baarda's w."""
-    return Tested(observations.kind, observations.values, observations.name, "w")
-
-
-def by_t(observations: Observations, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Tested:
-    """Return observations tested with the unit weight that the others give; their values are w."""
-    t = externally_studentized(observations.values, weighted_sum_of_squares, degrees_of_freedom)
-    return Tested(observations.kind, t, observations.name, "t", second=max(degrees_of_freedom - 1, 1))
-
-
-def by_f(tested: Tested, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Tested:
-    """Return groups tested by T with the unit weight that the others give: F."""
-    dimension = np.asarray(tested.dimension, dtype=np.float64)
-    others = degrees_of_freedom - dimension
-    with np.errstate(divide="ignore", invalid="ignore"):
-        left = np.maximum(weighted_sum_of_squares - tested.values, 1e-12 * weighted_sum_of_squares) / others
-        values = np.where(others > 0, tested.values / dimension / left, math.nan)
-    return replace(tested, values=values, statistic="F", second=np.where(others > 0, others, math.nan))
+    def studentized(self, weighted_sum_of_squares: float, degrees_of_freedom: float) -> Self:
+        """Return the tests with the unit weight of the other observations: t for w, F for T."""
+        omega, f = weighted_sum_of_squares, degrees_of_freedom
+        if self.statistic == "w":
+            t = externally_studentized(self.values, omega, f)
+            return replace(self, values=t, statistic="t", second=max(f - 1, 1))
+        if self.statistic != "T":
+            return self
+        dimension = np.asarray(self.dimension, dtype=np.float64)
+        others = f - dimension
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.maximum(omega - self.values, 1e-12 * omega) / others
+            values = np.where(others > 0, self.values / dimension / left, math.nan)
+        return replace(self, values=values, statistic="F", second=np.where(others > 0, others, math.nan))
 
 
 @dataclass(frozen=True, eq=False)
