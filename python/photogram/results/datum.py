@@ -34,33 +34,20 @@ NOTABLE_LOSS = 1e-9
 
 @dataclass(frozen=True)
 class ResultDatum:
-    """What coordinates and standard deviations refer to.
+    """What coordinates and standard deviations refer to."""
 
-    Attributes
-    ----------
-    kind
-        `observations` (control, weights and observations give it), `minimal control` (control and weights are
-        just what a datum takes, and check nothing), `minimum constraints`, `inner constraints` or `relative`.
-    held
-        Photos, or coefficients of trajectories, with the names of their unknowns that are held; of other
-        kinds than minimum constraints those from which the network was taken to its datum.
-    points, photos
-        What carries inner constraints, or what cofactors are relative to.
-    attitudes
-        Photos whose attitudes carry inner constraints.
-    scale
-        Whether inner constraints take the scale from them, too: nothing else gives one.
-    lost
-        About how large a part of the variances rounding may be.
-    """
-
+    # `observations` (control, weights and observations give it), `minimal control` (control and weights are
+    # just what a datum takes, and check nothing), `minimum constraints`, `inner constraints` or `relative`
     kind: str
+    # Photos, or coefficients of trajectories, with the names of their unknowns that are held; of other kinds
+    # than minimum constraints those from which the network was taken to its datum
     held: tuple[tuple[str, str], ...] = ()
+    # points, photos: What carries inner constraints, or what cofactors are relative to
     points: tuple[str, ...] = ()
     photos: tuple[str, ...] = ()
-    scale: bool = False
-    lost: float = 0.0
-    attitudes: tuple[str, ...] = ()
+    scale: bool = False  # Whether inner constraints take the scale from them, too: nothing else gives one
+    lost: float = 0.0  # About how large a part of the variances rounding may be
+    attitudes: tuple[str, ...] = ()  # Photos whose attitudes carry inner constraints
     row: DatumRow | None = field(default=None, repr=False)
     """As the core knows it."""
 
@@ -123,17 +110,7 @@ def datum_of(
     *,
     held: Sequence[tuple[int, int]] | None = None,
 ) -> ResultDatum:
-    """Return the datum of what the core found: that of inner constraints or, without, what it held.
-
-    Parameters
-    ----------
-    block, solution
-        The block, and what the core found.
-    row
-        Inner constraints, or what cofactors are relative to.
-    held
-        What is held of the block that this one is a part of; None: what the core has held.
-    """
+    """Return the datum of what the core found: that of inner constraints or, without, what it held."""
     names = photo_components(block)
     own = tuple((block.photo_ids[photo], names[unknown]) for photo, unknown in sorted(solution.datum))
     own += _held_coefficients(block, solution)
@@ -230,26 +207,14 @@ def _levelled(block: Block, held: int) -> str:
 
 
 def inner_datum(datum: object) -> InnerConstraints:
-    """Return inner constraints; refuse anything else.
-
-    Raises
-    ------
-    InputError
-        Anything else.
-    """
+    """Return inner constraints; refuse anything else."""
     if not isinstance(datum, InnerConstraints):
         raise InputError(f"the datum is no InnerConstraints but of the type {type(datum).__name__}")
     return datum
 
 
 def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None) -> DatumRow:
-    """Return what cofactors are to be relative to, as the core knows it.
-
-    Raises
-    ------
-    InputError
-        Neither or both, or names that are not in the block.
-    """
+    """Return what cofactors are to be relative to, as the core knows it."""
     if (photo is None) == (points is None):
         raise InputError("relative to what: a photo, or points?")
     if photo is not None:

@@ -189,13 +189,7 @@ def directions(kind: str) -> tuple[str, ...]:
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return points by names and patterns, each once, in the order in which they are asked for.
-
-    Raises
-    ------
-    InputError
-        A name that is not there, or a pattern that none has.
-    """
+    """Return points by names and patterns, each once, in the order in which they are asked for."""
     known, found = set(names), {}
     for each in wanted:
         if each in known:

@@ -63,22 +63,14 @@ TOGETHER = 32
 
 @dataclass(frozen=True)
 class Probing:
-    """How sums over R are found.
+    """How sums over R are found."""
 
-    Attributes
-    ----------
-    exact
-        Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
-        network of 1,000 observations.
-    vectors
-        Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that.
-    seed
-        Of the signs; the same seed gives the same bits.
-    """
-
+    # Groups of so many observations at the most are taken column by column; None: 64, and all groups of a
+    # network of 1,000 observations
     exact: int | None = None
+    # Vectors of random signs for larger groups: 16 give a sum to about 15 percent, 64 to half of that
     vectors: int = 32
-    seed: int = 1
+    seed: int = 1  # of the signs; equal seeds give equal bits
 
     def options(self, observations: int) -> dict[str, Any]:
         """Return what the core takes, for a network of so many observations."""
@@ -88,25 +80,16 @@ class Probing:
 
 @dataclass(frozen=True)
 class GroupSum:
-    """A group of observations after the adjustment.
-
-    Attributes
-    ----------
-    name
-        The group.
-    count, squares, redundancy
-        Observations, their weighted sum of squares q, the sum r of their redundancy numbers.
-    spread
-        s: q has the variance 2 s where the standard deviations are right.
-    test
-        Of q / c with its degrees of freedom (Satterthwaite); None with a redundancy below 0.5.
-    """
+    """A group of observations after the adjustment."""
 
     name: str
+    # count, squares, redundancy: Observations, their weighted sum of squares q, the sum r of their redundancy
+    # numbers
     count: int
     squares: float
     redundancy: float
-    spread: float
+    spread: float  # s: the variance of q is 2 s if the standard deviations are right
+    # Of q / c with its degrees of freedom (Satterthwaite); None with a redundancy below 0.5
     test: GlobalTest | None
 
     @property
@@ -191,13 +174,7 @@ class GroupSums(Documented, Brief):
 
 
 class Left:
-    """What an adjustment leaves of groups of its observations, and of all others as one more group.
-
-    Attributes
-    ----------
-    counts, squares, redundancy
-        (G + 1,) observations, weighted sums of squares, sums of redundancy numbers.
-    """
+    """What an adjustment leaves of groups of its observations, and of all others as one more group."""
 
     def __init__(self, result: AdjustedNetwork, grouping: Grouping, probing: Probing) -> None:
         self.result, self.grouping, self._probing = result, grouping, probing

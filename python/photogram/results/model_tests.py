@@ -60,28 +60,17 @@ SEEN = 2000
 
 @dataclass(frozen=True)
 class TermsTest:
-    """A test of terms of a camera, all together.
+    """A test of terms of a camera, all together."""
 
-    Attributes
-    ----------
-    camera, names
-        The camera and its parameters.
-    statistic
-        T: by how much the weighted sum of squares rises without them, or falls with them.
-    dimension, freedom
-        k, and the degrees of freedom of the unit variance with the terms; infinite where that is known.
-    probability
-        Of a value as large where the terms are what they are held to.
-    effect
-        How far they move an image at the most, in standard deviations of it; NaN for terms that are held.
-    """
-
-    camera: str
+    camera: str  # camera and its parameters
     names: tuple[str, ...]
-    statistic: float
+    statistic: float  # T: by how much the weighted sum of squares rises without them, or falls with them
+    # dimension, freedom: k, and the degrees of freedom of the unit variance with the terms; infinite where
+    # that is known
     dimension: int
     freedom: float
-    probability: float
+    probability: float  # Of a value as large where the terms are what they are held to
+    # How far they move an image at the most, in standard deviations of it; NaN for terms that are held
     effect: float
 
     @property

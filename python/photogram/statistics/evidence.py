@@ -45,44 +45,22 @@ Beyond = tuple[float, Tested, tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Test:
-    """One test.
+    """One test."""
 
-    Attributes
-    ----------
-    kind, subject
-        What is tested, and the one of its kind; the latter empty if it is one thing.
-    statistic
-        What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals.
-    distribution, dof
-        `chi2`, `F`, `normal`, `t` or another, and its degrees of freedom.
-    value
-        Of the statistic.
-    limits
-        What it may be at least and at most; None where there is no such side.
-    p
-        Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers.
-    log10_p
-        Its decimal logarithm.
-    level
-        What p is compared with.
-    tests
-        Among so many tests: the level is a share of that of all together (Bonferroni).
-    accepted
-        Whether p is no less than the level.
-    """
-
-    kind: Text
+    kind: Text  # type of the tested observations
     subject: Text
-    statistic: str
-    distribution: str
+    statistic: str  # What it is called: `s^2`, `w`, `t`, `T`, `F`, or of a pattern of residuals
+    distribution: str  # `chi2`, `F`, `normal`, `t`, ...
     dof: tuple[float, ...]
     value: float
+    # What it may be at least and at most; None where there is no such side
     limits: tuple[float | None, float | None]
+    # Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers
     p: float
-    log10_p: float
-    level: float
-    tests: int
-    accepted: bool
+    log10_p: float  # Its decimal logarithm
+    level: float  # What p is compared with
+    tests: int  # Among so many tests: the level is a share of that of all together (Bonferroni)
+    accepted: bool  # Whether p is no less than the level
 
     @property
     def name(self) -> str:

@@ -119,23 +119,13 @@ class Tested:
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """How n points with known values agree with an adjustment that they took no part in.
+    """How n points with known values agree with an adjustment that they took no part in."""
 
-    Attributes
-    ----------
-    points
-        The test of each point by itself, T_i = d_i' C_ii^-1 d_i.
-    together
-        The test of all with their cross covariances; None without these, or without points.
-    sd
-        (n, k) standard deviations of the differences: roots of C_ii.
-    apart
-        Fields of how far the point at a place is off, given its (k,) standard deviations.
-    """
-
-    points: Tested
+    points: Tested  # The test of each point by itself, T_i = d_i' C_ii^-1 d_i
+    # The test of all with their cross covariances; None without these, or without points
     together: GlobalTest | None
-    sd: Floats
+    sd: Floats  # (n, k) standard deviations of the differences: roots of C_ii
+    # Fields of how far the point at a place is off, given its (k,) standard deviations
     apart: Callable[[tuple[int, ...], Floats], Mapping[str, Any]]
 
     def difference(self, place: tuple[int, ...]) -> Phrase:
@@ -146,33 +136,19 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Systematic:
-    """A test of the pattern of residuals.
+    """A test of the pattern of residuals."""
 
-    Attributes
-    ----------
-    kind, subject
-        What is tested, and of what; the latter empty if it is one thing.
-    sentence
-        What the test says: what, how large, what it would do.
-    statistic, distribution, dof, value
-        Of the test.
-    probability, level
-        Its p-value and the level it is compared with.
-    large
-        Whether the pattern is large enough to matter: with a small probability the model is likely wrong.
-    fall
-        By how much the weighted sum of squares would fall without it, where that was asked for.
-    """
-
-    kind: Text
-    sentence: Text
+    kind: Text  # what is tested
+    sentence: Text  # result of the test: what, how large, effect
     statistic: str
     distribution: str
     dof: tuple[float, ...]
     value: float
-    probability: float
+    probability: float  # p-value
     level: float
+    # Whether the pattern is large enough to matter: with a small probability the model is likely wrong
     large: bool
+    # By how much the weighted sum of squares would fall without it, where that was asked for
     fall: float = 0.0
     subject: Text = ""
 
@@ -186,7 +162,7 @@ class Systematic:
 class GroupFactor:
     """The estimated variance component of a group of observations."""
 
-    group: Text  # Its name
+    group: Text
     factor: float  # By which its standard deviations are too small: the root of the component
     interval: tuple[float, float]  # 95 percent, of the factor
     significant: bool  # Whether it differs from 1, and by enough to change weights
@@ -194,28 +170,15 @@ class GroupFactor:
 
 @dataclass(frozen=True)
 class Removed:
-    """What data snooping has taken out.
+    """What data snooping has taken out."""
 
-    Attributes
-    ----------
-    removed
-        Each that was taken out and did not return, in order: name, and what else the log says of it.
-    images, control
-        Shares of the images and of the control that were taken out.
-    rivals
-        What cannot be told apart from them.
-    exchanged
-        Names that are exchanged among them.
-    kept
-        Suspects that were not taken out, with the reason.
-    """
-
+    # Removed observations in order: name and other members of the log
     removed: Sequence[Mapping[str, Any]]
-    images: float = 0.0
+    images: float = 0.0  # shares of removed images and control
     control: float = 0.0
-    rivals: Sequence[Text] = ()
-    exchanged: Sequence[Text] = ()
-    kept: Sequence[Text] = ()
+    rivals: Sequence[Text] = ()  # observations that cannot be distinguished from these
+    exchanged: Sequence[Text] = ()  # exchanged names among them
+    kept: Sequence[Text] = ()  # suspects that were not removed, with the reason
 
 
 @dataclass(frozen=True, kw_only=True)

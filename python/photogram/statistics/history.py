@@ -42,71 +42,36 @@ MOST = 3
 
 @dataclass(frozen=True)
 class Change:
-    """An accepted hypothesis on one quantity.
+    """An accepted hypothesis on one quantity."""
 
-    Attributes
-    ----------
-    kind
-        `drift`, `step`, `single`, or the name of a regressor.
-    size, sd
-        In the unit of the quantity: a unit of time, after less before, off, a unit of the regressor.
-    statistic, log10_p
-        t, and the decimal logarithm of its probability.
-    at
-        The first occasion after a step, or the single one; None of others.
-    sentence
-        What it says.
-    """
-
-    kind: str
+    kind: str  # `drift`, `step`, `single`, or the name of a regressor
+    # size, sd: In the unit of the quantity: a unit of time, after less before, off, a unit of the regressor
     size: float
     sd: float
-    statistic: float
+    statistic: float  # t
     log10_p: float
-    at: int | None
+    at: int | None  # The first occasion after a step, or the single one; None of others
     sentence: str
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One quantity on all occasions.
-
-    Attributes
-    ----------
-    name, unit
-        Of the quantity.
-    values, sd
-        (k,) as given.
-    mean, mean_sd
-        Weighted mean over all occasions.
-    model
-        (k,) what the accepted changes make of the mean.
-    off, off_sd
-        (k,) each value less the mean of the others, for a control chart.
-    drift, drift_sd
-        A unit of time, where nothing else changes; NaN where times are equal.
-    steps
-        (k - 1,) t of a step before occasions 2 ... k; NaN where there is none.
-    test
-        Chi-square of the residuals about the mean.
-    changes
-        What was accepted.
-    """
+    """One quantity on all occasions."""
 
     name: str
     unit: str
-    values: Floats
+    values: Floats  # (k,) as given
     sd: Floats
-    mean: float
+    mean: float  # weighted mean over all occasions
     mean_sd: float
-    model: Floats
-    off: Floats
+    model: Floats  # (k,) what the accepted changes make of the mean
+    off: Floats  # (k,) value minus mean of the others, for a control chart
     off_sd: Floats
-    drift: float
+    drift: float  # per unit of time; NaN if all times are equal
     drift_sd: float
-    steps: Floats
-    test: GlobalTest | None
-    changes: tuple[Change, ...]
+    steps: Floats  # (k - 1,) t of a step before occasions 2 ... k; NaN where there is none
+    test: GlobalTest | None  # Chi-square of the residuals about the mean
+    changes: tuple[Change, ...]  # accepted changes, the most certain first
 
 
 @dataclass(frozen=True, eq=False)
