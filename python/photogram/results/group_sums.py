@@ -16,7 +16,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -37,6 +37,7 @@ from photogram.show.summary import Brief
 from photogram.statistics.components import balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -234,7 +235,7 @@ def _weighted_squares(residuals: Floats, sd: Floats) -> Floats:
 @Way
 def observables(network: object) -> Observables:
     """Return what a block, a collection or an adjusted one has observations of."""
-    raise InputError(f"no block or collection, nor the result of one: {shown(network)}")
+    raise argument_error("network", "kind", kind=phrase("groups.network"), value=value_field(network))
 
 
 @observables.register
@@ -309,9 +310,9 @@ def group_sums(
         No adjusted network, none with covariances, groups that there are not.
     """
     if not isinstance(result, AdjustedNetwork):
-        raise InputError(f"not the result of an adjustment: {shown(result)}")
+        raise argument_error("result", "kind", kind=phrase("groups.result"), value=value_field(result))
     if not np.isfinite(result.redundancy[result.used_images]).all():
-        raise InputError("the result has no redundancy numbers: adjust with covariance=True")
+        raise InputError(phrase("groups.no-redundancy"))
     grouping = grouped(observables(result), groups)
     counts, squares, redundancy = sums_of(result, grouping)
     spread = np.clip(_spread(result, grouping, counts, probing or Probing()), 0.0, redundancy)

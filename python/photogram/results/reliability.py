@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.arrays import number, one_of
+from photogram.arguments.arrays import number, one_of, probability
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.covariance import Covariances
 from photogram.results.network_trial import NetworkTrial
@@ -378,8 +377,7 @@ def reliability_of(
     """Return the reliability of a network that is adjusted, with checked options."""
     one_of("unit_weight", unit_weight, ("known", "unknown"))
     for name, value in (("level", level), ("power", power)):
-        if not 0 < number(name, value) < 1:
-            raise InputError(f"{name} is a probability between 0 and 1, not {value:g}")
+        probability(name, number(name, value))
     known = unit_weight == "known"
     return Reliability(trial, covariances, level=level, power=power, known=known)
 

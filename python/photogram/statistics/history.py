@@ -25,6 +25,7 @@ from datetime import date
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -32,7 +33,7 @@ from photogram.statistics.distributions import LEVEL, bonferroni, critical_stude
 from photogram.statistics.findings import Systematic
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
 
 YEAR = 365.2425
 """Days."""
@@ -216,19 +217,19 @@ def history(
     """
     x = np.asarray(values, dtype=np.float64)
     if x.ndim != 2 or len(x) < 2 or not np.isfinite(x).all():
-        raise InputError("values must be finite numbers (k, m) of two occasions at least")
+        raise InputError(phrase("history.values"))
     k, m = x.shape
     c = _together(np.asarray(covariance, dtype=np.float64), k, m)
     t = np.arange(float(k)) if times is None else np.asarray(times, dtype=np.float64)
     if t.shape != (k,) or not (np.diff(t) >= 0).all():
-        raise InputError("times must be k numbers that do not fall")
+        raise InputError(phrase("history.times", count=k))
     named = tuple(occasions) or tuple(f"occasion {i + 1}" for i in range(k))
     hypotheses = _hypotheses(t, named, unit_of_time, regressors or {})
     tests = m * len(hypotheses.kinds)
     quantities = names or [f"value {j + 1}" for j in range(m)]
     of_units = units or [""] * m
     if (len(named), len(quantities), len(of_units)) != (k, m, m):
-        raise InputError(f"there are {k} occasions of {m} quantities: names or units are not as many")
+        raise InputError(phrase("history.names", occasions=k, quantities=m))
     series = tuple(
         _series(
             x[:, j], c[:, j, :, j], hypotheses, quantities[j], of_units[j], freedom, bonferroni(level, tests)
@@ -250,7 +251,7 @@ def _together(covariance: Floats, k: int, m: int) -> Floats:
         whole = np.zeros((k, m, k, m))
         whole[np.arange(k), :, np.arange(k), :] = covariance
     if whole.shape != (k, m, k, m) or not np.isfinite(whole).all():
-        raise InputError(f"covariance must be finite numbers ({k}, {m}, {m}) or ({k}, {m}, {k}, {m})")
+        raise InputError(phrase("history.covariance", k=k, m=m))
     return whole
 
 
@@ -271,11 +272,11 @@ def _hypotheses(
     for name, (given, of_what) in regressors.items():
         u = np.asarray(given, dtype=np.float64)
         if u.shape != (k,) or not np.isfinite(u).all():
-            raise InputError(f"{name} must be {k} finite numbers")
+            raise argument_error(name, "numbers", count=k, value=value_field(given))
         if k > 2 and np.ptp(u) > 0:
             found.append((u - u.mean(), (name, None), f"changes with the {name} by {{}} a {of_what}"))
     if not found:
-        raise InputError("all occasions are at one time: nothing can have changed")
+        raise InputError(phrase("history.one-time"))
     return _Hypotheses(
         np.column_stack([column for column, _, _ in found]),
         tuple(kind for _, kind, _ in found),
