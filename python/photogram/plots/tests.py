@@ -139,7 +139,6 @@ def _rows(n: int) -> Any:
 
 
 def _worst(groups: list[Observations], outlying: list[Bools]) -> list[tuple[float, str]]:
-    """Return the values of outliers and their names, the largest first."""
     found = []
     for each, own in zip(groups, outlying, strict=True):
         sizes = np.where(own, np.nan_to_num(np.abs(each.values)), 0.0)

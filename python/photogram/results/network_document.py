@@ -47,8 +47,7 @@ ORDERINGS = {
     "graph-dissection": "by dissection of the graph",
     "parts": "in parts, and the separators between them",
 }
-NOTABLE = 3.0
-"""Test values above are counted; the limit of the tests, which decides, is in the verdict."""
+NOTABLE = 3.0  # Larger test values are counted
 _NOT_CHECKED = 0.01
 
 
@@ -176,7 +175,6 @@ def size_section(
 
 
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
-    """Return what a reader wants first of every network, with its number of photos."""
     used, (axis, _) = result.used_images, result._terms().image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
     found = [
@@ -192,7 +190,6 @@ def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
 
 
 def _unit_weight(result: AdjustedNetwork) -> Fact:
-    """Return the standard deviation of unit weight with what it may be, where that was tested."""
     variance, name = result.variance_of_unit_weight, "Standard deviation of unit weight"
     if variance is None:
         return Fact(name, "–", note="no degrees of freedom: covariances are scaled by 1")
@@ -204,7 +201,6 @@ def _unit_weight(result: AdjustedNetwork) -> Fact:
 
 
 def _images_facts(result: AdjustedNetwork) -> list[Fact]:
-    """Return how well images fit and are checked."""
     used, (axis, _) = result.used_images, result._terms().image_axes
     unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
     if not len(residuals):
@@ -269,7 +265,6 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
 
 
 def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
-    """Return all tests, and the picture of single ones."""
     table = verdict_table(result.verdict)
     parts: list[Part] = [drawing, *([table] if table.rows else [])]
     intro = "How the residuals agree with the standard deviations that were given, as a whole and one by one."
@@ -277,7 +272,6 @@ def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
 
 
 def _iterations_section(result: AdjustedNetwork) -> Section:
-    """Return the history."""
     note = "Damping is 0 for a step of Gauss-Newton. The sum is that after the corrections of the iteration."
     table = quantity.Table("iterations", "Iterations", iterations(result), note)
     course = [Fact("Status", result.status)]
@@ -304,10 +298,8 @@ def _work(result: AdjustedNetwork) -> list[Fact]:
     ]
 
 
-WORST = 25
-"""Observations in the table of the worst."""
-Worst = tuple[float, Tested, tuple[int, ...]]
-"""The size of a test value, its kind, and its place there."""
+WORST = 25  # Observations in the table
+Worst = tuple[float, Tested, tuple[int, ...]]  # Size of a test value, kind, index
 
 
 def _worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
@@ -327,7 +319,6 @@ def _worst_of(groups: Sequence[Tested], count: int = WORST) -> list[Worst]:
 
 
 def _worst_images(result: AdjustedNetwork, worst: Sequence[Worst]) -> tuple[list[int], list[int]]:
-    """Return photos and points of the images among the worst observations."""
     own = [place[0] for _, tested, place in worst if tested.kind == IMAGE_COORDINATES]
     return result.given.image_photos[own].tolist(), result.image_points[own].tolist()
 
@@ -439,7 +430,6 @@ CAPTIONS = {
         " the certificate, or a pattern that was left out. Patterns as the adjustment has them.",
     ),
 }
-"""Title and caption by name."""
 
 
 def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:

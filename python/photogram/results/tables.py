@@ -46,7 +46,6 @@ _FEATURES: dict[str, tuple[Literal["name", "value", "number"], str]] = {
     "expanded": ("value", "expanded uncertainty, k times the standard deviation"),
     "deviation": ("value", "distance of the point from the feature"),
 }
-"""What the columns of features have."""
 
 
 def check_points(result: Result) -> list[Quantity]:
@@ -224,7 +223,6 @@ def _each(every: Sequence[Any], what: str) -> Any:
 
 
 def _quantities(columns: Mapping[str, Any]) -> list[Quantity]:
-    """Return named columns of features as quantities."""
     return [
         Quantity(values, kind=kind, name=name, about=about)
         for name, values in columns.items()
@@ -241,4 +239,3 @@ TABLES: dict[str, Callable[[Result], list[Quantity]]] = {
     "feature": lambda result: _quantities((result.features or Features(())).columns()),
     "deviation": lambda result: _quantities((result.features or Features(())).deviation_columns()),
 }
-"""The tables by the kind of things that have their rows."""

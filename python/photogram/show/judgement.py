@@ -16,7 +16,6 @@ MARKS: dict[Tone, str] = {
     "": "Not tested as a whole",
     "bad": "Not to be used as it is",
 }
-"""What stands above a verdict: colours alone say nothing."""
 
 
 def judged(verdict: Verdict, on: str = "") -> Judgement:

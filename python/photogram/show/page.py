@@ -27,10 +27,8 @@ T = TypeVar("T")
 Tone = Literal["", "good", "look", "bad"]
 """How a thing is to be taken: no colour stands without words that say the same."""
 
-MOST_DECIMALS = 12
-"""Of a fixed-point column."""
-LEAST_PROBABILITY = 1e-99
-"""Smaller probabilities are not told apart."""
+MOST_DECIMALS = 12  # Of a fixed-point column
+LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 
 @dataclass(frozen=True)
@@ -44,8 +42,7 @@ class Cell:
     sorts: float | None = None  # Sort key of a text
 
 
-Row = Sequence[Cell | str | float | None]
-"""Cells of a table."""
+Row = Sequence[Cell | str | float | None]  # Cells of a table
 
 
 @dataclass(frozen=True)

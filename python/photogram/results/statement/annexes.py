@@ -63,7 +63,6 @@ def annexes(found: Statement) -> list[Section]:
 
 
 def _radii(texts: Texts, own: Figures) -> Table:
-    """Return radii of probability: of the sample, from moments, and predicted."""
     columns, decimals = Columns(texts), decimals_for(own.points.sd_adjusted)
     radii = {name: radius for name, radius in own.radii.items() if radius is not None}
     number = partial(columns.number, decimals=decimals, unit=texts.unit)
@@ -182,7 +181,6 @@ def _adjustment(found: Statement) -> list[Part]:
 
 
 def _tests(found: Statement) -> Table:
-    """Return all tests of the verdict on the adjustment."""
     texts, columns, tests = found.texts, Columns(found.texts), found.result.verdict.tests
     named = [f"{texts.text(test.kind, '^')}: {texts.text(test.subject)}".removesuffix(": ") for test in tests]
     outcomes = [texts("test.passes" if test.accepted else "test.rejects") for test in tests]
@@ -223,7 +221,6 @@ def _markers(found: Statement) -> Table:
 
 
 def _survey(found: Statement) -> list[Table]:
-    """Return control and check points as they were given."""
     texts, columns, own = found.texts, Columns(found.texts), found.survey
     if own.system is None:
         return []
@@ -245,7 +242,6 @@ def _survey(found: Statement) -> list[Table]:
 
 
 def _files(found: Statement) -> list[Part]:
-    """Return program, command and input files."""
     texts, columns, files = found.texts, Columns(found.texts), found.inputs
     facts = [Fact(texts("page.program"), f"photogram {_photocore.__version__}")]
     if found.command:
@@ -259,7 +255,6 @@ def _files(found: Statement) -> list[Part]:
 
 
 def _metrology(found: Statement) -> list[Part]:
-    """Return features, calibrated lengths, and measures of ISO 19157."""
     texts, columns, parts = found.texts, Columns(found.texts), list[Part]()
     features, lengths, measures = found.result.features, found.standards.lengths, found.standards.iso_19157
     if features is not None and len(features):
