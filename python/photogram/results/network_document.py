@@ -265,8 +265,7 @@ def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
 
 
 def _tests_section(result: AdjustedNetwork, drawing: Drawing) -> Section:
-    table = verdict_table(result.verdict)
-    parts: list[Part] = [drawing, *([table] if table.rows else [])]
+    parts: list[Part] = [drawing, verdict_table(result.verdict)]
     intro = "How the residuals agree with the standard deviations that were given, as a whole and one by one."
     return Section("tests", "Tests", parts, intro)
 
