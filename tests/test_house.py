@@ -115,7 +115,6 @@ KNOWS = {
     "adjustment": {"normals"},
     "normals": set(),
     "geometry": set(),
-    "files": set(),
 }
 """What a folder of the crate may know of the others."""
 

@@ -122,8 +122,7 @@ def combined_polynomial_page(calibration: Calibration) -> list[str]:
     ]
 
 
-STEP_UM = 25_000.0
-"""Distance of the nodes."""
+STEP_UM = 25_000.0  # Distance of the nodes
 ROWS = 9
 
 
