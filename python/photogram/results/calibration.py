@@ -30,16 +30,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Calibration", "Correlation", "GroupTest", "ParameterTest", "PoseCorrelation", "calibrations"]
 
-LEVEL = 0.05
-"""Probability that a term that is not there is called significant."""
-CORRELATED = 0.95
-"""Larger correlations are named."""
-ASKED = 20
-"""Cameras whose correlations with the poses of photos are computed."""
-INSEPARABLE = 0.9999
-"""R^2 above this: nothing tells the parameter from the others."""
-FROM_PRIOR = 0.05
-"""A weight whose redundancy number is below this determines the parameter, not the images."""
+LEVEL = 0.05  # Of tests for significance
+CORRELATED = 0.95  # Larger correlations are reported
+ASKED = 20  # Cameras with correlations to poses of photos
+INSEPARABLE = 0.9999  # R^2 above which a parameter is not separable
+FROM_PRIOR = 0.05  # Redundancy number of a weight below which the weight determines the parameter
 FAR = 5.0
 """A weighted parameter that has moved by more of its standard deviations a priori is a contradiction."""
 
@@ -191,7 +186,6 @@ class Calibration:
         return said
 
     def _worth(self) -> list[str]:
-        """Say which terms are worth keeping."""
         kept = [", ".join(each.names) for each in self.terms if each.worth_keeping]
         others = [
             f"{', '.join(each.names)} (probability {each.probability:.2g}, up to {each.effect:.2g} sd)"
