@@ -276,7 +276,7 @@ def _hypotheses(
         if k > 2 and np.ptp(u) > 0:
             found.append((u - u.mean(), (name, None), f"changes with the {name} by {{}} a {of_what}"))
     if not found:
-        raise InputError(phrase("history.one-time"))
+        raise InputError(phrase("history.equal-times"))
     return _Hypotheses(
         np.column_stack([column for column, _, _ in found]),
         tuple(kind for _, kind, _ in found),

@@ -126,24 +126,34 @@ class Rule:
     """A rule of verdicts."""
 
     code: str
-    message: Callable[[Evidence], Phrase | None]  # On the evidence; None if the rule does not fit
+    message: Callable[[Any], Phrase | None]  # On the evidence; None if the rule does not fit
     exit: int  # Exit code, if `grave` holds of the evidence
     advice: tuple[str, ...]  # Codes of the next steps, if it gives the headline
     warning: bool = False  # Whether a user should look although the exit code is 0
-    grave: Callable[[Evidence], bool] = lambda _: True  # Whether it forbids the use
+    grave: Callable[[Any], bool] = lambda _: True  # Whether it forbids the use
     also: bool = False  # Whether the message has the variant `.also` for verdicts that forbid the use
+
+
+def fitting_rules(
+    rules: Iterable[Rule], evidence: Any, codes: list[str] | None = None
+) -> list[tuple[Rule, Phrase, int]]:
+    """Return the rules that fit, with messages and exit codes; rules that forbid the use are first.
+
+    `codes` receives the codes of these rules, for the conditions of those that follow.
+    """
+    fitting: list[tuple[Rule, Phrase, int]] = []
+    for rule in rules:
+        if (message := rule.message(evidence)) is not None:
+            if codes is not None:
+                codes.append(rule.code)
+            fitting.append((rule, message, rule.exit if rule.grave(evidence) else 0))
+    return sorted(fitting, key=lambda each: each[2] == 0)
 
 
 def verdict(found: Findings) -> Verdict:
     """Judge an adjustment by all that was found about it."""
     evidence = Evidence(found)
-    fitting: list[tuple[Rule, Phrase, int]] = []
-    for rule in RULES:
-        if (message := rule.message(evidence)) is not None:
-            evidence.codes.append(rule.code)
-            fitting.append((rule, message, rule.exit if rule.grave(evidence) else 0))
-    # Rules that forbid the use are first: no green headline above a line that says so.
-    fitting.sort(key=lambda each: each[2] == 0)
+    fitting = fitting_rules(RULES, evidence, evidence.codes)
     usable = not fitting[0][2]
     messages = [
         replace(message, code=f"verdict.{rule.code}.also") if rule.also and not usable else message
