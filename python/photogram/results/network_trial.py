@@ -27,12 +27,9 @@ KINDS = ("image", "control", "position", "attitude", "observation", "camera", "u
 """What the suspects of the core are of, by their numbers."""
 IMAGE, CONTROL, POSITION, ATTITUDE, OBSERVATION = range(5)
 
-WHOLE = 1500
-"""Rows up to which R of all of them is had: an exact round takes as many solutions."""
-SUPPORT = 3
-"""Images that a photo whose pose is free needs."""
-HUBER, CAUCHY = 1.50, 2.55
-"""Scales of the losses of a robust start, in standard deviations of an image point."""
+WHOLE = 1500  # Largest number of rows with R of all of them; an exact round has as many solutions
+SUPPORT = 3  # Smallest number of images of a photo with a free pose
+HUBER, CAUCHY = 1.50, 2.55  # Scales of the losses of a robust start, in standard deviations of an image point
 ROBUST_ITERATIONS = 20
 
 

@@ -38,10 +38,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Inseparable", "Moved", "Reliability", "reliability_of"]
 
-SEPARATED = 1.6448536269514722
-"""Of the normal distribution, 95 percent on one side."""
-SEARCHED = 100
-"""Observations of the largest norm whose effect on every unknown is looked into."""
+SEPARATED = 1.6448536269514722  # One-sided 95 percent quantile of the normal distribution
+SEARCHED = 100  # Number of examined observations: those of the largest norm
 
 
 @dataclass(frozen=True)

@@ -30,10 +30,8 @@ ANGLES = ("omega", "phi", "kappa")
 ROUGH = 2.0
 """Standard deviations: a step after which the next would move no unknown by more is the last of a round. The
 rounds that follow start there, and the last takes nothing out: what it decides on is as good as exact."""
-EXACT = 1e-7
-"""The same where R of all rows is used: a small network."""
-LOOSE = 0.1
-"""Standard deviation of positions, in the extent of the block, that hardly gives it a datum."""
+EXACT = 1e-7  # The same if R of all rows is used
+LOOSE = 0.1  # Largest standard deviation of positions for a firm datum, as a part of the extent of the block
 
 
 def network_trial(block: Block, core: _photocore.NetworkTrial, *, parts: bool = True) -> NetworkTrial:

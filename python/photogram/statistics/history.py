@@ -35,10 +35,8 @@ from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase, phrase
 
-YEAR = 365.2425
-"""Days."""
-MOST = 3
-"""Changes of one quantity that are told apart."""
+YEAR = 365.2425  # days
+MOST = 3  # Largest number of changes of one quantity
 
 
 @dataclass(frozen=True)

@@ -24,17 +24,13 @@ WRONG_ALIKE = 1.5
 """Where the median is larger than expected by more, and the mean square by no more than this beside it, all
 residuals are too large, not a few."""
 
-MOST_IMAGES, MOST_CONTROL = 0.05, 1 / 3
-"""Shares of images and of control without which a network may be used."""
+MOST_IMAGES, MOST_CONTROL = 0.05, 1 / 3  # Largest shares of removed images and control
 
-_GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)
-"""Exit codes, the worst last."""
+_GRAVITY = (0, EXIT_NOT_USABLE, EXIT_NOT_CONVERGED)  # Exit codes, the worst last
 
-LARGEST_FACTOR = 3.0
-"""Standard deviations wrong by more than this are no matter of weights."""
+LARGEST_FACTOR = 3.0  # Largest factor of standard deviations that weights explain
 
-_LISTED = ("lines", "next", "outliers", "rivals", "hints")
-"""Members of a verdict that list messages."""
+_LISTED = ("lines", "next", "outliers", "rivals", "hints")  # Members of a verdict that list messages
 
 
 @dataclass(frozen=True, repr=False)
@@ -398,8 +394,7 @@ def _not_tested(e: Evidence) -> Phrase | None:
     return Phrase(f"verdict.not-tested{'.pattern' if pattern else ''}", {"reason": e.found.untested})
 
 
-CONTROL = "named.control"
-"""Code of the name of a control point."""
+CONTROL = "named.control"  # Code of the name of a control point
 
 _WITH_CHECK = frozenset(
     {
