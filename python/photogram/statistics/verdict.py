@@ -35,44 +35,23 @@ _LISTED = ("lines", "next", "outliers", "rivals", "hints")  # Members of a verdi
 
 @dataclass(frozen=True, repr=False)
 class Verdict:
-    """Whether a result can be used.
+    """Whether a result can be used."""
 
-    Attributes
-    ----------
-    code
-        Name of the rule that fits first: the table is in `docs/command-line.md`.
-    message
-        Its message: a code with fields.
-    exit
-        Exit code of the command: 0, 3 or 4.
-    warning
-        Whether a user should look although the exit code is 0; `--strict` makes it 4.
-    lines
-        Messages of the other rules, and remarks.
-    next
-        Messages on the next steps.
-    tests
-        The global test, the largest test value of every kind of observation, tests of patterns.
-    outliers
-        A message for each kind of observations with outliers: how many, and the worst.
-    removed, rivals, hints
-        Observations that snooping removed, those that cannot be told apart from them, accepted hypotheses.
-    outlying
-        The outliers by kind, which tables and plots mark: the row of an observation, and the number of a
-        single component behind it.
-    """
-
-    code: str
-    message: Phrase
-    exit: int
-    warning: bool
-    lines: tuple[Phrase, ...]
-    next: tuple[Phrase, ...]
+    code: str  # Name of the rule that fits first: the table is in `docs/command-line.md`
+    message: Phrase  # Its message: a code with fields
+    exit: int  # Exit code of the command: 0, 3 or 4
+    warning: bool  # Whether a user should look although the exit code is 0; `--strict` makes it 4
+    lines: tuple[Phrase, ...]  # Messages of the other rules, and remarks
+    next: tuple[Phrase, ...]  # Messages on the next steps
+    # The global test, the largest test value of every kind of observation, tests of patterns
     tests: tuple[Test, ...]
+    # A message for each type of observation with outliers: their number, and the worst
     outliers: tuple[Phrase, ...] = ()
+    # Observations that snooping removed, those that are inseparable from them, accepted hypotheses
     removed: tuple[Any, ...] = ()
     rivals: tuple[Text, ...] = ()
     hints: tuple[Text, ...] = ()
+    # The outliers by type, which tables and plots mark: row of an observation, or row and component
     outlying: Mapping[Text, Sequence[tuple[int, ...]]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
