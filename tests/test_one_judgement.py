@@ -8,7 +8,6 @@ import pytest
 
 import photogram
 from photogram import collection, formats
-from photogram.plots.picture_data import pictured
 from photogram.results import tests as table
 from photogram.words import Phrase
 
@@ -108,7 +107,7 @@ def test_simulated_errors_are_judged_once():
 
 
 def test_the_plot_of_tests_marks_outliers_only(result):
-    drawn = pictured(result)
+    drawn = result._plot_data()
     masks = zip(table.Tests(result).outliers, drawn.tested, strict=True)
     count = sum(int((own & np.isfinite(each.values)).sum()) for own, each in masks)
     labels = [getattr(mark, "label", "") for mark in PLOT.tests(result).panels[1].marks]

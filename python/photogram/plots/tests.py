@@ -11,13 +11,13 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import pictured
 from photogram.show.sketch.declared import Panel, spread
 from photogram.show.sketch.marks import Level, Line, Mark, Markers, Names, band, bars
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, MARKED, SKY
 from photogram.statistics.distributions import bonferroni, critical_normal
 from photogram.statistics.patterns import SPEAKING
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.statistics.findings import Tested
@@ -30,7 +30,7 @@ LEVEL = 0.05
 MAX_TEST_VALUE = 6.0  # The histogram counts test values beyond at its ends
 
 
-def tests(result: object) -> Plot:
+def tests(result: Any) -> Plot:
     """Plot test values w of all observations: their histogram, and their quantiles, against the normal.
 
     w = residual / (standard deviation x root of redundancy number) is standard normal where the given
@@ -41,12 +41,12 @@ def tests(result: object) -> Plot:
     InputError
         The adjustment gave no test values (`covariance=False`).
     """
-    drawn = pictured(result)
+    drawn = result._plot_data()
     groups = [_speaking(each) for each in drawn.tested]
     values = np.concatenate([each.values.ravel() for each in groups])
     values = values[np.isfinite(values)]
     if len(values) < 2:
-        raise InputError("there are no test values: adjust with covariance=True, and with redundancy")
+        raise InputError(phrase("plot.tests"))
     weight = drawn.unit_weight
     return Plot(10.0, 4.6, [_histogram(values, weight), _quantiles(groups, drawn.outlying, weight)], 2)
 

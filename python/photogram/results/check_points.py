@@ -30,14 +30,14 @@ class CheckPoints:
     """The k check points of a result."""
 
     rows: Indices  # (k,) among all points
-    names: tuple[str, ...]
-    differences: Floats  # (k, 3) adjusted minus given, in the units of the block; NaN where nothing is given
+    names: tuple[str, ...]  # Names of the points
+    differences: Floats  # (k, 3) adjusted minus given, in the units of the block; NaN if not given
     sd: Floats  # (k, 3) standard deviations of the adjusted coordinates
-    # (k, 3) standard deviations of the given ones; where none were given, those that are assumed
+    # (k, 3) standard deviations of the given coordinates; assumed values if none were given
     given_sd: Floats
-    assumed: Bools  # (k,) whether those of a point are assumed
-    untested: str  # Why there is no test; empty where there is one
-    agreement: Agreement | None = None  # The tests; None where there are none
+    assumed: Bools  # (k,) whether the given deviations are assumed
+    untested: str  # Reason for a missing test; empty with a test
+    agreement: Agreement | None = None  # Tests, if any
 
     @cached_property
     def statistics(self) -> tuple[Floats, Floats]:

@@ -21,7 +21,6 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.network.core_arrays import core_network
 from photogram.network.motion import on_shared
 from photogram.network.observations import moments
 from photogram.network.rays import local_axes
@@ -29,8 +28,7 @@ from photogram.network.strips import strips_of
 from photogram.results.check_points import point_kinds
 from photogram.results.grouping import Grouping, GroupsArgument, Observables, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import terms_of
-from photogram.show.methods import Documented, Way
+from photogram.show.methods import Documented
 from photogram.show.page import Document, Section
 from photogram.show.quantity import Quantity, Table, of_each
 from photogram.show.summary import Brief
@@ -210,7 +208,7 @@ def sums_of(result: AdjustedNetwork, grouping: Grouping) -> tuple[Indices, Float
         "points": np.where(np.isfinite(squares["points"]), result.point_redundancy, np.nan),
         "photos": np.where(np.isfinite(squares["photos"]), result.photo_redundancy, np.nan),
     }
-    kinds = [*terms_of(result).kinds]
+    kinds = [*result._terms().kinds]
     size = sum(len(kind.rows) for kind in kinds)
     of_observations, shares, components = np.full(size, np.nan), np.full(size, np.nan), np.ones(size)
     for kind in kinds:
@@ -229,13 +227,17 @@ def _weighted_squares(residuals: Floats, sd: Floats) -> Floats:
     return np.where((sd > 0) & np.isfinite(sd), (residuals / sd) ** 2, np.nan)
 
 
-@Way
 def observables(network: object) -> Observables:
     """Return what a block, a collection or an adjusted one has observations of."""
-    raise argument_error("network", "kind", kind=phrase("groups.network"), value=value_field(network))
+    given = network.given if isinstance(network, AdjustedNetwork) else network
+    if isinstance(given, Block):
+        return block_observables(given)
+    if not hasattr(given, "_observables"):
+        raise argument_error("network", "kind", kind=phrase("groups.network"), value=value_field(network))
+    found: Observables = given._observables()
+    return found
 
 
-@observables.register
 def block_observables(block: Block) -> Observables:
     """Return what a block has observations of."""
     sd = np.hstack([block.photo_position_sd, block.photo_attitude_sd])
@@ -270,14 +272,9 @@ def _strips(block: Block) -> list[Indices]:
     return [*(others[strip] for strip in found), *(np.array(rows, dtype=np.int64) for rows in flown.values())]
 
 
-@observables.register
-def _(result: AdjustedNetwork) -> Observables:
-    return observables(result.given)
-
-
 def factored(result: AdjustedNetwork) -> _photocore.BlockCovariances:
     """Return the factor of the normal equations of an adjusted network."""
-    return core_network(result.given, result.options).covariances(result.state, threads=0, progress=None)
+    return result._core_network().covariances(result.state, threads=0, progress=None)
 
 
 def group_sums(

@@ -26,7 +26,6 @@ from photogram.results.network_tables import (
     photos,
     points,
     stations,
-    terms_of,
 )
 from photogram.results.tests import Tests
 from photogram.results.weakest import weakest_photos, weakest_points
@@ -92,7 +91,7 @@ def network_document(
         " test value considers both. Names of photos and points lead to their rows below."
     )
     summary = result.reliability_summary
-    reliability = [] if summary is None else summary.parts(terms_of(result).linear_unit)
+    reliability = [] if summary is None else summary.parts(result._terms().linear_unit)
     tables = [table for table in weakest_tables(result, *weak) if len(table.columns[0].values)]
     return Document(
         what=what,
@@ -183,7 +182,7 @@ def size_section(
 
 def _highlights(result: AdjustedNetwork, photos: int) -> list[Fact]:
     """Return what a reader wants first of every network, with its number of photos."""
-    used, (axis, _) = result.used_images, terms_of(result).image_axes
+    used, (axis, _) = result.used_images, result._terms().image_axes
     images, points = np.count_nonzero(used), np.count_nonzero(result.used_points)
     found = [
         _unit_weight(result),
@@ -211,7 +210,7 @@ def _unit_weight(result: AdjustedNetwork) -> Fact:
 
 def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     """Return how well images fit and are checked."""
-    used, (axis, _) = result.used_images, terms_of(result).image_axes
+    used, (axis, _) = result.used_images, result._terms().image_axes
     unit, residuals = unit_written(axis.small), result.residuals[used] * axis.factor
     if not len(residuals):
         return []
@@ -250,7 +249,7 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
 
 def _precision_table(result: AdjustedNetwork) -> list[quantity.Table]:
     """Return how the standard deviations of adjusted values are spread; none where none were computed."""
-    terms, rows = terms_of(result), list[tuple[Any, ...]]()
+    terms, rows = result._terms(), list[tuple[Any, ...]]()
     for what, axes, deviations in (
         ("points", terms.point_axes, result.point_sd[result.used_points]),
         ("photos", terms.photo_axes, result.photo_sd),

@@ -21,7 +21,6 @@ from photogram.plots.picture_data import (
     Pictured,
     Plan,
     VectorField,
-    pictured,
 )
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.distortion import DistortionCurve, distortion_curve
@@ -229,8 +228,3 @@ def curves_of(camera: AdjustedCamera, curve: DistortionCurve) -> Curves:
             Curve(balanced, curve.balanced, _bands(balanced_curve=curve.sd_balanced)),
         ],
     )
-
-
-@pictured.register(Result)
-def _pictured(result: Result) -> Pictured:
-    return PicturedBlock(result)

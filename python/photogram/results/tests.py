@@ -13,7 +13,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results import network_tables
 from photogram.results.axes import component_axis
 from photogram.results.network import AdjustedNetwork
-from photogram.results.network_tables import deviation, redundancy, terms_of
+from photogram.results.network_tables import deviation, redundancy
 from photogram.results.network_trial import KINDS, OBSERVATION
 from photogram.results.observation_kinds import kind_words, named_observation, parts_of
 from photogram.show.cells import unit_written
@@ -47,7 +47,7 @@ class Tests:
     """The tests of an adjusted network: of single components, and of groups that may err together."""
 
     def __init__(self, result: AdjustedNetwork) -> None:
-        self._result, self._terms = result, terms_of(result)
+        self._result, self._terms = result, result._terms()
 
     @cached_property
     def normal(self) -> list[ComponentTests]:
