@@ -29,14 +29,10 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram import Result
 
-HELD = Phrase("test.held")
-"""The kind of these tests."""
-SUSPECTED = 5
-"""Fixed stations and points that are tested at the most, those with the worst images."""
-STEP = 1e-6
-"""Of the coordinates, in distances between points and stations, and of attitudes, radians."""
-LEAST_IMAGES = 3
-"""Of a station."""
+HELD = Phrase("test.held")  # Type of these tests
+SUSPECTED = 5  # Largest number of tested stations and points: those with the worst images
+STEP = 1e-6  # Of coordinates, in distances between points and stations; of attitudes, in radians
+LEAST_IMAGES = 3  # Of a tested station
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,14 +23,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-LISTED = 5
-"""Observations of each kind that are listed."""
-PAIRS = 10
-"""Pairs that cannot be told apart that are listed."""
-LOOKED_INTO = 2_000
-"""Points whose pairs are looked into, those of the least redundancy first."""
-LIMIT = 0.9
-"""Of the correlation of two tests, from which on errors cannot be told apart (Foerstner 1983)."""
+LISTED = 5  # Listed observations of each type
+PAIRS = 10  # Listed inseparable pairs
+LOOKED_INTO = 2_000  # Number of points with examined pairs: those of the least redundancy
+LIMIT = 0.9  # Largest correlation of separable tests (Foerstner 1983)
 APART = 1 / (1 + LIMIT)
 """Redundancy from which on that of a pair cannot be reached: rho^2 <= (1 - r)(1 - s) / (r s)."""
 

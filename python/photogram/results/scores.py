@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from photogram import _photocore
     from photogram.arguments.types import Floats, Indices
 
-TAKEN_UP = 1e-9
-"""Of the partials; what is left of them beside the unknowns is rounding below it."""
+TAKEN_UP = 1e-9  # Smaller parts of the partials are rounding errors
 
 
 @dataclass(frozen=True, eq=False)

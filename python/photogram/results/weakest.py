@@ -10,8 +10,7 @@ from photogram.results.axes import Determined
 from photogram.results.network import AdjustedNetwork
 
 WORST = 10
-NEAR = 1e-3
-"""Distance from a station, in the median of such distances, below which a point stands first."""
+NEAR = 1e-3  # Points closer to a station, as a part of the median distance, are listed first
 
 
 @dataclass(frozen=True)

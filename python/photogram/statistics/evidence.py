@@ -21,23 +21,18 @@ from photogram.statistics.findings import Findings, Systematic, Tested, Text
 from photogram.statistics.limits import NOTABLE_FACTOR, GlobalTest
 from photogram.words import Phrase
 
-FEW = 5
-"""With fewer degrees of freedom only gross disagreement can be seen."""
+FEW = 5  # With fewer degrees of freedom tests detect large disagreement only
 
-ENOUGH = 20
-"""Tested observations that the median of their test values needs."""
+ENOUGH = 20  # Smallest number of test values for a median
 
 EXPLAINED, SINGLE = 0.8, 0.2
 """Of what residuals are too large by: what a lens explains at least, and one observation at most."""
 
-WITHHELD = 0.001
-"""Level of check points below which a result is withheld: one good block in a thousand."""
+WITHHELD = 0.001  # Significance level of check points that forbid the use
 
-MEDIAN = 0.6744897501960817
-"""Of the absolute value of a standard normal variable."""
+MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
 
-GLOBAL = Phrase("test.global")
-"""The kind of the test of all residuals together."""
+GLOBAL = Phrase("test.global")  # Type of the test of all residuals together
 
 Beyond = tuple[float, Tested, tuple[int, ...]]
 """Logarithm of the probability, kind, and place of an observation whose test rejects."""

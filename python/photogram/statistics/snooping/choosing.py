@@ -23,10 +23,8 @@ from photogram.statistics.distributions import LEVEL, critical_chi_square, criti
 from photogram.statistics.snooping.conditioning import Chosen, Conditional, UnitWeight
 from photogram.statistics.snooping.suspects import Suspects, Tests, Trial
 
-ON_POINT = 2
-"""Groups that go from one point in a round, at the most, where R of all rows is too large."""
-AHEAD = 10
-"""Groups that are taken out regardless, at the most, to see whether they hide each other."""
+ON_POINT = 2  # Largest number of removals on one point in a round without R of all rows
+AHEAD = 10  # Largest number of trial removals that search for masked errors
 
 
 @dataclass(frozen=True)

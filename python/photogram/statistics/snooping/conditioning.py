@@ -210,7 +210,5 @@ class Conditional:
         self.v[flat, places[there]] = 0.0
 
 
-BENT = 2e-5
-"""What the curvature of the equations may make of the difference of two T, in T^(3/2)."""
-RIVAL = 20.0
-"""Odds from which on another group is no rival."""
+BENT = 2e-5  # Largest effect of curvature on the difference of two T, in T^(3/2)
+RIVAL = 20.0  # Smallest odds against a rival

@@ -78,8 +78,7 @@ class Removal:
         return " or ".join([self.name, *others])
 
 
-NEAR = 3.0
-"""Odds below which both are named."""
+NEAR = 3.0  # Odds of rivals that the log names
 
 
 @dataclass(frozen=True)

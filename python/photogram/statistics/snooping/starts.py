@@ -25,14 +25,11 @@ from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out,
 from photogram.statistics.snooping.taking_out import Settings, TakingOut, log_probability, take_back
 from photogram.statistics.snooping.whole_photos import log_photo, take_photo
 
-MEDIAN = 0.6744897501960817
-"""Of the absolute value of a standard normal variable."""
-MEDIAN_OF_TWO = 1.1774100225154747
-"""Of the length of a vector of two of them."""
+MEDIAN = 0.6744897501960817  # Median of the absolute value of a standard normal variable
+MEDIAN_OF_TWO = 1.1774100225154747  # Median of the length of a vector of two of them
 OPTIMISTIC = 2.0
 """Standard deviations that are too small by more than this are told from gross errors by the median."""
-ENOUGH = 20
-"""Test values that a median needs."""
+ENOUGH = 20  # Smallest number of test values for a median
 
 
 def scales(work: TakingOut) -> tuple[dict[str, float], Floats]:
@@ -81,8 +78,7 @@ FAR = 5.0
 CANDIDATE = 4.4
 """Robust standard deviations from which on a residual is put aside: Cauchy's loss leaves it a quarter of its
 weight."""
-SCALES = 5
-"""Robust adjustments at the most until their scale stands."""
+SCALES = 5  # Largest number of robust adjustments
 
 
 def needs_robust_start(work: TakingOut) -> bool:

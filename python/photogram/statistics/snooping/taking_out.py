@@ -37,8 +37,7 @@ class Settings:
     max_rounds: int = 20
 
 
-RESCUES = 5
-"""Attempts to leave a round with everything determined."""
+RESCUES = 5  # Largest number of attempts of a round to determine all unknowns
 _NOT_DETERMINED = "its point is no longer determined and has left the network"
 
 

@@ -19,8 +19,7 @@ LEAST_OF_PHOTO, MOST_OF_PHOTO = 4, 0.5
 EVEN = 0.25
 """Share of the largest test value of a photo that the median of all of them has where all its images are
 bad: a few huge errors, such as exchanged names, lift the others, but far less."""
-BAD_PHOTOS = 5
-"""Photos that are taken out before single images are tested, at the most."""
+BAD_PHOTOS = 5  # Largest number of photos that are removed before tests of images
 
 
 def take_bad_photos_out(work: TakingOut) -> None:
