@@ -396,7 +396,7 @@ def test_bad_rows_are_named(folder):
     file = folder / "images.csv"
     lines = file.read_text().splitlines()
     for row, message in (
-        ("1,12,x", "y_px 'x' is not a number"),
+        ("1,12,x", "column y_px: must be a number, got 'x'"),
         ("1,12,", "y_px is blank"),
         ("9,1,1", "exposure 9"),
     ):

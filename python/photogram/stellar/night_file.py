@@ -14,7 +14,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.io.rows import Row
 from photogram.io.rows import Table as ImageTable
-from photogram.io.toml_tables import Document, Table, read_document
+from photogram.io.toml import Document, Table, read_document
 from photogram.show.angles import ARCSEC
 from photogram.stellar.camera_yaml import read_yaml
 from photogram.stellar.catalogue import Catalogue, star_key

@@ -14,7 +14,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.rows import Row, read_rows
-from photogram.io.toml_tables import Document, Table, read_document
+from photogram.io.toml import Document, Table, read_document
 from photogram.messages import listed
 from photogram.show.angles import ARCSEC
 from photogram.stellar.cameras import PlateCamera

@@ -6,7 +6,7 @@ import math
 from dataclasses import fields
 
 from photogram.errors import InputError
-from photogram.io.toml_tables import Table
+from photogram.io.toml import Table
 from photogram.show.angles import ARCSEC
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 
