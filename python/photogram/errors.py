@@ -86,7 +86,8 @@ class InputError(PhotogramError, ValueError):
 
 def message_of(error: Exception) -> str | Phrase:
     """Return the message of an error without its place, as a code with fields if it has one."""
-    return getattr(error, "phrase", None) or getattr(error, "message", str(error))
+    message: str | Phrase = getattr(error, "phrase", None) or getattr(error, "message", str(error))
+    return message
 
 
 class ContradictionError(InputError):

@@ -7,13 +7,14 @@ ignored.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io.files import read_lines
 from photogram.io.numbers import number_or_text
@@ -213,6 +214,34 @@ def _scalar(text: str) -> Any:
 def figures(values: ArrayLike) -> str:
     """Return a list of numbers with all their digits."""
     return "[" + ", ".join(repr(float(each)) for each in np.ravel(values)) + "]"
+
+
+def camera_info(
+    name: str,
+    size: tuple[int, int],
+    matrix: Floats,
+    lens: tuple[str, Sequence[float]],
+    turn: Floats | None = None,
+    projection: Floats | None = None,
+) -> bytes:
+    """Return a camera as ROS writes it (`sensor_msgs/CameraInfo`); turn and projection rectify it.
+
+    The lens is the distortion model with its coefficients.
+    """
+    escaped = name.replace("\\", "\\\\").replace('"', '\\"')
+    if projection is None:
+        projection = np.column_stack([matrix, np.zeros(3)])
+    lines = [
+        f"image_width: {size[0]}",
+        f"image_height: {size[1]}",
+        f'camera_name: "{escaped}"',
+        *matrix_lines("camera_matrix", matrix),
+        f"distortion_model: {lens[0]}",
+        *matrix_lines("distortion_coefficients", [lens[1]]),
+        *matrix_lines("rectification_matrix", np.eye(3) if turn is None else turn),
+        *matrix_lines("projection_matrix", projection),
+    ]
+    return "\n".join([*lines, ""]).encode()
 
 
 def matrix_lines(name: str, values: ArrayLike, *, opencv: bool = False) -> list[str]:
