@@ -44,7 +44,7 @@ def holding(what: str, path: Path | None = None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(error.message, file=path) from None
+        raise InputError(error.phrase or error.message, file=path) from None
     except KeyError as error:
         raise InputError(f"holds no {what}: {error} is missing", file=path) from None
     except (AttributeError, IndexError, TypeError, ValueError) as error:
