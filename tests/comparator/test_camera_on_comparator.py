@@ -64,9 +64,9 @@ def test_it_is_weighted_in_a_block(calibration):
 def test_what_the_comparator_has_itself_is_refused(calibration):
     correction = calibration.joint.correction
     for camera, message in (
-        (Camera("perspective", {"c": -150.0}), "comparator.camera camera=perspective"),
-        (Camera("brown", {"c": -150.0, "b1": 1e-4}), "comparator.camera camera=brown"),
-        (Camera("brown", {"c": -150.0}, sd={"b2": np.inf}), "comparator.camera-free camera=brown"),
+        (Camera("perspective", {"c": -150.0}), "comparators.camera camera=perspective"),
+        (Camera("brown", {"c": -150.0, "b1": 1e-4}), "comparators.camera camera=brown"),
+        (Camera("brown", {"c": -150.0}, sd={"b2": np.inf}), "comparators.camera-free camera=brown"),
     ):
         with refusal(message):
             correction.as_camera(camera)

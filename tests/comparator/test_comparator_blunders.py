@@ -54,8 +54,8 @@ def test_exchanged_labels_are_named_and_withhold_the_correction():
     calibration = calibrate(exchanged_labels(noisy(4)), QUICK)
     assert not calibration.usable
     first, *named = phrases(calibration)[:3]
-    assert first.code == "comparator.harm"
-    assert {each.code for each in named} == {"comparator.outlier-exchanged"}
+    assert first.code == "comparators.harm"
+    assert {each.code for each in named} == {"comparators.outlier-exchanged"}
     fields = [[each.fields[name] for name in ("case", "point", "instead")] for each in named]
     assert fields == [[3, 7, 8], [3, 8, 7]]
     for outlier in calibration.screening.outliers:
@@ -76,7 +76,7 @@ def test_a_blunder_is_named_with_its_place_and_size():
     assert calibration.usable
     assert 0.05 < calibration.screening.change_um < calibration.screening.sigma_um
     first = phrases(calibration)[0]
-    assert (first.code, first.fields["case"], first.fields["point"]) == ("comparator.outlier", 3, 9)
+    assert (first.code, first.fields["case"], first.fields["point"]) == ("comparators.outlier", 3, 9)
 
 
 def test_several_blunders_do_not_hide_each_other():
@@ -93,7 +93,7 @@ def test_a_point_that_is_off_everywhere_is_one_of_the_grid():
     xy[12] += [20.0, 0.0]
     calibration = calibrate(replace(session, grids={1: replace(session.grids[1], xy_um=xy)}))
     of_point = [each.code for each in phrases(calibration) if each.fields.get("point") == 13]
-    assert of_point == ["comparator.wrong-point"]
+    assert of_point == ["comparators.wrong-point"]
 
 
 def test_labels_exchanged_in_every_case_are_exchanged_labels():
@@ -101,10 +101,10 @@ def test_labels_exchanged_in_every_case_are_exchanged_labels():
     for case in range(4):
         session = exchanged_labels(session, case, 12, 14)
     first, *named = phrases(calibrate(session, QUICK))[:3]
-    assert first.code == "comparator.harm"
+    assert first.code == "comparators.harm"
     assert [described(each) for each in named] == [
-        "comparator.exchanged plate=1 point=12 instead=14",
-        "comparator.exchanged plate=1 point=14 instead=12",
+        "comparators.exchanged plate=1 point=12 instead=14",
+        "comparators.exchanged plate=1 point=14 instead=12",
     ]
 
 
@@ -119,7 +119,7 @@ def test_a_pointing_ten_sigma_off_is_named_with_its_record(run, tmp_path):
     assert result.exit_code == 0
     point = session.cases[1].points[37]
     calibration = calibrate(changed(session, 1, xy_um=xy), QUICK)
-    (message,) = (each for each in calibration.messages if each.code == "comparator.far-pointing")
+    (message,) = (each for each in calibration.messages if each.code == "comparators.far-pointing")
     assert (message.phrase.fields["case"], message.phrase.fields["point"]) == (2, point)
     verdict = calibration.verdict
     assert verdict.code == "look-at"
@@ -208,7 +208,7 @@ def test_the_command_withholds_what_outliers_spoil(run, tmp_path, exchanged):
     table.write_text("x_um,y_um\n1,2\n")
     result = run("comparator", "correct", document, table)
     assert refused(result)
-    assert str(phrase("comparator.withheld")) in result.output
+    assert str(phrase("comparators.withheld")) in result.output
 
 
 def test_files_of_an_earlier_run_are_named(run, tmp_path, exchanged):
@@ -228,8 +228,8 @@ def test_a_grid_that_is_worse_than_it_should_be_comes_first():
     test = calibration.joint.plates[1].test
     assert test.rejected_high
     first, second = phrases(calibration)[:2]
-    assert (first.code, first.fields["plate"], first.fields["sd"]) == ("comparator.grid-test", 1, 0.3)
-    assert (second.code, second.fields["point"]) == ("comparator.outlier", 9)
+    assert (first.code, first.fields["plate"], first.fields["sd"]) == ("comparators.grid-test", 1, 0.3)
+    assert (second.code, second.fields["point"]) == ("comparators.outlier", 9)
     assert json.loads(calibration.to_json())["joint"]["plates"][0]["test"]["probability_above"] < 1e-6
 
 

@@ -147,7 +147,7 @@ def test_usage(run):
 def test_handedness_must_agree(run, tables):
     result = run(*tables, "--hand", "left")
     assert result.exit_code == 1
-    assert str(phrase("comparator.hand", case=1, measured="right", specified="left")) in result.stderr
+    assert str(phrase("comparators.hand", case=1, measured="right", specified="left")) in result.stderr
 
 
 def test_strict_turns_remarks_into_errors(run, tables):
@@ -155,7 +155,7 @@ def test_strict_turns_remarks_into_errors(run, tables):
     tables[0].write_text("\n".join(line for line in lines if not line.startswith("1,1,1,0,25,")) + "\n")
     lenient = run(*tables, "--no-plots")
     assert lenient.exit_code == 0
-    assert str(phrase("comparator.missing", case=1, n=1, count=25, plate=1)) in lenient.output
+    assert str(phrase("comparators.missing", case=1, n=1, count=25, plate=1)) in lenient.output
     strict = run(*tables, "--no-plots", "--strict", "--out", "strict")
     assert strict.exit_code == 1
     assert not Path("strict").exists()
@@ -299,7 +299,7 @@ def test_tables_of_one_calibration_may_not_contradict(run, tables):
     tables[1].write_text(text.replace("# comparator = 1", "# comparator = 2"))
     result = run(*tables, "--no-plots")
     assert result.exit_code == 1
-    assert str(phrase("comparator.contradiction", key="comparator", value="2", other="1")) in result.stderr
+    assert str(phrase("comparators.contradiction", key="comparator", value="2", other="1")) in result.stderr
     tables[1].write_text(f"# comparator = 1\n{text}")
     assert (
         str(phrase("error.repeated", kind="setting", name="comparator")) in run(*tables, "--no-plots").stderr
@@ -307,5 +307,5 @@ def test_tables_of_one_calibration_may_not_contradict(run, tables):
 
 
 def test_the_numbers_of_the_page_are_those_of_the_command():
-    command = [sys.executable, str(ROOT / "docs" / "regenerate.py"), "--check", "comparator.md"]
+    command = [sys.executable, str(ROOT / "docs" / "regenerate.py"), "--check", "comparators.md"]
     assert subprocess.run(command, check=False).returncode == 0

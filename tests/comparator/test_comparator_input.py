@@ -173,9 +173,9 @@ def test_feature_02_special_grid_of_a_deck(tmp_path):
     session = read_cards(deck(tmp_path, header(operators=operators, master=3), *cards, *data, ""))[0]
     assert session.grids[2345].xy_um == pytest.approx(grid.xy_um)
     assert session.grids[2345].sigma_um is None
-    assert described(session.messages[0]) == "comparator.special-grid plate=2345"
+    assert described(session.messages[0]) == "comparators.special-grid plate=2345"
     unmarked = [card[:79] for card in cards]
-    with refusal("comparator.grid-end"):
+    with refusal("comparators.grid-end"):
         read_cards(deck(tmp_path, header(master=3), *unmarked))
 
 
@@ -208,9 +208,9 @@ def test_plates_expand_with_their_temperature(tmp_path):
     assert found.correction.scale_x / plain.correction.scale_x - 1 == pytest.approx(4 * 8e-6, rel=1e-3)
     assert found.correction.identity.temperature_c == 24.0
     assert corrected_grid(found, 1).temperature_c == 24.0
-    assert not [each for each in found.messages if each.code == "comparator.expansion"]
+    assert not [each for each in found.messages if each.code == "comparators.expansion"]
     unsaid = calibrate(replace(made, temperature_c=24.0), QUICK)
-    assert described(unsaid.messages[0]).startswith("comparator.expansion plate=1 missing=its")
+    assert described(unsaid.messages[0]).startswith("comparators.expansion plate=1 missing=its")
     with refusal("what=expansion_per_k message=error.range value=1.0"):
         replace(cold, expansion_per_k=1.0)
 
@@ -225,7 +225,7 @@ def test_feature_03_left_handed_data_exchange_the_grid(left_handed):
     assert all(case.placed.orientation.left_handed == left_handed for case in calibration.cases)
     assert calibration.linear.correction.scale_y == pytest.approx(1 - 22e-6, abs=1e-12)
     wrong = replace(session, left_handed=not left_handed)
-    with refusal("comparator.hand case=1"):
+    with refusal("comparators.hand case=1"):
         calibrate(wrong, QUICK)
 
 
@@ -253,7 +253,7 @@ def test_feature_04_legs_meet_in_their_intersection():
         c, s = math.cos(angle), math.sin(angle)
         cross = np.array([[c, s], [-s, c], [-3 * c, -3 * s], [2 * s, -2 * c]]) * 500 + [123_456.0, 98_765.0]
         assert intersect_legs(cross) == pytest.approx([123_456.0, 98_765.0], abs=1e-7)
-    with refusal("comparator.parallel"):
+    with refusal("comparators.parallel"):
         intersect_legs(np.array([[0.0, 0.0], [0.0, 5.0], [10.0, 0.0], [10.0, 5.0]]))
 
 
@@ -289,7 +289,7 @@ def test_feature_04_legs_replace_an_intersection_in_a_case():
     assert 13 in calibration.cases[0].placed.from_legs
     session, _ = legged(noisy(2), 13, arms=3)
     calibration = calibrate(session, QUICK)
-    assert "comparator.legs point=13 present=3" in map(described, calibration.messages)
+    assert "comparators.legs point=13 present=3" in map(described, calibration.messages)
     assert 13 not in calibration.cases[0].placed.points
 
 
@@ -308,8 +308,8 @@ def test_feature_05_close_out_of_case_2():
     ("shift", "verdict", "words"),
     [
         (1.9, "good", None),
-        (2.5, "suspect", "comparator.shifted-first"),
-        (4.0, "remeasure", "comparator.moved"),
+        (2.5, "suspect", "comparators.shifted-first"),
+        (4.0, "remeasure", "comparators.moved"),
     ],
 )
 def test_feature_05_the_rules_of_two_and_four_micrometres(shift, verdict, words):
@@ -329,11 +329,11 @@ def test_feature_05_cases_that_are_not_closed():
     )
     closeouts, messages = close_out(open_case)
     assert closeouts[0].verdict == "none"
-    assert described(messages[0]) == "comparator.no-closeout case=1 point=1"
+    assert described(messages[0]) == "comparators.no-closeout case=1 point=1"
     few = replace(
         case, points=case.points[:9], legs=case.legs[:9], xy_um=case.xy_um[:9], places=case.places[:9]
     )
-    with refusal("comparator.not-closed case=1 count=9 point=1"):
+    with refusal("comparators.not-closed case=1 count=9 point=1"):
         close_out(few)
 
 
@@ -368,13 +368,13 @@ def swapped(number, card):
 @pytest.mark.parametrize(
     ("change", "record", "words"),
     [
-        (swapped(7, standard(1, 77, 25_000, 25_000)), 7, "comparator.no-point plate=1320 point=77"),
+        (swapped(7, standard(1, 77, 25_000, 25_000)), 7, "comparators.no-point plate=1320 point=77"),
         (
             swapped(3, standard(1, 1, 95_000, 25_000)),
             3,
-            "comparator.far-reading distance=69999.0 case=1 point=1",
+            "comparators.far-reading distance=69999.0 case=1 point=1",
         ),
-        (swapped(7, standard(2, 3, 25_000, 25_000)), 8, "comparator.repeated-case case=1 record=2"),
+        (swapped(7, standard(2, 3, 25_000, 25_000)), 8, "comparators.repeated-case case=1 record=2"),
         (
             swapped(7, standard(1, 3, 25_000, 25_000, plate=73)),
             7,
@@ -402,7 +402,7 @@ def swapped(number, card):
         ),
         (swapped(1, header(19)), 1, "error.columns first=6 last=7 message=error.most high=15 value=19"),
         (swapped(1, header(master=5)), 1, "error.columns first=80 last=80 message=error.most high=3 value=5"),
-        (lambda cards: [cards[0], ""], 1, "comparator.empty-deck"),
+        (lambda cards: [cards[0], ""], 1, "comparators.empty-deck"),
     ],
 )
 def test_bad_cards_name_file_record_and_text(tmp_path, change, record, words):
@@ -416,7 +416,7 @@ def test_bad_cards_name_file_record_and_text(tmp_path, change, record, words):
 def test_zero_and_zero_is_missing_on_cards(tmp_path):
     session = read_cards(small_deck(tmp_path, swapped(7, standard(1, 3, 0, 0))))[0]
     assert len(session.cases[0].points) == 51
-    assert described(session.messages[0]) == "comparator.zero-readings point=3"
+    assert described(session.messages[0]) == "comparators.zero-readings point=3"
 
 
 def test_the_middle_of_the_range_stands_on_cards_of_comparator_15(tmp_path):
@@ -434,17 +434,17 @@ TABLE = "# grid = 1320\ncase,point,x_um,y_um\n"
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("# grid = 1320\ncase,point,x_um,y_mm\n1,1,2,3\n", "comparator.units"),
-        ("# grid = 1320\ncase,point,x_um,y_um,x_mm,y_mm\n1,1,2,3,4,5\n", "comparator.units"),
-        ("# grid = 1320\ncase,point,x,y\n1,1,2,3\n", "comparator.units"),
+        ("# grid = 1320\ncase,point,x_um,y_mm\n1,1,2,3\n", "comparators.units"),
+        ("# grid = 1320\ncase,point,x_um,y_um,x_mm,y_mm\n1,1,2,3,4,5\n", "comparators.units"),
+        ("# grid = 1320\ncase,point,x,y\n1,1,2,3\n", "comparators.units"),
         ("# grid = 1320\npoint,x_um,y_um\n1,2,3\n", "case"),
-        ("case,point,x_um,y_um\n1,1,2,3\n", "comparator.no-grid"),
+        ("case,point,x_um,y_um\n1,1,2,3\n", "comparators.no-grid"),
         (f"{TABLE}1,1,2\n", "3"),
-        (f"{TABLE}1,1,2,\n", "comparator.coordinate"),
+        (f"{TABLE}1,1,2,\n", "comparators.coordinate"),
         (f"{TABLE}1,1,2,abc\n", "abc"),
         (f"{TABLE}1,one,2,3\n", "one"),
-        (f"{TABLE}1,77,2,3\n", "comparator.no-point plate=1320 point=77"),
-        (f"{TABLE}1,1,2,3\n2,1,2,3\n1,2,2,3\n", "comparator.repeated-case case=1 record=3"),
+        (f"{TABLE}1,77,2,3\n", "comparators.no-point plate=1320 point=77"),
+        (f"{TABLE}1,1,2,3\n2,1,2,3\n1,2,2,3\n", "comparators.repeated-case case=1 record=3"),
         (
             "# grid = 99\ncase,point,x_um,y_um\n1,1,2,3\n",
             "error.unknown kind=built-in grid name=99 names=['773', '1320',",
@@ -467,7 +467,7 @@ TABLE = "# grid = 1320\ncase,point,x_um,y_um\n"
         (f"{TABLE}1,1,{'9' * 140_000},3\n", "1400"),
         (f"# grid = 1320\ncase,point,x_um,y_um{',' * 420_000}\n1,1,2,3\n", "4200"),
         (f"{TABLE}1,1,1_0,3\n", "1_0"),
-        (f"{TABLE}1,1,1e300,3\n", "error.at what=comparator.point case=1 point=1"),
+        (f"{TABLE}1,1,1e300,3\n", "error.at what=comparators.point case=1 point=1"),
         ("# grid = 1320\ncase,point,x_um,y_um,point\n1,1,2,3,4\n", "point"),
         (TABLE, "error.empty-file content=measurements"),
     ],
@@ -488,7 +488,7 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "a.csv").write_text(TABLE)
     with pytest.raises(InputError, match="tables and decks"):
         read([tmp_path / "a.csv", tmp_path / "b.txt"])
-    with refusal("comparator.files"):
+    with refusal("comparators.files"):
         read([])
 
 
@@ -509,11 +509,11 @@ def without(session, case, keep):
 
 def test_too_few_points_are_errors():
     session = noisy(4)
-    with refusal("case=2", "comparator.few-points count=2"):
+    with refusal("case=2", "comparators.few-points count=2"):
         calibrate(without(session, 1, lambda case: case.points <= 2), QUICK)
-    with refusal("case=2", "comparator.few-points count=3"):
+    with refusal("case=2", "comparators.few-points count=3"):
         calibrate(without(session, 1, lambda case: np.isin(case.points, [1, 5, 21])), QUICK)
-    with refusal("case=2", "comparator.collinear"):
+    with refusal("case=2", "comparators.collinear"):
         calibrate(without(session, 1, lambda case: case.points <= 5), QUICK)
     eight = without(session, 1, lambda case: np.isin(case.points, [1, 3, 5, 11, 15, 21, 23, 25]))
     calibration = calibrate(eight, QUICK)
@@ -528,7 +528,7 @@ def test_identical_readings_are_remarked_on_or_refused():
     same[case.points == 7] = same[case.points == 7][0]
     copied = replace(session, cases=(replace(case, xy_um=same), *session.cases[1:]))
     messages = map(described, calibrate(copied, QUICK).messages)
-    assert "comparator.identical case=1 points=7" in messages
+    assert "comparators.identical case=1 points=7" in messages
     same[case.points == 8] = same[case.points == 7][0]
     copied = replace(session, cases=(replace(case, xy_um=same), *session.cases[1:]))
     with pytest.raises(InputError, match="points 7 and 8 have identical readings"):
@@ -537,20 +537,20 @@ def test_identical_readings_are_remarked_on_or_refused():
 
 def test_parallel_legs_and_doubly_measured_points_are_errors():
     session, _ = legged(noisy(2), 13, parallel=True)
-    with refusal("case=1 point=13", "comparator.parallel"):
+    with refusal("case=1 point=13", "comparators.parallel"):
         calibrate(session, QUICK)
     session, _ = legged(noisy(2), 1)
     doubled = replace(
         session.cases[0], legs=np.where(np.arange(len(session.cases[0].legs)) < 1, 0, session.cases[0].legs)
     )
-    with refusal("comparator.legs-mixed point=1"):
+    with refusal("comparators.legs-mixed point=1"):
         reduce_legs(doubled)
 
 
 def test_a_case_in_another_unit_is_an_error():
     session = noisy(4)
     other = replace(session.cases[0], xy_um=session.cases[0].xy_um / 1000)
-    with refusal("comparator.scale case=1 scale=999.99"):
+    with refusal("comparators.scale case=1 scale=999.99"):
         calibrate(replace(session, cases=(other, *session.cases[1:])), QUICK)
 
 
@@ -566,8 +566,8 @@ def test_arrays_are_checked():
     xy = case.xy_um.copy()
     xy[7, 1] = np.nan
     for wrong, words in (
-        (replace(case, xy_um=xy), "error.at what=comparator.point case=1 point=2"),
-        (replace(case, points=case.points[:-1]), "comparator.lengths case=1"),
+        (replace(case, xy_um=xy), "error.at what=comparators.point case=1 point=2"),
+        (replace(case, points=case.points[:-1]), "comparators.lengths case=1"),
         (replace(case, plate=9), "error.unknown kind=plate name=9 names=['1']"),
     ):
         with refusal(words):
@@ -585,7 +585,7 @@ def test_a_blunder_is_remarked_on():
     xy[case.points == 9] += [12.0, 0.0]
     spoilt = replace(session, cases=(*session.cases[:2], replace(case, xy_um=xy), session.cases[3]))
     (message,) = calibrate(spoilt, Options(joint=False)).messages
-    assert (message.code, message.phrase.fields["point"]) == ("comparator.outlier", 9)
+    assert (message.code, message.phrase.fields["point"]) == ("comparators.outlier", 9)
 
 
 def test_the_printed_data_are_complete():

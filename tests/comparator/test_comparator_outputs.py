@@ -316,7 +316,7 @@ def test_feature_21_negative_differences_are_said():
     calibration = calibrate(noisy(1, grid=Grid.square(sigma_um=5.0)), QUICK)
     assert calibration.variance.negative == ("random",)
     assert calibration.variance.random == 0.0
-    assert "comparator.negative name=random" in map(described, calibration.messages)
+    assert "comparators.negative name=random" in map(described, calibration.messages)
 
 
 def test_feature_21_nanometres_of_the_listing():
@@ -584,21 +584,21 @@ def test_missing_points():
     calibration = calibrate(session)
     assert calibration.plates[1].averages.counts.tolist().count(3) == 3
     assert [case.placed.orientation.nearest_point for case in calibration.cases] == [1, 21, 25, 5]
-    assert "comparator.missing case=3 n=3 count=25 plate=1" in map(described, calibration.messages)
+    assert "comparators.missing case=3 n=3 count=25 plate=1" in map(described, calibration.messages)
     assert calibration.linear.degrees_of_freedom == 2 * 97 - 15
 
 
 def test_a_plate_of_unknown_accuracy_that_lies_one_way_is_held_fixed():
     calibration = calibrate(noisy(3, grid=Grid.square(), cases=1))
     assert calibration.joint.plates[1].sigma_um == 0.0
-    assert "comparator.fixed-grid plate=1" in map(described, calibration.messages)
+    assert "comparators.fixed-grid plate=1" in map(described, calibration.messages)
 
 
 def test_what_the_joint_adjustment_cannot_do_is_said(full, monkeypatch):
     from photogram.comparator import calibration as module
 
     def fail(*_arguments, **_options):
-        raise AdjustmentError(phrase("comparator.not-converged"))
+        raise AdjustmentError(phrase("comparators.not-converged"))
 
     session = noisy(3)
     real = module.adjust_jointly
@@ -606,7 +606,7 @@ def test_what_the_joint_adjustment_cannot_do_is_said(full, monkeypatch):
     monkeypatch.setattr(module, "adjust_jointly", lambda *a, **k: next(calls)(*a, **k))
     calibration = calibrate(session)
     assert calibration.joint is None
-    assert "comparator.not-converged" in map(described, calibration.messages)
+    assert "comparators.not-converged" in map(described, calibration.messages)
 
 
 def test_measurements_without_any_error():

@@ -161,17 +161,17 @@ def test_the_command_names_a_step_and_writes_the_grid(run, tmp_path):
 
 def test_what_cannot_be_compared_is_refused(tmp_path):
     first, second = year(0), year(1)
-    with refusal("comparator.same first=calibration 1 second=calibration 2"):
+    with refusal("comparators.same first=calibration 1 second=calibration 2"):
         compare([first, first])
     quick = calibrate(first.session, QUICK)
-    with refusal("comparator.no-joint"):
+    with refusal("comparators.no-joint"):
         compare([first, quick])
     undated = calibrate(replace(second.session, date="last spring"))
-    with refusal("comparator.date date=last spring"):
+    with refusal("comparators.date date=last spring"):
         compare([first, undated])
     moved = replace(GRID, xy_um=GRID.xy_um + np.array([0.01, 0.0]))
     other = calibrate(replace(second.session, grids={7: moved}))
-    with refusal("comparator.other-grid name=calibration 2 plate=7"):
+    with refusal("comparators.other-grid name=calibration 2 plate=7"):
         compare([first, other])
     for text in ("{}", "[1]", "nonsense", '{"joint": {"correction": 1}}'):
         (tmp_path / "bad.json").write_text(text)
@@ -184,7 +184,7 @@ def test_dates_are_those_of_the_report_or_of_today():
     assert day_of("1/2/2024").isoformat() == "2024-01-02"
     assert day_of(" 2024-02-29 ").isoformat() == "2024-02-29"
     for text in ("", "17.7.1972", "2023-02-29", "13/1/72"):
-        with refusal("comparator.date", text):
+        with refusal("comparators.date", text):
             day_of(text)
 
 

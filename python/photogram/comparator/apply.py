@@ -52,7 +52,7 @@ def correct_table(
             values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
     if not np.isfinite(values).all():
         place = table.records.records[int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])]
-        raise place.error(phrase("comparator.infinite"))
+        raise place.error(phrase("comparators.infinite"))
     reach = correction.reach(readings)
     remarks = _outside(correction, table, readings, reach, extrapolate=extrapolate)
     in_range = ["" if np.isnan(far) else "yes" if far <= 1 + ROUNDING else "no" for far in reach.tolist()]
@@ -74,7 +74,7 @@ def _outside(
 ) -> list[Message]:
     """Return a remark on places outside the calibrated range; refuse those far outside."""
     if np.isnan(reach).all():
-        return [Message(phrase("comparator.unknown-range"))]
+        return [Message(phrase("comparators.unknown-range"))]
     outside = int((reach > 1 + ROUNDING).sum())
     if not outside:
         return []
@@ -84,5 +84,5 @@ def _outside(
     farthest = {"x": x, "y": y, "reach": float(reach[worst])}
     farthest["range"] = f" ({identity.range_text})" if identity else ""
     if reach[worst] > EDGE and not extrapolate:
-        raise place.error(phrase("comparator.far-outside", limit=EDGE, **farthest))
-    return [place.message(phrase("comparator.outside", n=outside, count=len(reach), **farthest))]
+        raise place.error(phrase("comparators.far-outside", limit=EDGE, **farthest))
+    return [place.message(phrase("comparators.outside", n=outside, count=len(reach), **farthest))]

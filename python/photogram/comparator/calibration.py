@@ -276,14 +276,14 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
         try:
             nonlinear = combine_polynomial(placed, linear, as_listed=listed)
         except AdjustmentError as error:
-            what = phrase("comparator.combined")
-            messages.append(Message(phrase("comparator.no-polynomials", what=what, reason=error.phrase)))
+            what = phrase("comparators.combined")
+            messages.append(Message(phrase("comparators.no-polynomials", what=what, reason=error.phrase)))
     pointing = _pointing(cases, options)
     averages = _averages(session, cases, linear, nonlinear)
     grid_um = _grid_sigma(session, averages["nonlinear" if nonlinear else "linear"], options)
     free, truncated = [case.free for case in cases], options.nanometres == "truncated"
     variance = analyse_variance(free, linear, nonlinear, pointing.total, grid_um, as_listed=truncated)
-    messages += [Message(phrase("comparator.negative", name=name)) for name in variance.negative]
+    messages += [Message(phrase("comparators.negative", name=name)) for name in variance.negative]
     messages += plate_remarks(session, placed)
     joint = None
     if options.joint:
@@ -319,7 +319,7 @@ def _case(case: Case, grid: Grid, options: Options, messages: list[Message]) -> 
     messages += remarks + more
     points = placed.points, placed.means_um, placed.grid_um
     free = fit_rigid(*points, as_listed=options.free_residuals == "report")
-    name, polynomial = phrase("comparator.case", case=case.number), None
+    name, polynomial = phrase("comparators.case", case=case.number), None
     try:
         linear = fit_affine(*points)
     except AdjustmentError as error:
@@ -329,7 +329,7 @@ def _case(case: Case, grid: Grid, options: Options, messages: list[Message]) -> 
         try:
             polynomial = single_polynomial(placed, linear, as_listed=listed)
         except AdjustmentError as error:
-            messages.append(Message(phrase("comparator.no-polynomials", what=name, reason=error.phrase)))
+            messages.append(Message(phrase("comparators.no-polynomials", what=name, reason=error.phrase)))
     return CaseResult(placed, closeouts, free, linear, polynomial)
 
 
@@ -339,7 +339,7 @@ def _check_handedness(session: Session, cases: Sequence[CaseResult]) -> None:
     if specified is None or any(case.placed.orientation.left_handed == specified for case in cases):
         return
     fields = {"case": cases[0].number, "measured": hands[not specified], "specified": hands[specified]}
-    raise cases[0].placed.case.place.error(phrase("comparator.hand", **fields))
+    raise cases[0].placed.case.place.error(phrase("comparators.hand", **fields))
 
 
 def _pointing(cases: Sequence[CaseResult], options: Options) -> Pointing:
@@ -416,7 +416,7 @@ def _joint(
         if options.estimate_grid and len(turns) > 1:
             grid[plate] = None
         elif grid[plate] is None and len(turns) < 2:
-            messages.append(Message(phrase("comparator.fixed-grid", plate=plate)))
+            messages.append(Message(phrase("comparators.fixed-grid", plate=plate)))
             grid[plate] = 0.0
     try:
         joint = adjust_jointly(placed, session.grids, linear, Weights(grid, known), polynomial=polynomial)

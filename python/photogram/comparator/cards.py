@@ -145,7 +145,7 @@ def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
     if len(digits) == 5 and digits.endswith("0"):
         digits = digits[:-1]
     if not (digits.isascii() and digits.isdigit()):
-        raise _refusal(record, *columns, phrase("comparator.plate-case", value=text))
+        raise _refusal(record, *columns, phrase("comparators.plate-case", value=text))
     return int(digits[:-2] or 0), int(digits[-2:])
 
 
@@ -169,7 +169,7 @@ class _Deck:
         master = special or built_in_grid(BUILT_IN[min(header.master, 2)])
         self.grids = {grid.number: grid for grid in [*grids] or [master]}
         if special is not None:
-            self.messages.append(first.message(phrase("comparator.special-grid", plate=special.number)))
+            self.messages.append(first.message(phrase("comparators.special-grid", plate=special.number)))
 
     def _special_grid(self) -> Grid:
         """Read the cards of a special grid; a mark in column 80 is on the last one."""
@@ -180,7 +180,7 @@ class _Deck:
             if not card.blank(80, 80):
                 number = 1000 * self.header.operators[18] + self.header.operators[19]
                 return Grid(number, np.array(points), np.array(xy))
-        raise self.first.error(phrase("comparator.grid-end"))
+        raise self.first.error(phrase("comparators.grid-end"))
 
     def session(self) -> Session:
         if self.header.skip_card:
@@ -192,7 +192,7 @@ class _Deck:
                 break
             reading = self._reading(card, layout)
             if reading.xy_um == (0.0, 0.0):
-                self.messages.append(card.message(phrase("comparator.zero-readings", point=reading.point)))
+                self.messages.append(card.message(phrase("comparators.zero-readings", point=reading.point)))
             else:
                 readings.append(reading)
         session = Session(
@@ -210,7 +210,7 @@ class _Deck:
             messages=self.messages,
         )
         if not session.cases:
-            raise self.first.error(phrase("comparator.empty-deck"))
+            raise self.first.error(phrase("comparators.empty-deck"))
         session.check()
         return session
 
@@ -274,7 +274,7 @@ def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | No
         session = _Deck(cards, header, first, list(grids)).session()
         sessions.append(session if left_handed is None else replace(session, left_handed=left_handed))
     if not sessions:
-        raise InputError(phrase("comparator.no-deck"), file=path)
+        raise InputError(phrase("comparators.no-deck"), file=path)
     return sessions
 
 
@@ -288,7 +288,7 @@ def to_cards(session: Session) -> bytes:
     """
     number = next(iter(session.grids))
     if len(session.grids) != 1 or number not in BUILT_IN:
-        raise InputError(phrase("comparator.deck-grid"))
+        raise InputError(phrase("comparators.deck-grid"))
     operators = {case.number: case.operator for case in session.cases}
     for case_number in operators:
         check_number(Place(), "case", case_number, 1, CASES)

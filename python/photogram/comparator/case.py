@@ -65,7 +65,7 @@ def detect_orientation(grid: Grid, points: Indices, xy_um: Floats) -> Orientatio
     centred = plate - plate.mean(axis=0)
     matrix, _, rank, _ = np.linalg.lstsq(centred, xy_um - xy_um.mean(axis=0), rcond=1e-6)
     if rank < 2:
-        raise InputError(phrase("comparator.collinear"))
+        raise InputError(phrase("comparators.collinear"))
     low, high = grid.xy_um.min(axis=0), grid.xy_um.max(axis=0)
     middle, quarter = (low + high) / 2, (high - low) / 4
 
@@ -121,7 +121,7 @@ def intersect_legs(legs_um: Floats) -> Floats:
     # Solve first + s along = second + t across for s (Cramer).
     determinant = along[1] * across[0] - along[0] * across[1]
     if abs(determinant) <= PARALLEL * float(np.hypot(*along) * np.hypot(*across)):
-        raise InputError(phrase("comparator.parallel"))
+        raise InputError(phrase("comparators.parallel"))
     gap = second - first
     meeting: Floats = first + (gap[1] * across[0] - gap[0] * across[1]) / determinant * along
     return meeting
@@ -143,16 +143,16 @@ def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
         rows = on_legs[own_rows]
         place = case.places[rows[0]]
         if point in on_intersections:
-            raise place.error(phrase("comparator.legs-mixed", point=point))
+            raise place.error(phrase("comparators.legs-mixed", point=point))
         legs = [rows[case.legs[rows] == leg] for leg in LEGS]
         present = sum(len(leg) > 0 for leg in legs)
         if present < len(LEGS):
-            messages.append(place.message(phrase("comparator.legs", point=point, present=present)))
+            messages.append(place.message(phrase("comparators.legs", point=point, present=present)))
             continue
         try:
             xy_um[rows[0]] = intersect_legs(np.array([case.xy_um[leg].mean(axis=0) for leg in legs]))
         except InputError as error:
-            name = phrase("comparator.point", case=case.number, point=point)
+            name = phrase("comparators.point", case=case.number, point=point)
             raise place.error(phrase("error.at", what=name, message=error.phrase)) from None
         keep[rows[0]] = True
         reduced.add(point)
@@ -196,10 +196,10 @@ class PlacedCase:
 
 def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[PlacedCase, list[Message]]:
     """Reduce legs, group readings (as the listing if `as_listed`), form means, and detect the orientation."""
-    name = phrase("comparator.case", case=case.number)
+    name = phrase("comparators.case", case=case.number)
     reduced, from_legs, messages = reduce_legs(case)
     if (count := len(np.unique(reduced.points))) < 3:
-        too_few = phrase("comparator.few-points", count=count, least=LEAST_POINTS)
+        too_few = phrase("comparators.few-points", count=count, least=LEAST_POINTS)
         raise case.place.error(phrase("error.at", what=name, message=too_few))
     order = (group_as_listed if as_listed else group)(reduced.points)
     readings = read_points(reduced.points[order], reduced.xy_um[order])
@@ -224,7 +224,7 @@ def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[Plac
     spread, extent = (np.linalg.norm(xy - xy.mean(axis=0)) for xy in (means, placed.grid_um))
     if not SCALES[0] < extent / spread < SCALES[1]:
         scale = float(extent / spread)
-        raise case.place.error(phrase("comparator.scale", case=case.number, scale=scale))
+        raise case.place.error(phrase("comparators.scale", case=case.number, scale=scale))
     return placed, messages
 
 
@@ -235,7 +235,7 @@ def _identical(case: Case, readings: list[PointReadings]) -> list[Message]:
         return []
     place = case.places[int(np.flatnonzero(case.points == points[0])[0])]
     names = ", ".join(map(str, points))
-    return [place.message(phrase("comparator.identical", case=case.number, points=names))]
+    return [place.message(phrase("comparators.identical", case=case.number, points=names))]
 
 
 def _refuse_equal_places(case: Case, points: Indices, means: Floats) -> None:
@@ -245,4 +245,4 @@ def _refuse_equal_places(case: Case, points: Indices, means: Floats) -> None:
         equal = points[(means == at).all(axis=1)].tolist()
         place = case.places[int(np.flatnonzero(case.points == equal[1])[0])]
         fields = {"case": case.number, "first": equal[0], "second": equal[1]}
-        raise place.error(phrase("comparator.equal-points", **fields))
+        raise place.error(phrase("comparators.equal-points", **fields))

@@ -60,7 +60,7 @@ def close_out(case: Case) -> tuple[list[Closeout], list[Message]]:
         closeouts.append(second)
     if len(closeouts[0].counts) < 2 and len(case.points) <= FEW_READINGS:
         fields = {"case": case.number, "count": len(case.points), "point": first}
-        raise case.place.error(phrase("comparator.not-closed", **fields))
+        raise case.place.error(phrase("comparators.not-closed", **fields))
     return closeouts, [case.place.message(remark) for remark in _remarks(case.number, closeouts)]
 
 
@@ -74,12 +74,12 @@ def _visits(case: Case, point: int) -> Closeout:
 def _remarks(case: int, closeouts: list[Closeout]) -> Iterator[Phrase]:
     first = closeouts[0]
     if first.verdict == "none":
-        yield phrase("comparator.no-closeout", case=case, point=first.point)
+        yield phrase("comparators.no-closeout", case=case, point=first.point)
     elif (count := first.counts[-1]) < ENOUGH:
         fields = {"case": case, "point": first.point, "count": count}
-        yield phrase("comparator.short-closeout", least=ENOUGH, **fields)
-    suspect = "comparator.shifted" if len(closeouts) > 1 else "comparator.shifted-first"
-    codes = {"remeasure": "comparator.moved", "suspect": suspect}
+        yield phrase("comparators.short-closeout", least=ENOUGH, **fields)
+    suspect = "comparators.shifted" if len(closeouts) > 1 else "comparators.shifted-first"
+    codes = {"remeasure": "comparators.moved", "suspect": suspect}
     for closeout in closeouts:
         if closeout.verdict in codes:
             shift = float(np.abs(closeout.means_um - closeout.means_um[0]).max())

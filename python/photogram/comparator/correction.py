@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from photogram.arguments.arrays import is_covariance
+from photogram.arguments.arrays import argument_error, is_covariance
 from photogram.arguments.types import Floats
 from photogram.comparator.polynomial import Frame, Polynomial, design
 from photogram.comparator.readings import Session
@@ -89,7 +89,7 @@ class Identity:
         """
         numbers = np.array([document["low_um"], document["high_um"]], dtype=float)
         if numbers.shape != (2, 2) or not (numbers[0] < numbers[1]).all():
-            raise InputError(phrase("comparator.range"))
+            raise InputError(phrase("comparators.range"))
         low, high = ((float(x), float(y)) for x, y in numbers)
         temperature = document["temperature_c"]
         return cls(
@@ -141,17 +141,17 @@ class Correction:
     def __post_init__(self) -> None:
         for name in ("scale_x", "scale_y"):
             if not 0 < (value := getattr(self, name)) < math.inf:
-                raise _refusal(name, "error.positive", value)
+                raise argument_error(name, "positive", value=value)
         if not abs(self.nonorthogonality_rad) < math.pi / 2:
             angles = {"low": -math.pi / 2, "high": math.pi / 2}
-            raise _refusal("nonorthogonality_rad", "error.range", self.nonorthogonality_rad, **angles)
+            raise argument_error("nonorthogonality_rad", "range", value=self.nonorthogonality_rad, **angles)
         if self.polynomial is not None:
             for value in (*self.polynomial.frame.centre_um, *self.polynomial.scaled_um.ravel().tolist()):
                 if not math.isfinite(value):
-                    raise _refusal("polynomial", "error.finite", value)
+                    raise argument_error("polynomial", "finite", value=value)
             for half in self.polynomial.frame.half_range_um:
                 if not 0 < half < math.inf:
-                    raise _refusal("half_range_um", "error.positive", half)
+                    raise argument_error("half_range_um", "positive", value=half)
         if self.covariance.shape != 2 * (PARAMETERS,) or not is_covariance(self.covariance, singular=True):
             raise InputError(phrase("error.covariance-singular"))
 
@@ -206,7 +206,7 @@ class Correction:
                     linear = self._before_polynomial(self.polynomial, linear)
                 readings = np.linalg.solve(self.matrix, linear.T).T
         except np.linalg.LinAlgError:
-            raise InputError(phrase("comparator.singular")) from None
+            raise InputError(phrase("comparators.singular")) from None
         return np.asarray(readings)
 
     @staticmethod
@@ -220,7 +220,7 @@ class Correction:
             # Rounding of coordinates of a metre is 1e-10 um.
             if np.abs(step).max(initial=0.0) < 1e-8:
                 return place
-        raise InputError(phrase("comparator.no-inverse"))
+        raise InputError(phrase("comparators.no-inverse"))
 
     def covariance_of(self, xy_um: Floats, measured_um2: Floats | None = None) -> Floats:
         """Return the covariance of corrected readings (n, 2, 2) in um^2.
@@ -345,12 +345,8 @@ class Correction:
         with json.holding("correction of a comparator", path):
             document = orjson.loads(read_bytes(path))
             if document.get("usable") is False:
-                raise InputError(phrase("comparator.withheld"))
+                raise InputError(phrase("comparators.withheld"))
             return cls.from_document(document.get("correction", document))
-
-
-def _refusal(what: str, code: str, value: float, **fields: float) -> InputError:
-    return InputError(phrase("error.at", what=what, message=phrase(code, value=value, **fields)))
 
 
 def parameters_of(correction: Correction) -> Floats:
@@ -383,9 +379,9 @@ def _deviations(camera: Camera) -> dict[str, float]:
     deviations = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
     affine = ("b1", "b2", "r0")
     if camera.model != "brown" or camera.unit != "mm" or any(camera.parameters[name] for name in affine):
-        raise InputError(phrase("comparator.camera", camera=camera.title))
+        raise InputError(phrase("comparators.camera", camera=camera.title))
     if deviations["b1"] or deviations["b2"]:
-        raise InputError(phrase("comparator.camera-free", camera=camera.title))
+        raise InputError(phrase("comparators.camera-free", camera=camera.title))
     return {name: deviations[name] for name in camera.names if name not in affine}
 
 

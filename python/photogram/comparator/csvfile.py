@@ -58,7 +58,7 @@ class Table:
         if x is None and y is None:
             return None
         if x is None or y is None:
-            raise row.place.error(phrase("comparator.coordinate"))
+            raise row.place.error(phrase("comparators.coordinate"))
         factor = MICROMETRES[self.unit]
         return x * factor, y * factor
 
@@ -80,5 +80,5 @@ def read_table(path: Path, *columns: str, keys: Collection[str] | None = None) -
             settings[name] = Setting(name, value.strip(), place)
     units = [{unit for unit in MICROMETRES if f"{axis}_{unit}" in records.columns} for axis in "xy"]
     if units[0] != units[1] or len(units[0]) != 1:
-        raise records.head.error(phrase("comparator.units"))
+        raise records.head.error(phrase("comparators.units"))
     return Table(records, settings, units[0].pop())

@@ -28,9 +28,9 @@ def comparator_findings(calibration: Calibration) -> Findings:
 
     def name(index: tuple[int, ...]) -> Phrase:
         case, point, axis = places[index[0]]
-        return phrase("comparator.axis", axis=axis, point=point, case=case)
+        return phrase("comparators.axis", axis=axis, point=point, case=case)
 
-    values, kind = np.vstack(screening.ratios).ravel(), phrase("comparator.readings")
+    values, kind = np.vstack(screening.ratios).ravel(), phrase("comparators.readings")
     readings = Tested(kind, values, name, "t", second=max(screening.freedom - 1, 1))
     tests = calibration.pointing_tests
     rows = [(each.case, row, axis) for each in tests for row in range(len(each.ratios)) for axis in "xy"]
@@ -38,12 +38,12 @@ def comparator_findings(calibration: Calibration) -> Findings:
     def pointing(index: tuple[int, ...]) -> Phrase:
         case, row, axis = rows[index[0]]
         fields = {"axis": axis, "pointing": row + 1, "point": int(case.points[row]), "case": case.number}
-        return phrase("comparator.pointing", **fields)
+        return phrase("comparators.pointing", **fields)
 
     ratios = np.concatenate([each.ratios.ravel() for each in tests])
     freedom = np.repeat([each.freedom for each in tests], [each.ratios.size for each in tests])
     pointings = Tested(
-        phrase("comparator.pointings"), ratios, pointing, "t", second=np.maximum(freedom - 1.0, 1.0)
+        phrase("comparators.pointings"), ratios, pointing, "t", second=np.maximum(freedom - 1.0, 1.0)
     )
     return Findings(
         status="converged",

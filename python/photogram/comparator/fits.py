@@ -190,16 +190,16 @@ def fit_affine(points: Indices, xy_um: Floats, grid_um: Floats) -> AffineFit:
     normal equations. Measured and grid coordinates (n, 2) have the same handedness.
     """
     if len(points) < LEAST_POINTS:
-        raise AdjustmentError(phrase("comparator.few-points", count=len(points), least=LEAST_POINTS))
+        raise AdjustmentError(phrase("comparators.few-points", count=len(points), least=LEAST_POINTS))
     middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
     centred = grid_um - grid_middle
     q, r = np.linalg.qr(centred)
     if np.abs(np.diag(r)).min() <= 1e-6 * np.abs(r).max():
-        raise AdjustmentError(phrase("comparator.collinear"))
+        raise AdjustmentError(phrase("comparators.collinear"))
     inverse = np.linalg.inv(r)
     coefficients = (inverse @ (q.T @ (xy_um - middle))).T
     if np.linalg.det(coefficients) <= 0:
-        raise AdjustmentError(phrase("comparator.handedness"))
+        raise AdjustmentError(phrase("comparators.handedness"))
     computed = centred @ coefficients.T + middle
     comparator = computed - xy_um
     # Grid residuals V = -A^-1 v.

@@ -64,7 +64,7 @@ class Grid(Brief):
         if (counts > 1).any():
             self._refuse("points", "error.repeated", kind="point", name=str(values[counts > 1][0]))
         if self.xy_um.shape != (*np.shape(self.points)[:1], 2) or not np.isfinite(self.xy_um).all():
-            self._refuse("xy_um", "comparator.grid-shape")
+            self._refuse("xy_um", "comparators.grid-shape")
         if self.sigma_um is not None and not 0 <= self.sigma_um < np.inf:
             self._refuse("sigma_um", "error.not-negative", value=self.sigma_um)
         if self.expansion_per_k is not None and not abs(self.expansion_per_k) < MOST_EXPANSION:
@@ -73,7 +73,7 @@ class Grid(Brief):
 
     def _refuse(self, field: str, code: str, **fields: object) -> NoReturn:
         message = phrase("error.at", what=field, message=phrase(code, **fields))
-        plate = phrase("comparator.plate", plate=self.number)
+        plate = phrase("comparators.plate", plate=self.number)
         raise InputError(phrase("error.at", what=plate, message=message), file=self.source)
 
     @classmethod

@@ -190,9 +190,9 @@ class _Problem:
                 max_iterations=50,
             )
         except _photocore.ComparatorError as error:
-            raise AdjustmentError(phrase("comparator.joint", reason=error.args[0])) from None
+            raise AdjustmentError(phrase("comparators.joint", reason=error.args[0])) from None
         if not self.solution.converged:
-            raise AdjustmentError(phrase("comparator.not-converged"))
+            raise AdjustmentError(phrase("comparators.not-converged"))
 
     def random(self) -> float:
         """Estimate the standard deviation of the comparator: weighted squares equal their redundancy."""

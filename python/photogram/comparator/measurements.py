@@ -45,13 +45,13 @@ def read(
     """
     files = [Path(path) for path in paths]
     if not files:
-        raise InputError(phrase("comparator.files"))
+        raise InputError(phrase("comparators.files"))
     tables = [path for path in files if path.suffix.lower() == ".csv"]
     plates = list(grids)
     if not tables:
         return [session for path in files for session in read_cards(path, plates, left_handed=left_handed)]
     if len(tables) < len(files):
-        raise InputError(phrase("comparator.mixed-files"), file=tables[0])
+        raise InputError(phrase("comparators.mixed-files"), file=tables[0])
     return [read_csv(tables, plates, left_handed=left_handed)]
 
 
@@ -83,13 +83,13 @@ def read_csv(
         set one thing differently.
     """
     if not paths:
-        raise InputError(phrase("comparator.files"))
+        raise InputError(phrase("comparators.files"))
     tables = [read_table(path, "case", "point", keys=KEYS) for path in paths]
     plates = {grid.number: grid for grid in grids}
     if not plates:
         plates = {grid.number: grid for table in tables for grid in _named_grids(table)}
     if not plates:
-        raise InputError(phrase("comparator.no-grid"), file=paths[0])
+        raise InputError(phrase("comparators.no-grid"), file=paths[0])
     only_plate = next(iter(plates)) if len(plates) == 1 else 0
     cases = collect_cases(
         _reading(row, xy, only_plate)
@@ -118,7 +118,7 @@ def _one(tables: Sequence[Table], key: str, value_of: Callable[[Setting], T]) ->
     for setting, value in zip(settings, values, strict=True):
         if value != values[0]:
             fields = {"key": key, "value": setting.text, "other": settings[0].text}
-            raise setting.place.error(phrase("comparator.contradiction", **fields))
+            raise setting.place.error(phrase("comparators.contradiction", **fields))
     return values[0] if values else None
 
 

@@ -260,10 +260,10 @@ def problems(
     messages = []
     if screening.harmful:
         fields = {"change": screening.change_um, "sd": screening.sigma_um}
-        messages.append(Message(phrase("comparator.harm", **fields)))
+        messages.append(Message(phrase("comparators.harm", **fields)))
     for plate, result in joint.plates.items() if joint else ():
         if result.test and (reason := result.test.problem()):
-            text = phrase("comparator.grid-test", plate=plate, sd=result.sigma_um, reason=reason)
+            text = phrase("comparators.grid-test", plate=plate, sd=result.sigma_um, reason=reason)
             messages.append(Message(text))
     places = {
         (case.number, point): place
@@ -274,9 +274,9 @@ def problems(
     numbers = {case.number: case for case in session.cases}
     for pointing in _largest(far):
         fields = members(pointing, "case", "point", "ratio", "limit")
-        text = phrase("comparator.far-pointing", distance=abs(pointing.deviation_um), **fields)
+        text = phrase("comparators.far-pointing", distance=abs(pointing.deviation_um), **fields)
         messages.append(numbers[pointing.case].places[pointing.row].message(text))
-    return messages + _more(len(far), "comparator.more-pointings")
+    return messages + _more(len(far), "comparators.more-pointings")
 
 
 def _outliers(
@@ -299,13 +299,13 @@ def _outliers(
         instead = {outlier.instead for outlier in outliers}
         code = "wrong-point" if len(instead) > 1 or None in instead else "exchanged"
         fields = {"plate": plate, "point": point, "instead": instead.pop()}
-        messages.append(Message(phrase(f"comparator.{code}", **fields)))
+        messages.append(Message(phrase(f"comparators.{code}", **fields)))
     for outlier in _largest(single):
         code = "outlier" if outlier.instead is None else "outlier-exchanged"
         fields = members(outlier, "case", "point", "ratio", "instead", distance="distance_um")
-        text = phrase(f"comparator.{code}", limit=screening.limit, **fields)
+        text = phrase(f"comparators.{code}", limit=screening.limit, **fields)
         messages.append(places[outlier.case, outlier.point].message(text))
-    return messages + _more(len(single), "comparator.more-outliers")
+    return messages + _more(len(single), "comparators.more-outliers")
 
 
 def _largest(outliers: Sequence[Found]) -> list[Found]:
@@ -327,7 +327,7 @@ def plate_remarks(session: Session, cases: Sequence[PlacedCase]) -> list[Message
         if len({corners.count(corner) for corner in range(1, 5)}) > 1 or any(missing.values()):
             remarks.append(Message.of("comparator.rotations", plate=str(plate)))
         remarks += [
-            Message(phrase("comparator.missing", case=case, n=points, count=count, plate=plate))
+            Message(phrase("comparators.missing", case=case, n=points, count=count, plate=plate))
             for case, points in missing.items()
             if points
         ]

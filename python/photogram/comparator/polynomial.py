@@ -120,11 +120,11 @@ class Polynomial:
 def fit_polynomial(xy_um: Floats, residuals_um: Floats) -> Polynomial:
     """Fit both polynomials to the residuals (n, 2) that the linear adjustment left at places (n, 2)."""
     if len(xy_um) <= COUNT:
-        raise AdjustmentError(phrase("comparator.few-points", count=len(xy_um), least=COUNT + 1))
+        raise AdjustmentError(phrase("comparators.few-points", count=len(xy_um), least=COUNT + 1))
     frame = Frame.of(xy_um)
     q, r = np.linalg.qr(design(frame, xy_um))
     if np.abs(np.diag(r)).min() < 1e-9 * np.abs(r).max():
-        raise AdjustmentError(phrase("comparator.few-coordinates"))
+        raise AdjustmentError(phrase("comparators.few-coordinates"))
     inverse = np.linalg.inv(r)
     cofactors = np.kron(np.eye(2), inverse @ inverse.T)
     return Polynomial(frame, np.asarray((inverse @ (q.T @ residuals_um)).T), cofactors)

@@ -94,7 +94,7 @@ class Case:
             The first reading at fault, with its place.
         """
         if not len(self.points) == len(self.legs) == len(self.xy_um) == len(self.places):
-            raise InputError(phrase("comparator.lengths", case=self.number))
+            raise InputError(phrase("comparators.lengths", case=self.number))
         largest = np.abs(self.xy_um).max(axis=1, initial=0.0)
         for code, bad in (
             ("error.finite", ~np.isfinite(largest)),
@@ -102,14 +102,14 @@ class Case:
         ):
             if bad.any():
                 at = int(np.argmax(bad))
-                name = phrase("comparator.point", case=self.number, point=int(self.points[at]))
+                name = phrase("comparators.point", case=self.number, point=int(self.points[at]))
                 message = phrase(code, value=float(largest[at]), high=LARGEST_UM)
                 raise self.places[at].error(phrase("error.at", what=name, message=message))
         known = np.isin(self.points, grid.points)
         if not known.all():
             at = int(np.argmin(known))
             fields = {"plate": grid.number, "point": int(self.points[at])}
-            raise self.places[at].error(phrase("comparator.no-point", **fields))
+            raise self.places[at].error(phrase("comparators.no-point", **fields))
         rows = np.flatnonzero(self.legs == 0)
         _, group = np.unique(self.points[rows], return_inverse=True)
         away = np.abs(self.xy_um[rows] - _medians(group, self.xy_um[rows])[group]).max(axis=1)
@@ -117,7 +117,7 @@ class Case:
             at = int(rows[away.argmax()])
             fields = {"case": self.number, "point": int(self.points[at])}
             raise self.places[at].error(
-                phrase("comparator.far-reading", distance=float(away.max()), **fields)
+                phrase("comparators.far-reading", distance=float(away.max()), **fields)
             )
 
 
@@ -210,7 +210,7 @@ class Session(Brief):
                 missing = (
                     "temperature_c of the measurements" if known else "its temperature_c or expansion_per_k"
                 )
-                remarks.append(Message(phrase("comparator.expansion", plate=number, missing=missing)))
+                remarks.append(Message(phrase("comparators.expansion", plate=number, missing=missing)))
         return replace(self, grids=grids, messages=[*self.messages, *remarks])
 
     def check(self) -> None:
@@ -235,7 +235,7 @@ class Session(Brief):
 def _repeated(case: int, first: Place) -> Phrase:
     if first.record is None:
         return phrase("error.repeated", kind="case", name=str(case))
-    return phrase("comparator.repeated-case", case=case, record=first.record, file=str(first.file))
+    return phrase("comparators.repeated-case", case=case, record=first.record, file=str(first.file))
 
 
 def collect_cases(readings: Iterable[Reading]) -> tuple[Case, ...]:
@@ -258,7 +258,7 @@ def collect_cases(readings: Iterable[Reading]) -> tuple[Case, ...]:
             before, now = getattr(run[0], what), getattr(reading, what)
             if before != now:
                 fields = {"case": reading.case, "what": what, "first": before, "second": now}
-                raise reading.place.error(phrase("comparator.changes", **fields))
+                raise reading.place.error(phrase("comparators.changes", **fields))
         if reading is not run[0]:
             run.append(reading)
     return tuple(

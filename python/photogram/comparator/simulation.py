@@ -96,7 +96,7 @@ def simulate_calibration(
         No operator, a rotation that is infinite, a negative seed, errors of another shape.
     """
     if not operators or not math.isfinite(rotation_rad) or seed < 0:
-        raise InputError(phrase("comparator.simulation"))
+        raise InputError(phrase("comparators.simulation"))
     random = np.random.default_rng(seed)
     drawn = grid_um * random.standard_normal((len(grid.points), 2))
     errors = drawn if grid_errors_um is None else shaped("grid_errors_um", grid_errors_um, drawn.shape)

@@ -58,7 +58,7 @@ def common_range(records: Sequence[RecordedCalibration]) -> Frame:
     low = np.max([each.low_um for each in identities if each], axis=0)
     high = np.min([each.high_um for each in identities if each], axis=0)
     if not (low < high).all():
-        raise InputError(phrase("comparator.no-range", name=records[0].comparator))
+        raise InputError(phrase("comparators.no-range", name=records[0].comparator))
     return Frame.of(np.array([low, high]))
 
 
@@ -235,14 +235,14 @@ def compare(
         else:
             records += RecordedCalibration.read(Path(each))
     if len(records) < 2:
-        raise InputError(phrase("comparator.two"))
+        raise InputError(phrase("comparators.two"))
     records.sort(key=lambda record: record.day)
     for first, second in combinations(records, 2):
         if first.day == second.day and all(
             np.array_equal(case.means_um, other.means_um)
             for case, other in zip(first.cases, second.cases, strict=False)
         ):
-            raise InputError(phrase("comparator.same", first=first.name, second=second.name))
+            raise InputError(phrase("comparators.same", first=first.name, second=second.name))
     together = adjust_together(records)
     corrections = _corrections(records, together)
     histories, ranges = {}, {}

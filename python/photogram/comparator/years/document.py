@@ -81,13 +81,13 @@ def comparison_findings(comparison: Comparison) -> Findings:
 
     def name(index: tuple[int, ...]) -> Phrase:
         record, case, point, axis = places[index[0]]
-        return phrase("comparator.axis-of-record", axis=axis, point=point, case=case, record=record)
+        return phrase("comparators.axis-of-record", axis=axis, point=point, case=case, record=record)
 
     test = comparison.together.test
     wrong = test.problem() is not None
     return Findings(
         status="converged",
-        observations=[Tested(phrase("comparator.all-readings"), values, name, "w")],
+        observations=[Tested(phrase("comparators.all-readings"), values, name, "w")],
         degrees_of_freedom=test.degrees_of_freedom,
         global_test=test,
         spoiled=phrase("harmful.grids") if wrong else "",

@@ -92,7 +92,7 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
     # Every given coordinate is an observation and an unknown.
     test = global_test(squares, count - sum(each.unknowns for each in reduced))
     if test is None:
-        raise AdjustmentError(phrase("comparator.no-redundancy"))
+        raise AdjustmentError(phrase("comparators.no-redundancy"))
     scale = test.variance
     places = {
         plate: slice(2 * starts[plate], 2 * (starts[plate] + len(grid.points)))
@@ -121,7 +121,7 @@ def _grids(records: Sequence[RecordedCalibration]) -> dict[int, Grid]:
             there = np.isin(grid.points, own.points)
             given = own.xy_um[own.rows_of(grid.points[there])] * _growth(own, grid)
             if there.any() and np.abs(given - grid.xy_um[there]).max() > SAME_UM:
-                raise InputError(phrase("comparator.other-grid", name=record.name, plate=plate))
+                raise InputError(phrase("comparators.other-grid", name=record.name, plate=plate))
             points = np.concatenate([own.points, grid.points[~there]])
             more = grid.xy_um[~there] / _growth(own, grid)
             plates[plate] = replace(own, points=points, xy_um=np.vstack([own.xy_um, more]))
@@ -197,7 +197,7 @@ def _inverse(normal: Floats, what: str) -> Floats:
     try:
         root = np.linalg.cholesky(normal / np.outer(scale, scale))
     except np.linalg.LinAlgError:
-        raise AdjustmentError(phrase("comparator.undetermined", what=what)) from None
+        raise AdjustmentError(phrase("comparators.undetermined", what=what)) from None
     inverse = np.linalg.inv(root)
     return np.asarray((inverse.T @ inverse) / np.outer(scale, scale))
 

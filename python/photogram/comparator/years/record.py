@@ -138,18 +138,18 @@ def day_of(text: str) -> date:
     try:
         return date(year, month, day)
     except ValueError:
-        raise InputError(phrase("comparator.date", date=text)) from None
+        raise InputError(phrase("comparators.date", date=text)) from None
 
 
 def _from_document(document: Any, name: str) -> RecordedCalibration:
     if document.get("usable") is False:
-        raise InputError(phrase("comparator.withheld"))
+        raise InputError(phrase("comparators.withheld"))
     joint = document["joint"]
     if joint is None or joint["correction"] is None:
-        raise InputError(phrase("comparator.no-joint"))
+        raise InputError(phrase("comparators.no-joint"))
     correction = Correction.from_document(joint["correction"])
     if correction.identity is None:
-        raise InputError(phrase("comparator.no-identity"))
+        raise InputError(phrase("comparators.no-identity"))
     counts = {(each["case"], each["point"]): each["readings"] for each in document["pointing"]["points"]}
     total = document["pointing"]["total"]
     freedom = int(total["degrees_of_freedom"])
@@ -161,7 +161,7 @@ def _from_document(document: Any, name: str) -> RecordedCalibration:
     cases = tuple(_case(each, placed[each["case"]], counts) for each in document["cases"])
     for case in cases:
         if (missing := np.setdiff1d(case.points, grids[case.plate].points)).size:
-            raise InputError(phrase("comparator.no-point", plate=case.plate, point=int(missing[0])))
+            raise InputError(phrase("comparators.no-point", plate=case.plate, point=int(missing[0])))
     return RecordedCalibration(
         name=name,
         day=day_of(str(document["date"])),
@@ -208,8 +208,8 @@ def _case(members: Any, placed: Any, counts: Mapping[tuple[int, int], int]) -> R
     points = np.array(members["points"], dtype=np.int64)
     means = np.array(members["means_um"], dtype=float)
     if means.shape != (len(points), 2) or not np.isfinite(means).all():
-        name = phrase("comparator.case", case=int(members["case"]))
-        raise InputError(phrase("error.at", what=name, message=phrase("comparator.grid-shape")))
+        name = phrase("comparators.case", case=int(members["case"]))
+        raise InputError(phrase("error.at", what=name, message=phrase("comparators.grid-shape")))
     return RecordedCase(
         number=int(members["case"]),
         operator=int(members["operator"]),
