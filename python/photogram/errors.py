@@ -86,7 +86,7 @@ class InputError(PhotogramError, ValueError):
 
 def message_of(error: Exception) -> str | Phrase:
     """Return the message of an error without its place, as a code with fields if it has one."""
-    message: str | Phrase = getattr(error, "phrase", None) or getattr(error, "message", str(error))
+    message: str | Phrase = getattr(error, "phrase", None) or getattr(error, "message", "") or str(error)
     return message
 
 
