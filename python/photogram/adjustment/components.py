@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.adjustment import adjust, adjusted_again
+from photogram.adjustment.adjustment import adjust, adjusted_again, at_least
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import shown
 from photogram.arguments.types import Floats
@@ -22,6 +22,7 @@ from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Way
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
+from photogram.words import phrase
 
 __all__ = ["Settings", "Weighing", "first_adjusted", "of_grouping", "scaled", "variance_components"]
 
@@ -33,7 +34,13 @@ SHARPER = 1e-2  # Of the tolerance of components, that of the adjustments in sta
 @Way
 def first_adjusted(network: object, *, tolerance: float, threads: int | None) -> AdjustedNetwork:
     """Return an adjustment of a block or a collection that is sharp enough for components."""
-    raise InputError(f"no block or collection: {shown(network)}")
+    raise not_a_network(network)
+
+
+def not_a_network(value: object) -> InputError:
+    """Return the error that an argument is not a block or collection."""
+    kinds = ["a Block", "a Collection"]
+    return InputError(phrase("block.type", name="network", kinds=kinds, value=shown(value)))
 
 
 @first_adjusted.register
@@ -61,7 +68,7 @@ class Weighing:
 @Way
 def scaled(network: Any, grouping: Grouping, factors: Floats) -> Any:
     """Return a block or collection with the variances of (G,) groups multiplied by factors."""
-    raise InputError(f"no block or collection: {shown(network)}")
+    raise not_a_network(network)
 
 
 @scaled.register
@@ -147,9 +154,8 @@ def variance_components(
         As of the adjustment.
     """
     if not 0 < tolerance < 1:
-        raise InputError(f"the tolerance of components is between 0 and 1, not {tolerance:g}")
-    if max_steps < 1:
-        raise InputError("there must be one step at least")
+        raise InputError(phrase("block.between", name="tolerance", low=0, high=1, value=tolerance))
+    at_least("max_steps", max_steps, 1)
     grouping = grouped(observables(network), groups)
     settings = Settings(tolerance, max_steps, least_redundancy, level, equality, probing or Probing())
     return of_grouping(network, grouping, settings, held=held, threads=threads, progress=progress)
@@ -179,7 +185,7 @@ def of_grouping(
     """Estimate the components of groups that are numbered already; see :func:`variance_components`."""
     names = grouping.groups.names
     if unknown := [name for name in held if name not in names]:
-        raise InputError(f"no group is called {shown(unknown[0])}; there are {', '.join(names[:20])}")
+        raise InputError(phrase("weighting.unknown-group", group=unknown[0], groups=list(names)))
     own = Weighing(network, threads=threads, tolerance=min(1e-5, SHARPER * settings.tolerance))
     number = 0
 
@@ -187,7 +193,7 @@ def of_grouping(
         nonlocal number
         result = own.adjust(grouping, factors[:-1]) if number else own.first
         if not np.isfinite(result.redundancy[result.used_images]).all():
-            raise InputError("the network is not determined: there are no redundancy numbers")
+            raise InputError(phrase("weighting.undetermined"))
         if progress is not None:
             progress(number, factors[:-1].copy())
         number += 1
@@ -209,7 +215,7 @@ def of_grouping(
         equality=settings.equality,
     )
     if not any(each.redundancy > 0 for each in found.components):
-        raise InputError("the network has no redundancy: nothing can be said of its weights")
+        raise InputError(phrase("weighting.no-redundancy"))
     last = own.adjust(grouping, found.factors[:-1])
     return VarianceComponents(_without_nothing(found), own.network, last, own.first)
 

@@ -16,6 +16,7 @@ from photogram.adjustment.adjustment import (
     UnitVariance,
     adjust,
     adjusted_from,
+    at_least,
     core_options,
     core_threads,
     iteration_limit,
@@ -23,7 +24,7 @@ from photogram.adjustment.adjustment import (
 )
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.remarks import check_cameras
-from photogram.arguments.arrays import number, one_of, truth_value, whole_number
+from photogram.arguments.arrays import number, one_of, truth_value
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
@@ -52,6 +53,7 @@ from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out
 from photogram.statistics.snooping.taking_out import Settings
+from photogram.words import phrase
 
 __all__ = [
     "block_trial",
@@ -134,11 +136,8 @@ def snoop(
         truth_value("robust", robust)
     family = number("level", level) if fdr is None else number("fdr", fdr)
     if not 0 < family < 1:
-        raise InputError(
-            f"{'level' if fdr is None else 'fdr'} is a probability between 0 and 1, not {family:g}"
-        )
-    if whole_number("max_rounds", max_rounds) < 1:
-        raise InputError("there must be one round at least")
+        raise InputError(phrase("block.probability", name="level" if fdr is None else "fdr", value=family))
+    at_least("max_rounds", max_rounds, 1)
     return snooped_network(
         block,
         Settings(
@@ -168,7 +167,8 @@ def snooped_network(
     **options: Any,
 ) -> Snooped:
     """Take gross errors out of a network of any class; see :func:`snoop`."""
-    raise InputError(f"snoop takes a Block or a Collection, not {type(network).__name__}")
+    kinds = ["a Block", "a Collection"]
+    raise InputError(phrase("block.type", name="block", kinds=kinds, value=type(network).__name__))
 
 
 @snooped_network.register
@@ -303,7 +303,7 @@ def _snooped_from(
             return trial, snooped(trial, attempt)
         except (LostSupportError, _photocore.BlockError) as error:
             reason: Exception = error
-    raise AdjustmentError(f"the block cannot be tested: {reason.args[0]}") from reason
+    raise AdjustmentError(phrase("adjust.untested", reason=str(reason.args[0]))) from reason
 
 
 def block_trial(

@@ -60,6 +60,7 @@ from photogram.network.tables import (
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.summary import Brief, Rows, few
+from photogram.words import phrase
 
 _NUMBERS: Any = None  # Names that are not given
 _ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
@@ -714,8 +715,7 @@ def refuse_passages(block: Block, what: str, *, but: type[Passage] | tuple[()] =
 
 def checked(block: Block) -> Block:
     """Return a block whose photos have positions and attitudes; refuse all else, by name."""
-    if not isinstance(block, Block):
-        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    require_block(block)
     unknown = np.isnan(block.photo_positions).any(axis=1) | np.isnan(block.photo_attitudes).any(axis=1)
     if unknown.any():
         photos = listed([block.photo_ids[row] for row in np.flatnonzero(unknown)])
@@ -724,6 +724,13 @@ def checked(block: Block) -> Block:
             " initial values"
         )
     return block
+
+
+def require_block(block: object) -> None:
+    """Refuse an argument that is not a block."""
+    if not isinstance(block, Block):
+        kind = type(block).__name__
+        raise InputError(phrase("block.type", name="block", kinds=["a Block"], value=kind))
 
 
 def position_columns(block: Block) -> tuple[str, str, str]:
