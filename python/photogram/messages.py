@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,22 @@ def nearest(word: str, known: Iterable[str]) -> str:
     names = list(known)
     close = difflib.get_close_matches(word, names, 1, 0.5)
     return f"; did you mean {close[0]}?" if close else f", but {', '.join(names)}"
+
+
+def unknown_name(kind: str | Phrase, name: str, names: Iterable[str]) -> Phrase:
+    """Return the message that there is no thing with a name: with the nearest name, or all names."""
+    import difflib  # a wrong name is rare
+
+    known = list(names)
+    if close := difflib.get_close_matches(name, known, 1, 0.5):
+        return Phrase("error.unknown.close", {"kind": kind, "name": name, "close": close[0]})
+    return Phrase("error.unknown", {"kind": kind, "name": name, "names": known})
+
+
+def missing_columns(missing: Sequence[str], columns: Sequence[str]) -> Phrase:
+    """Return the message that a table lacks some columns."""
+    fields = {"n": len(missing), "names": list(missing), "columns": list(columns)}
+    return Phrase("error.missing-columns", fields)
 
 
 def counted(count: int, noun: str) -> str:

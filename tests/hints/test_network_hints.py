@@ -329,7 +329,7 @@ def test_the_example(capsys):
 def test_what_is_no_block():
     with pytest.raises(InputError) as raised:
         hints("block")
-    assert raised.value.code == "block.type"
+    assert raised.value.code == "error.at"
     with pytest.raises(InputError, match="result is the result of a block, not 3"):
         diagnose(aerial(1), 3)
     assert len(spread(np.arange(100), 12)) == 12

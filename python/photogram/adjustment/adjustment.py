@@ -24,7 +24,8 @@ from photogram.adjustment.remarks import (
 from photogram.adjustment.robust import Loss, loss_row, remark
 from photogram.adjustment.taking_over import large_turns, stays, taken_over
 from photogram.adjustment.undetermined import beyond_trajectory, in_one_place, undetermined_combinations
-from photogram.arguments.arrays import number, one_of, shown, whole_number
+from photogram.arguments.arrays import argument_error, number, one_of, whole_number
+from photogram.arguments.objects import kind_error
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError, RankError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import threads_that_fit, turned
@@ -43,9 +44,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.check_points import tested_together
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused
 from photogram.results.iteration import Iteration
-from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result, dropped_points
-from photogram.show.methods import Way
 from photogram.words import phrase
 
 __all__ = [
@@ -195,8 +194,9 @@ def adjust(
     checked(block)
     keep = isinstance(covariance, str) and covariance == "verdict"
     if not (keep or isinstance(covariance, bool | np.bool_)):
-        kinds = ["True", "False", "'verdict'"]
-        raise InputError(phrase("block.type", name="covariance", kinds=kinds, value=shown(covariance)))
+        raise argument_error(
+            "covariance", "kind", kind="True, False or `verdict`", value=value_field(covariance)
+        )
     check_datum(datum)
     options = core_options(
         unit_variance,
@@ -319,19 +319,13 @@ def _adjusted(
         return Result.from_solution(block, solution, options, datum, messages, freedom)
 
 
-@Way
 def adjusted_again(
-    block: object, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
-) -> AdjustedNetwork:
-    """Adjust a network, of which only weights have changed, from where an adjustment of it has ended.
+    block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
+) -> Result:
+    """Adjust a block, of which only weights have changed, from where an adjustment of it has ended.
 
     `options` and `start` are those of the former result, and where it ended: its `options` and `state`.
     """
-    raise NotImplementedError(type(block).__name__)
-
-
-@adjusted_again.register
-def _(block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None) -> Result:
     return _adjusted(block, options, core_threads(threads), start=start)
 
 
@@ -354,7 +348,7 @@ def teller(
 ) -> Callable[[str, int, int, _photocore.IterationRow | None], None]:
     """Return the function that the core calls, which calls `progress`."""
     if not callable(progress):
-        raise InputError(phrase("block.type", name="progress", kinds=["a function"], value=shown(progress)))
+        raise kind_error("progress", "a function", progress)
 
     def tell(phase: str, done: int, total: int, iteration: _photocore.IterationRow | None) -> None:
         progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
@@ -367,13 +361,13 @@ def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> Non
     one_of("ordering", ordering, get_args(Ordering))
     at_least("max_iterations", max_iterations, 1)
     if not number("tolerance", tolerance) > 0:
-        raise InputError(phrase("block.positive", name="tolerance", value=tolerance))
+        raise argument_error("tolerance", "positive", value=tolerance)
 
 
 def at_least(name: str, value: object, least: int) -> int:
     """Return a whole number that is not below a limit."""
     if (whole := whole_number(name, value)) < least:
-        raise InputError(phrase("block.at-least", name=name, least=least, value=whole))
+        raise argument_error(name, "least", low=least, value=whole)
     return whole
 
 

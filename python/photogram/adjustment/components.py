@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.adjustment.adjustment import adjust, adjusted_again, at_least
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import probability
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -20,39 +20,31 @@ from photogram.results.components import VarianceComponents
 from photogram.results.group_sums import Left, Probing, observables
 from photogram.results.grouping import Grouping, GroupsArgument, grouped
 from photogram.results.network import AdjustedNetwork
-from photogram.show.methods import Way
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 from photogram.words import phrase
 
-__all__ = ["Settings", "Weighing", "first_adjusted", "of_grouping", "scaled", "variance_components"]
+__all__ = ["Settings", "Weighing", "of_grouping", "scaled", "variance_components"]
 
 NOTHING = 1e-6  # A redundancy that is rounding
 OTHERS = "all other observations"  # What is in no group
+DECREASE = 1e-12  # Relative decrease of the sum of squares by a step that ends the adjustment of a collection
 SHARPER = 1e-2  # Of the tolerance of components, that of the adjustments in standard deviations
-
-
-@Way
-def first_adjusted(network: object, *, tolerance: float, threads: int | None) -> AdjustedNetwork:
-    """Return an adjustment of a block or a collection that is sharp enough for components."""
-    raise not_a_network(network)
-
-
-def not_a_network(value: object) -> InputError:
-    """Return the error that an argument is not a block or collection."""
-    kinds = ["a Block", "a Collection"]
-    return InputError(phrase("block.type", name="network", kinds=kinds, value=shown(value)))
-
-
-@first_adjusted.register
-def _(network: Block, *, tolerance: float, threads: int | None) -> AdjustedNetwork:
-    return adjust(network, tolerance=tolerance, threads=threads)
 
 
 class Weighing:
     """A network that is adjusted again and again with other weights, each time from where it stood."""
 
     def __init__(self, network: object, *, threads: int | None, tolerance: float) -> None:
-        self.result = self.first = first_adjusted(network, tolerance=tolerance, threads=threads)
+        self.result: AdjustedNetwork
+        if isinstance(network, Block):
+            self.result = adjust(network, tolerance=tolerance, threads=threads)
+        elif hasattr(network, "_adjust"):
+            self.result = network._adjust(tolerance=DECREASE, threads=threads)
+        else:
+            raise argument_error(
+                "network", "kind", kind="a Block or a Collection", value=value_field(network)
+            )
+        self.first = self.result
         self.given: Any = self.result.given
         self.network: Any = self.given
         self.threads = threads
@@ -60,19 +52,17 @@ class Weighing:
     def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedNetwork:
         """Adjust with the variances of (G,) groups multiplied by factors."""
         self.network = scaled(self.given, grouping, factors)
+        again = adjusted_again if isinstance(self.network, Block) else type(self.network)._adjust_again
         options, state = self.result.options, self.result.state
-        self.result = adjusted_again(self.network, options, state, threads=self.threads)
+        self.result = again(self.network, options, start=state, threads=self.threads)
         return self.result
 
 
-@Way
 def scaled(network: Any, grouping: Grouping, factors: Floats) -> Any:
     """Return a block or collection with the variances of (G,) groups multiplied by factors."""
-    raise not_a_network(network)
-
-
-@scaled.register
-def _scaled_block(block: Block, grouping: Grouping, factors: Floats) -> Block:
+    if not isinstance(network, Block):
+        return network._scaled(grouping, factors)
+    block = network
     roots = np.sqrt(factors)
     of_photos = grouping.factors(roots, grouping.photos)
     of_observations = grouping.factors(factors, grouping.observations)
@@ -153,8 +143,7 @@ def variance_components(
     AdjustmentError, RankError
         As of the adjustment.
     """
-    if not 0 < tolerance < 1:
-        raise InputError(phrase("block.between", name="tolerance", low=0, high=1, value=tolerance))
+    probability("tolerance", tolerance)
     at_least("max_steps", max_steps, 1)
     grouping = grouped(observables(network), groups)
     settings = Settings(tolerance, max_steps, least_redundancy, level, equality, probing or Probing())

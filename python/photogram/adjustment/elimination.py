@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from photogram.adjustment.adjustment import UnitVariance, adjust
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shown
+from photogram.arguments.arrays import probability
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -91,11 +91,8 @@ def eliminate_terms(
         As of the adjustment.
     """
     if not isinstance(block, Block) or not block.cameras:
-        raise InputError(
-            phrase("block.type", name="block", kinds=["a Block with cameras"], value=shown(block))
-        )
-    if not 0 < level < 1:
-        raise InputError(phrase("block.probability", name="level", value=level))
+        raise kind_error("block", "a Block with cameras", block)
+    probability("level", level)
     result = adjust(block, unit_variance=unit_variance, threads=threads)
     first = [(camera.name, names) for camera in result.cameras for names in _groups(camera, groups)]
     if not first:

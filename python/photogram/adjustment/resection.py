@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike
 
 from photogram import _photocore
 from photogram.arguments.arrays import (
+    argument_error,
     length,
     names,
     number,
     numbers,
     shaped,
-    shown,
     truth_value,
+    value_field,
     whole_number,
 )
 from photogram.arguments.types import Floats
@@ -248,8 +249,7 @@ def resect(
     ([390.0, 430.0, 1500.0], [0.02, -0.03, 1.5])
     """
     if spheroid is not None and not isinstance(spheroid, Spheroid):
-        kinds = ["a Spheroid", "None"]
-        raise InputError(phrase("block.type", name="spheroid", kinds=kinds, value=shown(spheroid)))
+        raise argument_error("spheroid", "kind", kind="a Spheroid or None", value=value_field(spheroid))
     truth_value("photo_to_ground", photo_to_ground)
     given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
     known = np.concatenate(
@@ -258,7 +258,7 @@ def resect(
     limit = number("tolerance", tolerance)
     if whole_number("max_iterations", max_iterations) < 1 or not 0 < limit < math.inf:
         name, value = ("tolerance", limit) if max_iterations >= 1 else ("max_iterations", max_iterations)
-        raise InputError(phrase("block.positive", name=name, value=value))
+        raise argument_error(name, "positive", value=value)
     known_sd = np.concatenate(
         [_deviations("position_sd", position_sd, (3,)), _deviations("attitude_sd", attitude_sd, (3,))]
     )
@@ -326,7 +326,7 @@ class Observed:
         count = length("image_xy", xy)
         ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
         if len(ids) != count:
-            raise InputError(phrase("block.length", name="point_ids", n=count, value=len(ids)))
+            raise argument_error("point_ids", "count", count=count, actual=len(ids))
         made = cls(
             points=shaped("object_points", points, (count, 3)),
             point_sd=_deviations("object_sd", point_sd, (count, 3)),
@@ -339,9 +339,9 @@ class Observed:
         for name, values in {**checks, "image_sd": made.xy_sd}.items():
             good = np.isfinite(values) & ((values > 0) | (name != "image_sd"))
             if (rows := np.flatnonzero(~good.all(axis=1))).size:
-                code = "block.positive" if name == "image_sd" else "block.finite"
-                where, value = f"{name} of point {ids[rows[0]]}", values[rows[0]].tolist()
-                raise InputError(phrase(code, name=where, value=value))
+                code = "positive" if name == "image_sd" else "finite"
+                value = value_field(values[rows[0]].tolist())
+                raise argument_error(f"{name} of point {ids[rows[0]]}", code, value=value)
         if not math.isfinite(made.principal_distance) or made.principal_distance == 0:
             raise InputError(
                 phrase("block.not-zero", name="principal_distance", value=made.principal_distance)
@@ -398,7 +398,7 @@ def _deviations(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
         array = np.broadcast_to(array, shape)
     deviations = shaped(name, array, shape)
     if not (deviations >= 0).all():
-        raise InputError(phrase("block.sd", name=name, value=float(deviations[~(deviations >= 0)][0])))
+        raise argument_error(name, "not-negative", value=float(deviations[~(deviations >= 0)][0]))
     return deviations
 
 
@@ -410,7 +410,7 @@ def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
         return np.full(3, np.nan)
     values = shaped(name, value, (3,))
     if not np.isfinite(values).all():
-        raise InputError(phrase("block.finite", name=name, value=values.tolist()))
+        raise argument_error(name, "finite", value=value_field(values.tolist()))
     return values
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 from typing import Any, get_args
 
 import numpy as np
@@ -24,7 +25,8 @@ from photogram.adjustment.adjustment import (
 )
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.remarks import check_cameras
-from photogram.arguments.arrays import number, one_of, truth_value
+from photogram.arguments.arrays import argument_error, number, one_of, truth_value
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
@@ -47,7 +49,6 @@ from photogram.results.network_trial import (
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped, recorded
 from photogram.results.suspects import network_trial
-from photogram.show.methods import Way
 from photogram.statistics.distributions import LEVEL
 from photogram.statistics.findings import Tested
 from photogram.statistics.snooping.snooping import Outcome, snooped
@@ -60,7 +61,6 @@ __all__ = [
     "finished",
     "gone",
     "snoop",
-    "snooped_network",
     "started_by_consensus",
     "used_images",
 ]
@@ -136,10 +136,12 @@ def snoop(
         truth_value("robust", robust)
     family = number("level", level) if fdr is None else number("fdr", fdr)
     if not 0 < family < 1:
-        raise InputError(phrase("block.probability", name="level" if fdr is None else "fdr", value=family))
+        raise argument_error("level" if fdr is None else "fdr", "range", low=0, high=1, value=family)
     at_least("max_rounds", max_rounds, 1)
-    return snooped_network(
-        block,
+    if not isinstance(block, Block) and not hasattr(block, "_snoop"):
+        raise kind_error("block", "a Block or a Collection", block)
+    snoop_network = partial(_snoop_block, block) if isinstance(block, Block) else block._snoop
+    return snoop_network(
         Settings(
             level=family,
             fdr=fdr is not None,
@@ -155,23 +157,6 @@ def snoop(
     )
 
 
-@Way
-def snooped_network(
-    network: object,
-    settings: Settings,
-    *,
-    parts: bool,
-    unit_variance: UnitVariance,
-    threads: int | None,
-    progress: Callable[[Progress], None] | None,
-    **options: Any,
-) -> Snooped:
-    """Take gross errors out of a network of any class; see :func:`snoop`."""
-    kinds = ["a Block", "a Collection"]
-    raise InputError(phrase("block.type", name="block", kinds=kinds, value=type(network).__name__))
-
-
-@snooped_network.register
 def _snoop_block(
     network: Block,
     settings: Settings,

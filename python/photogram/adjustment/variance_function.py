@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from photogram.adjustment.adjustment import at_least
 from photogram.adjustment.components import Weighing
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import shaped, shown
+from photogram.arguments.arrays import argument_error, shaped, value_field
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.motion import focal_images
@@ -132,13 +133,12 @@ def variance_function(
 def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) -> Floats:
     if isinstance(of, str):
         if of != "radius":
-            kinds = ["'radius'", "an array"]
-            raise InputError(phrase("block.type", name="of", kinds=kinds, value=shown(of)))
+            raise kind_error("of", "`radius` or an array", of)
         middle = shaped("center", center, (2,))
         return np.asarray(np.linalg.norm(focal_images(own.network) - middle, axis=1))
     values = shaped("of", of, (images,))
     if not ((values >= 0) & np.isfinite(values)).all():
-        raise InputError(phrase("block.not-negative", name="of", value=shown(values)))
+        raise argument_error("of", "not-negative", value=value_field(values))
     return np.asarray(values)
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.errors import InputError
+from photogram.words import Phrase, phrase
 
 LARGEST_SD = math.sqrt(sys.float_info.max)  # Standard deviations beyond have no variance
 _SYMMETRIC = 1e-9  # What a covariance matrix may be unsymmetric by, relative to its diagonal
@@ -213,14 +214,35 @@ def one_of(name: str, value: object, choices: Sequence[str]) -> None:
         raise InputError(f"{name} is one of {', '.join(choices)}, not {shown(value)}")
 
 
-def shown(value: object) -> str:
-    """Show what a caller gave, in a line, however long it is."""
+def value_field(value: object) -> str | float | Phrase:
+    """Return what a caller gave as the field of a message: text, a number, or a short description."""
     if isinstance(value, int) and value.bit_length() > 128:
-        return f"a whole number of {value.bit_length()} bits"
+        return phrase("error.long-integer", bits=value.bit_length())
+    if isinstance(value, str) or (isinstance(value, int | float) and not isinstance(value, bool)):
+        return value
     try:
-        return ascii(value)[:80]
+        return phrase("error.value", value=ascii(value)[:80])
     except Exception:  # a foreign object may fail at anything, a deep one at its depth
-        return f"a {type(value).__name__}"
+        return phrase("error.object", type=type(value).__name__)
+
+
+def shown(value: object) -> str:
+    """Return what a caller gave for a message without fields."""
+    field = value_field(value)
+    return ascii(field)[:80] if isinstance(field, str) else str(field)
+
+
+def argument_error(name: str, code: str, **fields: object) -> InputError:
+    """Return the error of an argument: `code` is that of a message on values without `error.`."""
+    texts = {key: str(value) if isinstance(value, tuple) else value for key, value in fields.items()}
+    return InputError(phrase("error.at", what=name, message=phrase(f"error.{code}", **texts)))
+
+
+def probability(name: str, value: float) -> float:
+    """Return a probability between 0 and 1; refuse other numbers."""
+    if not 0 < value < 1:
+        raise argument_error(name, "range", low=0, high=1, value=value)
+    return value
 
 
 def is_covariance(matrix: NDArray[np.float64], *, singular: bool = False) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 
 from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
-from photogram.arguments.arrays import shown
+from photogram.arguments.objects import kind_error
 from photogram.diagnosis.adjusting import Adjuster
 from photogram.diagnosis.after_adjustment import diagnosis_of
 from photogram.diagnosis.blunders import BESIDE
@@ -45,10 +45,9 @@ from photogram.network.rays import Rays
 from photogram.network.subset import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
-from photogram.show.methods import Way
 from photogram.words import phrase
 
-__all__ = ["Manner", "check_block", "check_of", "diagnose"]
+__all__ = ["Manner", "check_block", "diagnose"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
@@ -114,27 +113,20 @@ def diagnose(
     if result is not None:
         adjusted = result.result if isinstance(result, Snooped) else result
         if not isinstance(adjusted, Result):
-            raise InputError(f"result is the result of a block, not {shown(result)}")
+            raise kind_error("result", "the result of a block", result)
         return diagnosis_of(adjusted)
-    return check_of(network, threads)
-
-
-@Way
-def check_of(network: object, threads: int | None) -> Diagnosis:
-    """Check a network; defined for each class of networks in the files above it."""
-    del threads
-    raise InputError(f"a check is of a block, a project or a collection, not of {shown(network)}")
-
-
-@check_of.register
-def _(network: Block, threads: int | None) -> Diagnosis:
-    return Diagnosis(network.title, *check_block(as_seen(network), Manner({"threads": threads})))
+    if isinstance(network, Block):
+        return Diagnosis(network.title, *check_block(as_seen(network), Manner({"threads": threads})))
+    if not hasattr(network, "_check"):
+        raise kind_error("network", "a block, a project or a collection", network)
+    found: Diagnosis = network._check(threads)
+    return found
 
 
 def check_block(block: Block, manner: Manner) -> tuple[list[Section], Any]:
     """Check a block; returns the sections, and the adjustment where there was one."""
     if not len(block.image_xy):
-        raise InputError("the block has no images: there is nothing to check")
+        raise InputError(phrase("check.no-images"))
     # Absurd values overflow to what no comparison holds for; what they spoil is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):

@@ -23,6 +23,7 @@ from photogram.arguments.arrays import (
     truth_value,
 )
 from photogram.arguments.equality import Valued
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, fields
@@ -60,7 +61,6 @@ from photogram.network.tables import (
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.show.summary import Brief, Rows, few
-from photogram.words import phrase
 
 _NUMBERS: Any = None  # Names that are not given
 _ANGLES = 1e6  # Radians: larger angles have lost the digits that an attitude needs
@@ -729,8 +729,7 @@ def checked(block: Block) -> Block:
 def require_block(block: object) -> None:
     """Refuse an argument that is not a block."""
     if not isinstance(block, Block):
-        kind = type(block).__name__
-        raise InputError(phrase("block.type", name="block", kinds=["a Block"], value=kind))
+        raise kind_error("block", "a Block", block)
 
 
 def position_columns(block: Block) -> tuple[str, str, str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.statistics.findings import Findings, Observations, Tested, by_t
+from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 from photogram.stellar.outliers import studentized
 from photogram.stellar.result import SIGNIFICANT
@@ -74,7 +74,7 @@ def night_findings(result: CalibratedNight) -> Findings:
     def tested(kind: str, values: Floats, redundancy: Floats, name: Named) -> Tested:
         # The values are over mean errors a posteriori; the standard deviation of a pixel is a guess.
         w = np.where(np.nan_to_num(redundancy) > TESTABLE, values * found.mean_error, np.nan)
-        return by_t(Observations(kind, w, name), omega, freedom)
+        return Tested(kind, w, name).studentized(omega, freedom)
 
     return Findings(
         status=found.status,

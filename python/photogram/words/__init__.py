@@ -7,7 +7,8 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
 * that of a list: the greatest number of its parts (`{names:5}`), `;`, `&` (and) or `|` (or) between them in
   place of commas, and `#` for parts with numbers;
 * `^` begins with a capital letter, `+` puts `; ` before a text that is not empty;
-* `'` quotes a text of the input: escaped, and shortened if it is long.
+* `'` quotes a text of the input: escaped, and shortened if it is long. Numbers, lists and phrases have no
+  quotation marks.
 
 `code.one` is the sentence if the field `n` is 1, `code.one.name` if the field `name` is 1, and `code.cli` the
 sentence on the command line: it names options, the other one functions of Python.
@@ -147,10 +148,10 @@ class Words:
         elif isinstance(value, list | tuple):
             text = self._list(value, form)
         elif isinstance(value, Real):
-            return self._number(value, form)
+            return self._number(value, form.replace("'", ""))
         else:
             text = str(value)
-        if "'" in form:
+        if "'" in form and isinstance(value, str):
             return quoted(text)
         text = f"{text[:1].upper()}{text[1:]}" if "^" in form else text
         return f"; {text}" if text and "+" in form else text

@@ -95,15 +95,7 @@ class Seen:
         return found
 
     def expected(self, photo: str, laid: Callable[[str], Laid | None]) -> Iterator[Expected]:
-        """Yield where images of a photo should be: by its pose, and by that of tie points on another photo.
-
-        Parameters
-        ----------
-        photo
-            Its name.
-        laid
-            Tells of another photo how its film lies, where that is known: asked of few.
-        """
+        """Yield where images of a photo should be: by its pose, and by tie points on another photo."""
         own = self.images.points[self._rows(photo)]
         centre, axes, c = self._pose(photo)
         places = _projected((self.points[own] - centre) @ axes, c)
@@ -158,16 +150,7 @@ def _projected(rays: Floats, c: float) -> Floats:
 def way_by_images(ways: Sequence[Lying], true: Floats, images: Floats, expected: Expected) -> int | None:
     """Return which way to lie brings images where they should be; None where none does, or several do.
 
-    Parameters
-    ----------
-    ways
-        Ways to lie.
-    true
-        (n, 2) true places on the scanner of the marks.
-    images
-        (m, 2) true places of all images of the photo.
-    expected
-        Where some of them should be.
+    `true` are (n, 2) true places of the marks on the scanner, `images` (m, 2) of all images of the photo.
     """
     if len(expected.rows) < 2:
         return None
