@@ -194,9 +194,7 @@ def adjust(
     checked(block)
     keep = isinstance(covariance, str) and covariance == "verdict"
     if not (keep or isinstance(covariance, bool | np.bool_)):
-        raise argument_error(
-            "covariance", "kind", kind="True, False or `verdict`", value=value_field(covariance)
-        )
+        raise kind_error("covariance", "True, False or `verdict`", covariance)
     check_datum(datum)
     options = core_options(
         unit_variance,

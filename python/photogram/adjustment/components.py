@@ -11,6 +11,7 @@ import numpy as np
 from photogram.adjustment.adjustment import adjust, adjusted_again, at_least
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import probability
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -41,9 +42,7 @@ class Weighing:
         elif hasattr(network, "_adjust"):
             self.result = network._adjust(tolerance=DECREASE, threads=threads)
         else:
-            raise argument_error(
-                "network", "kind", kind="a Block or a Collection", value=value_field(network)
-            )
+            raise kind_error("network", "a Block or a Collection", network)
         self.first = self.result
         self.given: Any = self.result.given
         self.network: Any = self.given

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from photogram.adjustment.adjustment import UnitVariance, adjust
 from photogram.arguments.annotations import check_arguments
 from photogram.arguments.arrays import probability
+from photogram.arguments.objects import kind_error
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
