@@ -77,7 +77,7 @@ def test_k_is_given_or_follows_from_a_probability(result, names):
     for wrong in (0.0, 1.0, np.nan):
         with pytest.raises(InputError, match="coverage"):
             features(result, wanted, coverage=wrong)
-    with pytest.raises(InputError, match="k is a positive number"):
+    with pytest.raises(InputError, match="k: must be positive"):
         features(result, wanted, k=-2.0)
 
 
@@ -92,9 +92,9 @@ def test_ground_is_no_plane_and_the_test_says_so(result, names):
     ("wanted", "message"),
     [
         (("circle", ["nowhere", "a", "b"]), "feature f: there is no point 'nowhere'"),
-        (("cone", ["*"]), "feature f: 'cone' is none of distance, line"),
-        ("plane", "feature f: 'plane' is no kind with points"),
-        (("distance", 3), "feature f: a distance takes 2 points, not 3"),
+        (("cone", ["*"]), "feature f: there is no kind of feature 'cone'"),
+        ("plane", "feature f: the definition must be a kind with points"),
+        (("distance", 3), "feature f: a distance requires 2 points, got 3"),
         (("cylinder", 5), "feature f: a cylinder takes 6 points, not 5"),
     ],
 )
@@ -108,7 +108,7 @@ def test_what_cannot_be_is_named(result, names, wanted, message):
 def test_points_that_took_no_part_are_named(result, names):
     rays = np.array(result.point_rays)
     rays[result.block.point_ids.index(names[1])] = 0
-    with pytest.raises(InputError, match=f"feature f: the point {names[1]} did not take part"):
+    with pytest.raises(InputError, match=f"feature f: the point '{names[1]}' did not take part"):
         features(replace(result, point_rays=rays), {"f": ("plane", names)})
 
 
@@ -120,10 +120,10 @@ def test_geographic_blocks_are_refused(result, names):
 
 def test_a_scale_that_nothing_gives_is_said(free):
     wanted = {"d": ("distance", free.block.point_ids[:2])}
-    assert "nothing gives the network a scale" in features(free, wanted).remarks[0]
+    assert "do not determine the scale" in features(free, wanted).remarks[0]
     told = with_features(free, wanted)
-    assert any("nothing gives the network a scale" in str(each) for each in told.messages)
-    assert "othing gives the network a scale" in told.report()
+    assert any("do not determine the scale" in str(each) for each in told.messages)
+    assert "do not determine the scale" in told.report()
     minimum = adjust(free.block)
     assert features(minimum, wanted).remarks
 

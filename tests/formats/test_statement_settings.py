@@ -152,39 +152,47 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
     ("old", "new", "said"),
     [
         ("survey_common_sd = 0.004", "survey_common = 0.004", "did you mean survey_common_sd"),
-        ("survey_common_sd = 0.004", "survey_common_sd = -0.004", "one standard deviation, or three"),
-        ("survey_common_sd = 0.004", "survey_common_sd = nan", "one standard deviation, or three"),
+        (
+            "survey_common_sd = 0.004",
+            "survey_common_sd = -0.004",
+            "one standard deviation, or three (east, north, up)",
+        ),
+        (
+            "survey_common_sd = 0.004",
+            "survey_common_sd = nan",
+            "one standard deviation, or three (east, north, up)",
+        ),
         ("survey_common_sd = 0.004", "survey_common_sd = [1, 2]", "1 or 3 numbers"),
         ("in_control = true", "in_control = 1", "is true or false, not 1"),
         ('"same-base"', '"perhaps"', "independent is one of yes, same-base, no"),
         ('independent = "same-base"', "independent = true", "independent is no text: True"),
-        ('"asprs-2023"', '"asprs"', "did you mean asprs-2023"),
+        ('"asprs-2023"', '"asprs"', "the nearest name is 'asprs-2023'"),
         ('["asprs-2023", "vdi-2634"]', '"plain"', "standards is a list of texts, not 'plain'"),
         ('class_h = "5cm"', 'class_x = "5cm"', "did you mean class_"),
-        ('class_h = "5cm"', "class_h = 5", "class_h: '5' is not a length with its unit"),
+        ('class_h = "5cm"', "class_h = 5", "must have a unit, such as 5cm, got '5'"),
         (
             'class_h = "5cm"',
             'class_h = "5 kms"',
-            "class_h: there is no unit of length 'kms'; did you mean km?",
+            "class_h: there is no unit of length 'kms'; the nearest name is 'km'",
         ),
-        ('class_h = "5cm"', 'class_h = "0cm"', "the class h is a length, not 0"),
-        ('class_v = "0.1 m"', 'class_v = "1e999m"', "the class v is a length, not inf"),
-        ('area = "12.5km2"', 'area = "12.5km"', "area: '12.5km' is not an area with its unit"),
+        ('class_h = "5cm"', 'class_h = "0cm"', "class h: must be positive, got 0.0"),
+        ('class_v = "0.1 m"', 'class_v = "1e999m"', "class v: must be positive, got inf"),
+        ('area = "12.5km2"', 'area = "12.5km"', "must have a unit, such as 12.5km2, got '12.5km'"),
         ('{ middle = "target moved" }', '"middle"', 'without is { C07 = "target moved" }'),
         ('{ middle = "target moved" }', '{ middle = " " }', "middle is left out for a reason"),
         ('{ middle = "target moved" }', '{ midle = "moved" }', "there is no point 'midle'"),
-        ('language = "de"', 'language = "fr"', "there is no language 'fr': en, de"),
+        ('language = "de"', 'language = "fr"', "language is one of en, de, not 'fr'"),
         ('text = "firm.toml"', 'text = "film.toml"', "the file of sentences is not there"),
         ('text = "firm.toml"', f'text = "{"x" * 300}"', "the file of sentences is not there"),
         ('["point middle z"', "[1", "budgets is a list of texts"),
-        ("coverage = 0.9", "coverage = 90", "coverage is a probability between 0 and 1"),
+        ("coverage = 0.9", "coverage = 90", "coverage: must be between 0 and 1"),
         ("coverage = 0.9", 'coverage = "90 %"', "coverage is 1 numbers"),
         ('firm = "Verm', 'firma = "Verm', "did you mean firm?"),
         ("project = 'the \"north\" quarry'", "project = 5", "project is no text: 5"),
         ("date = 2026-05-01", "date = 2026-05-01T12:00:00", "date is no text"),
         ("[0.00001, 5e-6, inf]", "[0.00001, 5e-6]", "length_limit is 3 numbers"),
-        ("[0.00001, 5e-6, inf]", "[inf, 5e-6, 1]", "A, K and B of A + K L <= B"),
-        ("[0.00001, 5e-6, inf]", "[1, -5e-6, 1]", "A, K and B of A + K L <= B"),
+        ("[0.00001, 5e-6, inf]", "[inf, 5e-6, 1]", "A + K L <= B"),
+        ("[0.00001, 5e-6, inf]", "[1, -5e-6, 1]", "A, K and B of the limit A + K L <= B"),
         ("expansion = 11.5e-6", "expansion = inf", "expansion is a finite number"),
     ],
 )
@@ -222,10 +230,10 @@ def test_errors_of_names_that_stand_in_several_sections_name_the_right_line(proj
 @pytest.mark.parametrize(
     ("sentences", "record", "said"),
     [
-        ('# ours\n"asprs.point" = "{asked}"', 2, "did you mean asprs.points?"),
-        ('"asprs.points" = "{many}"', 1, "asprs.points has no field 'many'"),
+        ('# ours\n"asprs.point" = "{asked}"', 2, "asprs.points"),
+        ('"asprs.points" = "{many}"', 1, "no field 'many'"),
         ('"asprs.points" = "{asked"', 1, "expected '}'"),
-        ('"asprs.points" = "{asked:.3f}"', 1, "a field is a name in braces"),
+        ('"asprs.points" = "{asked:.3f}"', 1, "only names in braces"),
         ('"asprs.points" = 5', 1, "asprs.points is no sentence: 5"),
         ('asprs.points = "{asked}"', 1, "keys stand in quotation marks"),
         ('[asprs]\npoints = "{asked}"', 1, "keys stand in quotation marks"),
@@ -301,7 +309,7 @@ def test_lengths_may_have_one_deviation_for_all(project):
 def test_a_standard_about_lengths_needs_their_table(project):
     (project / "lengths.csv").unlink()
     error = refused(project)
-    assert "a table of lengths lacks" in error.message
+    assert "requires a table of calibrated lengths" in error.message
     assert error.record == record_of(project / "project.toml", "standards =")
 
 

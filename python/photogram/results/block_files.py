@@ -39,6 +39,7 @@ from photogram.results.result_files import (
     written,
 )
 from photogram.results.tables import TABLES
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -200,7 +201,7 @@ class KeptTrajectory(Stand):
             for both in (made.coefficients, self.coefficients)
         )
         if own != kept:
-            raise InputError(f"the trajectory {self.name} has not the coefficients that stand with it")
+            raise InputError(phrase("adjusted.coefficients", name=self.name))
         object.__setattr__(made, "coefficients", self.coefficients)
         return made
 

@@ -13,10 +13,11 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
-from photogram.messages import nearest
+from photogram.messages import nearest, unknown_name
 from photogram.show import quantity
 from photogram.show.quantity import Axis
 from photogram.statistics.distributions import LEVEL
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +27,7 @@ __all__ = ["KINDS", "Definition", "Feature", "Features", "Quantity", "named_poin
 T = TypeVar("T", "Quantity", "Feature")
 _UNIT = "unit of values, residuals and deviations of this row; empty if dimensionless"
 _EXPANDED = "expanded uncertainty, k times the standard deviation"
+MAX_SEARCHED_NAMES = 10_000
 KINDS = ("distance", "line", "plane", "circle", "sphere", "cylinder")
 
 Definition = tuple[str, str | Sequence[str]]
@@ -242,8 +244,9 @@ def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
             continue
         matching = [name for name in names if fnmatchcase(name, each)]
         if not matching:
-            there = nearest(each, names) if len(names) < 10_000 and not {*"*?["} & {*each} else ""
-            raise InputError(f"there is no point {each!r}{there if 'mean' in there else ''}")
+            searched = len(names) < MAX_SEARCHED_NAMES and not {*"*?["} & {*each}
+            absent = phrase("error.absent", kind="point", name=each)
+            raise InputError(unknown_name("point", each, names) if searched else absent)
         found |= dict.fromkeys(matching, True)
     return list(found)
 

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.arrays import names, shown
+from photogram.arguments.arrays import names, value_field
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
 from photogram.network.tables import ATTITUDE_COLUMNS
+from photogram.words import phrase
 
 Wanted = str | int | Sequence[str] | Sequence[int] | None
 """A name, names, or None for all; the photos and points of collections are called by their numbers."""
@@ -73,8 +74,9 @@ class Adjusted:
         shapes: list[tuple[int, ...]] = []
         for item in items:
             if not (isinstance(item, tuple) and len(item) == 2) or item[0] not in self.things:
-                kinds = ", ".join(self.things)
-                raise InputError(f"{shown(item)} is no kind ({kinds}) with a name, several, or None for all")
+                raise InputError(
+                    phrase("adjusted.selection", value=value_field(item), kinds=list(self.things))
+                )
             kind, wanted = str(item[0]), item[1]
             own = self.things[kind]
             chosen = self._indices(kind, wanted)
@@ -114,9 +116,7 @@ class Adjusted:
         asked = names(f"names of the kind {kind}", several)
         if missing := [name for name in asked if name not in index]:
             what = kind.replace("step", "photo")
-            raise InputError(
-                f"the {self.network} has no {what} {missing[0] if self.numbered else repr(missing[0])}"
-            )
+            raise InputError(phrase("error.absent", kind=what, name=missing[0]))
         return [index[name] for name in asked]
 
 

@@ -8,10 +8,11 @@ from datetime import date
 from string import Formatter
 from typing import Any
 
+from photogram.arguments.arrays import one_of, value_field
 from photogram.errors import InputError
-from photogram.messages import nearest
+from photogram.messages import unknown_name
 from photogram.show.page import fixed, probability_written
-from photogram.words import Phrase, Words, table_of
+from photogram.words import Phrase, Words, phrase, table_of
 
 LANGUAGES = ("en", "de")
 NOTHING = "–"  # Missing number
@@ -22,7 +23,7 @@ def fields_of(sentence: str) -> set[str]:
     try:
         parts = list(Formatter().parse(sentence))
     except ValueError as error:
-        raise InputError(f"{sentence!r}: {error}") from None
+        raise InputError(phrase("request.braces", sentence=sentence, reason=str(error))) from None
     return {name for _, name, _, _ in parts if name is not None}
 
 
@@ -50,19 +51,23 @@ class Texts(Words):
         own: Mapping[str, str] | None = None,
         unit: str = "m",
     ) -> None:
-        if language not in LANGUAGES:
-            raise InputError(f"there is no language {language!r}: {', '.join(LANGUAGES)}")
+        one_of("language", language, LANGUAGES)
         self.language, self.unit = language, unit
         english = table_of("en")
         for key, sentence in (own or {}).items():
             if key not in english:
-                raise InputError(f"there is no sentence {key!r}{nearest(key, english)}")
+                raise InputError(unknown_name("code", key, english))
             if not isinstance(sentence, str):
-                raise InputError(f"{key} is no sentence: {sentence!r}")
-            if strange := fields_of(sentence) - fields_of(english[key]):
-                raise InputError(f"{key} has no field {sorted(strange)[0]!r}")
+                raise InputError(
+                    phrase("error.at", what=key, message=phrase("error.text", value=value_field(sentence)))
+                )
+            known = fields_of(english[key])
+            if strange := fields_of(sentence) - known:
+                raise InputError(
+                    phrase("request.field", code=key, field=sorted(strange)[0], names=sorted(known))
+                )
             if any(form or conversion for *_, form, conversion in Formatter().parse(sentence)):
-                raise InputError(f"{sentence!r}: a field is a name in braces, such as {{n}}")
+                raise InputError(phrase("request.form", code=key))
         super().__init__(language, own)
         own = table_of(language)
         families = {key.partition(".")[0] for key in own}  # The others are of no statement
