@@ -36,27 +36,17 @@ Definition = tuple[str, str | Sequence[str]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a feature.
+    """A quantity of a feature."""
 
-    Attributes
-    ----------
-    name
-        `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
-        `sphericity`, `cylindricity`.
-    value, sd
-        The value with its standard deviation; components of axes and normals are plain numbers, all others
-        are lengths.
-    expanded
-        U = k sd.
-    unit
-        The linear unit of the block; empty for plain numbers.
-    """
-
+    # `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
+    # `sphericity`, `cylindricity`
     name: str
+    # The value with its standard deviation; components of axes and normals are plain numbers, all others are
+    # lengths
     value: float
     sd: float
-    expanded: float
-    unit: str
+    expanded: float  # U = k sd
+    unit: str  # The linear unit of the block; empty for plain numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,13 +220,7 @@ def directions(kind: str) -> tuple[str, ...]:
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return points by names and patterns, each once, in the order in which they are asked for.
-
-    Raises
-    ------
-    InputError
-        A name that is not there, or a pattern that none has.
-    """
+    """Return points by names and patterns, each once, in the order of the request."""
     known, found = set(names), {}
     for each in wanted:
         if each in known:

@@ -30,19 +30,7 @@ def fields_of(sentence: str) -> set[str]:
 class Texts(Words):
     """Sentences in a language, with numbers as the language writes them.
 
-    Parameters
-    ----------
-    language
-        `en`, `de`.
-    own
-        Sentences by key that stand for those of the language.
-    unit
-        The linear unit of the block.
-
-    Raises
-    ------
-    InputError
-        A language or a key that there is not, fields that a sentence does not have.
+    `own` are sentences by code that replace those of the language, `unit` is the linear unit of the block.
     """
 
     def __init__(
