@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from string import Formatter
 from typing import Any
@@ -61,6 +61,13 @@ class Texts(Words):
         families = {key.partition(".")[0] for key in own}  # The others are of no statement
         self.missing = sorted(key for key in set(english) - set(own) if key.partition(".")[0] in families)
         """Keys that are said in English for want of a sentence in the language."""
+
+    def __call__(self, code: str, **fields: Any) -> str:
+        """Return the sentence of a code; numbers have the forms of :data:`FORMS`."""
+        for name, value in fields.items():
+            if isinstance(value, float) and name in FORMS:
+                fields[name] = FORMS[name](self, value)
+        return super().__call__(code, **fields)
 
     def said(self, key: str, **values: Any) -> tuple[str, str]:
         """Return a key with its sentence."""
@@ -147,3 +154,16 @@ class Texts(Words):
         kind, *things, component = parts
         one = ", ".join(self.word("one", part) for part in kind.split(", "))
         return " ".join([one, *things, self.word("axis", component)])
+
+
+FORMS: dict[str, Callable[[Texts, float], str]] = {
+    **dict.fromkeys(("rmse", "rmse_h", "rmse_v", "rmse_3d", "loo_h", "loo_v"), Texts.length),
+    **dict.fromkeys(("accuracy_r", "accuracy_z", "ce95", "largest", "rms", "mean", "expanded"), Texts.length),
+    **dict.fromkeys(("sd", "shift", "rise", "bend", "survey", "value", "east", "north"), Texts.length),
+    **dict.fromkeys(("height", "limit"), Texts.length),
+    **dict.fromkeys(("share", "percent", "spacing"), Texts.percent),
+    **dict.fromkeys(("factor", "low", "high", "k", "ratio"), lambda texts, value: texts.number(value, 2)),
+    "p": Texts.probability,
+    "class": Texts.size,
+}
+"""Forms of numbers in sentences by the names of fields."""
