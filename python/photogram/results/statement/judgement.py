@@ -245,10 +245,9 @@ def _honest(found: Grounds) -> Said:
     shifts = [(part, own) for part, own in of_all.bias.items() if own is not None]
     for part, shift in shifts:
         if shift.rejected:
-            fields = {"component": texts(f"component.{part}"), "k": shift.expanded / shift.sd_of_mean}
-            sizes = {"mean": shift.mean, "expanded": shift.expanded}
-            p = texts.percent(found.asked.coverage)
-            said.append(texts.said("bias.found", **fields, **sizes, p=p))
+            sizes = {"mean": shift.mean, "expanded": shift.expanded, "k": shift.expanded / shift.sd_of_mean}
+            component, p = texts(f"component.{part}"), texts.percent(found.asked.coverage)
+            said.append(texts.said("bias.found", component=component, **sizes, p=p))
     if shifts and not any(shift.rejected for _, shift in shifts):
         said.append(texts.said("bias.none"))
     return [*said, *_surface(texts, of_all.surface), *_points(found, of_all.points)]

@@ -134,7 +134,7 @@ class Asked:
                 raise InputError(phrase("request.reason", point=point))
 
 
-def invalid(name: str, code: str, value: object = None, **fields: Any) -> InputError:
+def invalid(name: str, code: str, value: object = None, /, **fields: Any) -> InputError:
     """Return the error that a value is not allowed."""
     return InputError(phrase("error.at", what=name, message=phrase(code, value=value_field(value), **fields)))
 

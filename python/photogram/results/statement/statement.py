@@ -30,6 +30,7 @@ from photogram.results.statement.standards import standards
 from photogram.results.statement.tables import check_points, left_out_points
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Document
+from photogram.show.quantity import records
 from photogram.show.run import InputFile
 from photogram.show.summary import Brief, Rows
 from photogram.words import Phrase, phrase
@@ -92,12 +93,12 @@ class Statement(Grounds, Brief):
     @property
     def check_points(self) -> list[dict[str, Any]]:
         """The check points, as in the JSON document."""
-        return check_points(self).record()
+        return records(check_points(self).columns)
 
     @property
     def leave_one_out(self) -> list[dict[str, Any]]:
         """Control points predicted by the others, likewise."""
-        return left_out_points(self.texts, self.left_out).record()
+        return records(left_out_points(self.texts, self.left_out).columns)
 
     def budget(self, quantity: str | Mapping[Any, Sequence[float]]) -> dict[str, Any]:
         """Return the budget of a quantity: one of the page, or any other.
