@@ -270,7 +270,7 @@ def _size(patterns: Sequence[Pattern]) -> Table:
         f"1 mm in the photo on the ground, {linear}",
         f"sd of image coordinates on the ground, {linear}",
     )
-    columns = [Quantity(names, kind="name", head="Number or size")]
+    columns = [Quantity(names, kind="name", head=" ")]
     for pattern in patterns:
         result, new = pattern.result, pattern.new_points
         counts = (
