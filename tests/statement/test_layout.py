@@ -97,7 +97,7 @@ def test_a_hull_has_the_area_of_that_of_another_program_and_holds_its_points(poi
         (lambda: layout([], SQUARE, SQUARE), "error.shape"),
         (lambda: layout(np.zeros((0, 3)), SQUARE, SQUARE), "error.empty"),
         (lambda: layout([[math.nan, 0, 0]], SQUARE, SQUARE), "error.finite"),
-        (lambda: layout(SQUARE, SQUARE[:1], SQUARE), "request.one-place"),
+        (lambda: layout(SQUARE, SQUARE[:1], SQUARE), "request.identical-positions"),
         (lambda: layout(SQUARE, SQUARE, [["a", 1, 2]]), "control is not an array of numbers"),
         (lambda: area_in_plan([[1.0]]), "error.shape"),
     ],

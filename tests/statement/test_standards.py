@@ -338,7 +338,7 @@ BAR = {"covariance": np.eye(2), "sd": [0.1, 0.1], "lines": ["a", "b"]}
             "error.covariance-singular",
         ),
         (lambda: length_test([1.0, 2.0], [1.0, 2.0], **(BAR | {"lines": ["a"]})), "error.count"),
-        (lambda: measured_lengths(np.zeros((2, 3)), np.eye(6), [[0, 1]]), "request.one-place"),
+        (lambda: measured_lengths(np.zeros((2, 3)), np.eye(6), [[0, 1]]), "request.identical-positions"),
         (
             lambda: measured_lengths(np.zeros((2, 3)), np.eye(6), [[0, 2]]),
             r"pairs\[:, 1\]\[0\] is 2, outside 0",

@@ -207,7 +207,7 @@ def test_a_survey_without_standard_deviations_is_refused_unless_said():
 def test_a_standard_deviation_along_one_axis_is_refused():
     with pytest.raises(photogram.InputError) as error:
         _with_checks(survey=np.array([0.01, np.nan, 0.01])).statement()
-    assert (error.value.code, error.value.phrase.fields["point"]) == ("request.one-axis", "C01")
+    assert (error.value.code, error.value.phrase.fields["point"]) == ("request.single-axis", "C01")
 
 
 def test_a_check_point_in_the_place_of_control_is_refused(result):

@@ -233,7 +233,7 @@ def _survey(
     halved = known[:, :2].all(axis=1) & (np.isfinite(own[:, 0]) != np.isfinite(own[:, 1]))
     if halved.any():
         name = names[int(np.argmax(halved))]
-        raise InputError(phrase("request.one-axis", point=name))
+        raise InputError(phrase("request.single-axis", point=name))
     if asked is not None:
         own = np.where(np.isnan(own), asked, own)
     lacking = (known & np.isnan(own)).any(axis=1)

@@ -62,7 +62,7 @@ def layout(points: ArrayLike, extent: ArrayLike, control: ArrayLike) -> Layout:
     low, high = block[:, :2].min(axis=0), block[:, :2].max(axis=0)
     diagonal = math.hypot(*(high - low))
     if not diagonal > 0:
-        raise invalid("extent", "request.one-place")
+        raise invalid("extent", "request.identical-positions")
     above = own[:, :2] > (low + high) / 2
     quadrants = np.bincount(above[:, 0] + 2 * above[:, 1], minlength=4) / len(own)
     return Layout(

@@ -116,7 +116,7 @@ def measured_lengths(positions: ArrayLike, covariance: ArrayLike, pairs: ArrayLi
     steps = own[second] - own[first]
     found = np.linalg.norm(steps, axis=1)
     if not (found > 0).all():
-        raise invalid(f"pairs[{np.argmin(found > 0)}]", "request.one-place")
+        raise invalid(f"pairs[{np.argmin(found > 0)}]", "request.identical-positions")
     along = steps / found[:, np.newaxis]
     gradient = np.zeros((count, len(own), 3))
     rows = np.arange(count)
@@ -137,7 +137,7 @@ def angle_to_diagonal(steps: ArrayLike, extent: ArrayLike) -> float:
         raise invalid("steps", "error.shape", shape="(m, 3)", actual=str(own.shape))
     sizes = np.linalg.norm(own, axis=1) * float(np.linalg.norm(box))
     if not (sizes > 0).all():
-        raise invalid("steps", "request.one-place")
+        raise invalid("steps", "request.identical-positions")
     # Of the four diagonals the one whose components have the signs of the step is the nearest.
     nearest = float((np.abs(own) @ np.abs(box) / sizes).max())
     return math.acos(min(nearest, 1.0))
