@@ -88,13 +88,7 @@ class PicturedNetwork(Pictured):
 
 
 class PicturedBlock(PicturedNetwork):
-    """What is drawn of an adjusted block: geographic space in axes to east, north and up amid its stations.
-
-    Parameters
-    ----------
-    result
-        The adjusted block.
-    """
+    """The data of an adjusted block: geographic space in axes to east, north and up amid its stations."""
 
     result: Result
 
