@@ -161,8 +161,8 @@ class Aside:
 
     # The groups, by their numbers, that do not meet where most of their point and photo do
     images: tuple[int, ...]
-    photos: dict[int, str]  # Photos whose images agree with no pose, and why that is said
-    found_by: str = "a consensus of resections and intersections"  # What the consensus is of
+    photos: dict[int, str | Phrase]  # Photos whose images agree with no pose, with the reason
+    found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
 
 
 class LostSupportError(Exception):

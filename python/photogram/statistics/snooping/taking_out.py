@@ -38,7 +38,7 @@ class Settings:
 
 
 RESCUES = 5  # Largest number of attempts of a round to determine all unknowns
-_NOT_DETERMINED = "its point is no longer determined and has left the network"
+_NOT_DETERMINED = Phrase("snooping.point-undetermined")
 
 
 class TakingOut:
@@ -51,7 +51,7 @@ class TakingOut:
         self.out = Out(np.zeros(int(suspects.row_starts[-1]), dtype=bool)) if out is None else out
         self.log: list[Removal] = []
         self.rounds: list[Round] = []
-        self.remarks: list[str] = []
+        self.remarks: list[Phrase] = []
         self.returns: set[int] = set()
         self.kept: set[int] = set()
         self.predicted: dict[int, tuple[Prediction, float]] = {}
@@ -88,7 +88,6 @@ class TakingOut:
         returned: Sequence[int],
         *,
         out: int = 0,
-        remarks: Sequence[str] = (),
     ) -> None:
         """Add a round to the log: how the network stood before it, with so many out, and what it changed."""
         self.rounds.append(
@@ -101,7 +100,6 @@ class TakingOut:
                 limit=self.level.limit(out),
                 removed=removed,
                 returned=returned,
-                remarks=remarks,
             )
         )
 
@@ -184,7 +182,7 @@ class TakingOut:
             **values,
         )
 
-    def apply(self, entries: list[Removal], remarks: list[str], returning: Sequence[int] = ()) -> list[int]:
+    def apply(self, entries: list[Removal], returning: Sequence[int] = ()) -> list[int]:
         """Take groups out with what cannot stay without them, and adjust.
 
         Groups without which the network falls apart stay, and are said to.
@@ -227,7 +225,7 @@ class TakingOut:
 
     def _keep(self, entry: Removal) -> None:
         self.kept.add(entry.group)
-        self.log.append(entry.with_(kept="nothing else determines what it belongs to"))
+        self.log.append(entry.with_(kept=Phrase("snooping.needed")))
 
     def _out_with(self, out: Out, entry: Removal) -> Removal:
         """Put a group out, and what cannot stay without it."""
@@ -237,7 +235,7 @@ class TakingOut:
         if photos:
             out.rows[list(entry.rows)] = False
             self.kept.add(entry.group)
-            return entry.with_(kept="it would leave a photo with fewer than three points")
+            return entry.with_(kept=Phrase("snooping.photo-undetermined"))
         own = int(self.suspects.points[entry.group])
         if _NOT_DETERMINED in consequences and own >= 0:
             points = points | {own}
@@ -246,13 +244,13 @@ class TakingOut:
             consequences += self.left(out, point)
         return entry.with_(consequences=tuple(dict.fromkeys(consequences))) if consequences else entry
 
-    def left(self, out: Out, point: int) -> Iterator[str]:
-        """Put everything of a point out, and say so."""
+    def left(self, out: Out, point: int) -> Iterator[Phrase]:
+        """Put everything of a point out, with a message for each group."""
         for group in self.suspects.on_point(point).tolist():
             rows = self.suspects.rows(group)
             if not out.rows[rows].all():
                 out.rows[rows] = True
-                yield f"{self.suspects.name(group)} is no longer used (its point is left with one ray)"
+                yield Phrase("snooping.single-ray", {"name": self.suspects.name(group)})
 
     def adjust(self, out: Out) -> None:
         """Adjust without what is out, and test the rest; raises LostSupportError."""
