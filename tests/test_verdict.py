@@ -11,6 +11,7 @@ import pytest
 from contradictions import contradictions, sentences_of
 from photogram import adjust, resect, simulate
 from photogram.network import project
+from photogram.show.cells import written
 from photogram.show.forms import table_text
 from photogram.show.forms import text as report_of
 from photogram.show.judgement import judged, verdict_table
@@ -199,7 +200,7 @@ def test_no_probability_is_lost():
     assert made.tests[1].log10_p == pytest.approx(-(400**2) / 2 / math.log(10), rel=1e-3)
     assert math.isfinite(made.tests[0].log10_p)
     # The report shows that it is tiny, the JSON document how tiny.
-    outcome = table_text(verdict_table(made))[2]
+    outcome = table_text(written(verdict_table(made)))[2]
     assert "< 1e-99" in outcome
     assert "rejects" in outcome
 

@@ -102,7 +102,7 @@ def _print_withheld(placed: dict[Path, Calibration]) -> None:
 
 def _corrections(calibration: Calibration, place: Path) -> dict[Path, bytes]:
     """Make what measurements are corrected by: corrections and corrected grids."""
-    from photogram.comparator.gridfile import adjusted_grid, corrected_grid
+    from photogram.comparator.calibration import adjusted_grid, corrected_grid
 
     made = {place / "correction.json": calibration.correction.to_json()}
     if calibration.joint:

@@ -87,19 +87,11 @@ class Edited:
 
 
 def edit(block: Block, suspects: Suspects, adjusted: Adjuster) -> Edited:
-    """Adjust a block and take out what does not fit, the largest of a neighbourhood at a time.
+    """Adjust a block and remove observations that do not fit, the largest error of a neighbourhood at a time.
 
-    Control points that agree with each other's predictions are exchanged back, and all is done anew.
-
-    Parameters
-    ----------
-    block
-        The block, with its orientations right way up.
-    suspects
-        Gross errors known already. Images are left out from the beginning, photos when the block does not fit
-        with them; control is left out until its prediction has judged it.
-    adjusted
-        Adjusts.
+    Suspected images are left out from the beginning, suspected photos if the block does not fit with them,
+    suspected control until its prediction has confirmed it. Control points that agree with each other's
+    predictions are exchanged, and the search starts again.
     """
     found = _edited(block, suspects, adjusted)
     if not suspects.control.any() or not found.control:

@@ -24,6 +24,7 @@ from photogram.diagnosis.robust import critical
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.results.result import Result
+from photogram.words import Phrase, phrase
 
 FEWEST_OF_HALVES = 12
 """Images of a photo."""
@@ -51,15 +52,9 @@ def seam_hints(result: Result) -> list[Message]:
     value, step, axis, row, pitch = max(found, default=(0.0, 0.0, 0, 0, 1.0))
     if not value > critical(4 * len(result.films)):
         return []
-    halves, seam = (("left and right", "seam_column"), ("upper and lower", "seam_row"))[axis]
+    code = f"film-check.seam.{('column', 'row')[axis]}"
     unit = "mm" if pitch == 1.0 else "px"
-    return [
-        Message(
-            f"the {halves} halves of the scan of {block.photo_ids[row]} are shifted against each other,"
-            f" residuals show {step:.2g} {unit}: was the film scanned in two parts that were joined? Then"
-            f" {seam} of the table photos, the line where they meet, gives each its own film"
-        )
-    ]
+    return [Message(phrase(code, photo=block.photo_ids[row], step=step, unit=unit))]
 
 
 def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float, float]:
@@ -108,35 +103,30 @@ class _Found:
 
 
 def line_hints(result: Result) -> list[Message]:
-    """Name scanners whose lines jitter, with the standard deviations that count it.
-
-    Parameters
-    ----------
-    result
-        An adjustment with covariances.
-    """
+    """Name scanners whose lines jitter, with standard deviations that include the jitter."""
     scanners: dict[int, tuple[str, list[int]]] = {}
     for row, film in result.films:
         if film.readings.pitch != 1.0:
             scanners.setdefault(id(film.scanner), (film.scanner.name, []))[1].append(row)
     limit = critical(4 * (len(WINDOWS) - FAR) * max(len(scanners), 1), CHANCE)
-    said = []
+    messages = []
     for name, rows in scanners.values():
-        own = max(_of_scanner(result, rows), key=lambda each: each.z, default=None)
-        if own is not None and own.z > limit:
-            said.append(Message(_said(result, name, rows, own)))
-    return said
+        jitter = max(_of_scanner(result, rows), key=lambda each: each.z, default=None)
+        if jitter is not None and jitter.z > limit:
+            messages.append(Message(_jitter_message(result, name, rows, jitter)))
+    return messages
 
 
-def _said(result: Result, scanner: str, rows: list[int], own: _Found) -> str:
+def _jitter_message(result: Result, scanner: str, rows: list[int], found: _Found) -> Phrase:
     images = np.isin(result.block.image_photos, rows)
-    sd = float(np.median(result.block.image_sd[images]))
-    lines, axis = ("columns", "rows")[own.lines], "xy"[own.axis]
-    return (
-        f"residuals in {axis} of images in nearly the same {lines} of {scanner} (within"
-        f" {own.within:.0f} px) are alike by {own.jitter:.2g} px (z = {own.z:.1f}): its lines jitter, and"
-        f" marks and images on one line err together; --set sd.images={np.hypot(sd, own.jitter):.2g} counts"
-        " it in their standard deviations, and so does sd.fiducial_images"
+    return phrase(
+        f"film-check.jitter.{('columns', 'rows')[found.lines]}",
+        scanner=scanner,
+        axis="xy"[found.axis],
+        within=found.within,
+        jitter=found.jitter,
+        z=found.z,
+        sd=float(np.hypot(np.median(result.block.image_sd[images]), found.jitter)),
     )
 
 

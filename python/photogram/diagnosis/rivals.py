@@ -27,16 +27,9 @@ INVISIBLE = 1e-6
 
 
 def rival_images(result: Result, row: int, spread: float) -> Indices:
-    """Return the other images of a point that may as well be wrong, by their rows.
+    """Return the rows of other images of a point that may be wrong instead of the image in a row.
 
-    Parameters
-    ----------
-    result
-        An adjustment with that image.
-    row
-        The image.
-    spread
-        Robust standard deviation of the test values.
+    `spread` is the robust standard deviation of the test values.
     """
     block = result.block
     point = int(block.image_points[row])

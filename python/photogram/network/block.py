@@ -23,6 +23,7 @@ from photogram.arguments.arrays import (
     truth_value,
 )
 from photogram.arguments.equality import Valued
+from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, fields
@@ -714,8 +715,7 @@ def refuse_passages(block: Block, what: str, *, but: type[Passage] | tuple[()] =
 
 def checked(block: Block) -> Block:
     """Return a block whose photos have positions and attitudes; refuse all else, by name."""
-    if not isinstance(block, Block):
-        raise InputError(f"block is not a Block but of the type {type(block).__name__}")
+    require_block(block)
     unknown = np.isnan(block.photo_positions).any(axis=1) | np.isnan(block.photo_attitudes).any(axis=1)
     if unknown.any():
         photos = listed([block.photo_ids[row] for row in np.flatnonzero(unknown)])
@@ -724,6 +724,12 @@ def checked(block: Block) -> Block:
             " initial values"
         )
     return block
+
+
+def require_block(block: object) -> None:
+    """Refuse an argument that is not a block."""
+    if not isinstance(block, Block):
+        raise kind_error("block", "a Block", block)
 
 
 def position_columns(block: Block) -> tuple[str, str, str]:

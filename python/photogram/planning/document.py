@@ -135,7 +135,6 @@ def points_table(pattern: Pattern) -> Table:
 
 
 def _present(table: Table) -> Table:
-    """Return the groups that have points."""
     count = next(column for column in table.columns if column.name == "points")
     return replace(table, columns=chosen(table.columns, np.flatnonzero(count.values)))
 
@@ -217,13 +216,11 @@ def _layers(
     table: Callable[[Pattern], Table | Cells | None],
     intro: str = "",
 ) -> Section:
-    """Return a section with the table of each pattern as a layer."""
     tables = [made for pattern in patterns if (made := table(pattern)) is not None]
     return Section(key, title, [Layers(f"{key}-layers", tables)] if len(tables) > 1 else tables, intro)
 
 
 def _comparison(patterns: Sequence[Pattern]) -> str:
-    """Return the sentence that names the better pattern, by the rms of new points in height."""
     if not all(pattern.new_points.any() for pattern in patterns):
         return "There are no new points to be compared"
     unit = patterns[0].block.linear_unit
@@ -328,7 +325,6 @@ def advice(patterns: Sequence[Pattern]) -> list[str]:
 
 
 def _improvements(pattern: Pattern) -> list[float]:
-    """Return the ratios of standard deviations of new points without and with a known readout time."""
     known = pattern.known_rms_sd
     if known is None:
         return [1.0]

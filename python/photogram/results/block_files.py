@@ -56,7 +56,6 @@ _TABLES = {
     "features": "feature",
     "feature_deviations": "deviation",
 }
-"""Tables for people, and the kind that each is in `results.tables`."""
 
 
 def block_files(result: Result) -> dict[str, Content]:
@@ -209,4 +208,3 @@ class KeptTrajectory(Stand):
 CLASSES = (KeptTrajectory, Lens, Lines, LineSensor, Polynomial, Shutter, Spline, Table, Timed)
 """Classes that a document of a block with trajectories may name."""
 STANDS: dict[type, Callable[[Any], Stand]] = {Trajectory: KeptTrajectory.of}
-"""What is written in the place of others."""

@@ -186,7 +186,6 @@ class Calibration:
         return said
 
     def _worth(self) -> list[str]:
-        """Say which terms are worth keeping."""
         kept = [", ".join(each.names) for each in self.terms if each.worth_keeping]
         others = [
             f"{', '.join(each.names)} (probability {each.probability:.2g}, up to {each.effect:.2g} sd)"

@@ -140,7 +140,6 @@ def _picked(
 
 
 def _larger(before: Largest, sizes: Floats, kind: str, keys: Sequence[tuple[str, str]]) -> Largest:
-    """Return the largest of some sizes, where it is larger than that of other kinds."""
     found = np.where(np.isfinite(sizes), np.abs(sizes), 0.0)
     if not len(found) or not found.max() > before.size:
         return before

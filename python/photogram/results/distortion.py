@@ -50,15 +50,11 @@ DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})
 """Principal distance and point, and the beta of `eucm`, which is never 0; others are terms of the lens."""
 
-RADIAL = re.compile(r"[KkA]\d|k")
-"""Names of radial terms."""
+RADIAL = re.compile(r"[KkA]\d|k")  # Radial terms
 
-BALANCED_AT = 2.0 / 3.0
-"""r0, of the largest observed radius."""
-BEYOND = 1.25
-"""How far the curve goes on, of the largest observed radius."""
-ROWS = 51
-"""Radii of a curve."""
+BALANCED_AT = 2.0 / 3.0  # r0 as a part of the largest observed radius
+BEYOND = 1.25  # End of a curve as a multiple of the largest observed radius
+ROWS = 51  # Radii of a curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,8 +241,7 @@ def _is_fisheye(camera: Camera) -> bool:
     return "fisheye" in camera.model.lower()
 
 
-GRID = 9
-"""Positions along either side of the observed part of the image."""
+GRID = 9  # Positions along either side of the observed part of the image
 
 
 @dataclass(frozen=True, eq=False)

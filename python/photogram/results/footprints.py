@@ -20,10 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Footprints", "footprints", "grounds", "picture_frames"]
 
-SIDE = 4
-"""Vertices of an outline on each side of the picture."""
-HORIZON = math.radians(80.0)
-"""From the vertical: what a picture shows beyond is cut off there."""
+SIDE = 4  # Vertices of an outline on each side of the picture
+HORIZON = math.radians(80.0)  # Limit of footprints from the vertical
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,10 +45,8 @@ if TYPE_CHECKING:
 
 __all__ = ["AdjustedNetwork", "Observed"]
 
-JUDGED = 100_000
-"""Images of a network whose `repr` tells the verdict, at most."""
-REMARKS = 5
-"""That its `repr` tells at most."""
+JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
+REMARKS = 5  # Of a `repr`
 
 
 @dataclass(frozen=True, eq=False)

@@ -169,4 +169,3 @@ TABLES: dict[str, Callable[[AdjustedNetwork], list[Quantity]]] = {
     "control": control,
     "station": stations,
 }
-"""The tables of every network by the kind of things that have their rows."""

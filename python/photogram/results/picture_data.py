@@ -125,7 +125,6 @@ class PicturedBlock(PicturedNetwork):
         )
 
     def _metric(self, positions: Floats) -> Floats:
-        """Return (n, 3) positions in metric axes: as they are in rectangular space."""
         return self._axes.positions(positions) if self.result.block.geographic else positions
 
     @cached_property

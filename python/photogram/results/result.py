@@ -189,7 +189,6 @@ class Result(OnFilm, AdjustedNetwork):
         return block_files(self)
 
     def _members(self) -> dict[str, Any]:
-        """Return the members of the JSON document, without the sections that people read."""
         from photogram.results.document import block_members
 
         return block_members(self)
@@ -328,7 +327,6 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        """Return what the result says about one kind of thing; `attrs` name the datum."""
         import pandas as pd
 
         from photogram.results.tables import TABLES
@@ -491,7 +489,6 @@ class Result(OnFilm, AdjustedNetwork):
 
 
 def _least_turns(angles: Floats) -> Floats:
-    """Take away whole turns."""
     return np.asarray(angles - math.tau * np.round(angles / math.tau))
 
 

@@ -31,8 +31,7 @@ from photogram.show.quantity import Quantities
 FORMAT = 2
 SUMMARY = "summary.json"
 _STATE = "state"
-_READ = ("photos", "points", "images", _STATE)
-"""Tables that are read again; the others are for people."""
+_READ = ("photos", "points", "images", _STATE)  # Tables that are read; the others are for people
 TRIANGLE = "covariances, lower triangle row by row, scaled by the variance of unit weight"
 REDUNDANCY = "redundancy number of {} as an observation; 0 unless weighted"
 GIVEN_SD = "standard deviation of {} that was given: infinite free, 0 fixed"
@@ -183,8 +182,7 @@ class Saved:
             raise InputError(f"keeps no state ({error})", file=self.folder / SUMMARY) from None
 
 
-_RENAMED = {"standardized": "test", "d": "difference"}
-"""What is called otherwise in Parquet."""
+_RENAMED = {"standardized": "test", "d": "difference"}  # Names in Parquet
 
 
 def sheet(table: Quantities) -> list[Column]:

@@ -18,11 +18,9 @@ from photogram.network.tables import ATTITUDE_COLUMNS
 Wanted = str | int | Sequence[str] | Sequence[int] | None
 """A name, names, or None for all; the photos and points of collections are called by their numbers."""
 
-Item = tuple[str, Wanted]
-"""A kind (of blocks `photo`, `step`, `point`, `camera`, `unknown`) and what of it."""
+Item = tuple[str, Wanted]  # Kind (`photo`, `step`, `point`, `camera`, `unknown`) and names
 
-Selection = Item | Sequence[Item]
-"""One or several of these."""
+Selection = Item | Sequence[Item]  # One or several items
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +95,6 @@ class Adjusted:
         return Selected(rows, labels, together[0], together[1], shapes)
 
     def _places(self, kind: str) -> dict[str, int]:
-        """Return where each name of a kind stands: large networks are asked more than once."""
         known: dict[str, dict[str, int]] = self.__dict__.setdefault("_known_places", {})
         if kind not in known:
             known[kind] = {name: i for i, name in enumerate(self.things[kind].ids)}

@@ -33,8 +33,7 @@ __all__ = [
     "restarted_motion",
 ]
 
-Joint = Callable[[list[str]], Floats]
-"""Covariances of common unknowns, by their names, all with all."""
+Joint = Callable[[list[str]], Floats]  # Joint covariances of common unknowns by name
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,7 @@ from photogram.words import Phrase
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")
 """Fonts that the library contains; for other letters it searches the fonts of the machine."""
 
-LONGEST = 30
-"""Longest word that is not broken, characters."""
+LONGEST = 30  # Longest word that is not broken, characters
 
 
 def page_pdf(page: Document, *, author: str = "") -> bytes:
@@ -79,7 +78,6 @@ def _record(part: Any) -> Any:
 
 
 def _column(column: Column, texts: list[str]) -> dict[str, object]:
-    """Return the head of a column, and the text and the word from which its width follows."""
     words = [word for text in texts for word in text.split()] if column.text else texts
     size = partial(width, size=1.0)
     return {

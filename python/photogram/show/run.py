@@ -14,8 +14,7 @@ from photogram.messages import printable
 from photogram.show.page import Column, Fact, Facts, Part, Section, Table
 
 PIECE = 1 << 20
-LISTED = 200
-"""Input files that are listed at most."""
+LISTED = 200  # Listed input files
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from photogram.arguments.types import Bools
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.statistics.evidence import GLOBAL, WITHHELD, Evidence, Test, part_of
 from photogram.statistics.findings import Findings, Text
@@ -71,6 +74,13 @@ class Verdict:
     def usable(self) -> bool:
         """Whether the result can be used."""
         return self.exit == 0
+
+    def marks(self, kind: Text, shape: tuple[int, ...]) -> Bools:
+        """Return which observations of one type (of the shape of their test values) are outliers."""
+        marks = np.zeros(shape, dtype=bool)
+        for place in self.outlying.get(kind, ()):
+            marks[place] = True
+        return marks
 
     def exit_code(self, *, strict: bool = False) -> int:
         """Return the exit code of a command; `strict` lets warnings count."""

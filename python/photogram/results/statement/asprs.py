@@ -19,8 +19,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.freedom import rmse_interval
 
-ENOUGH = 30
-"""Check points with which a product is tested (7.13); with fewer it is produced to meet a class."""
+ENOUGH = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
 POINTS_BY_AREA = (
     (1_000.0, 30),
     (2_000.0, 40),

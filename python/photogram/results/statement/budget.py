@@ -32,10 +32,8 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram import Result
 
-LARGEST = 5
-"""Single observations that are listed."""
-EXACT = 5000
-"""Rows up to which degrees of freedom of components are computed though nothing was estimated."""
+LARGEST = 5  # Listed single observations
+EXACT = 5000  # Rows up to which degrees of freedom are computed without estimated components
 
 
 @dataclass(frozen=True)
@@ -233,8 +231,7 @@ class _Freedoms:
         return Freedom(self._basis, used, self._common, names, joint, welch)
 
 
-PHOTOS = 100
-"""Photos that are listed, those that contribute most."""
+PHOTOS = 100  # Listed photos with the largest contributions
 _PLURALS = {IMAGE: "images", CONTROL: "control", POSITION: "photo positions", ATTITUDE: "photo attitudes"}
 
 
@@ -292,7 +289,6 @@ class Rows:
         yield from self._parameters(squares)
 
     def _parameters(self, squares: Floats) -> Iterable[tuple[str, Phrase | str, int, float]]:
-        """Return weighted parameters of cameras and components of common unknowns."""
         several = len(self.block.camera_names) > 1
         for group in np.flatnonzero(self.suspects.kinds > OBSERVATION).tolist():
             for row in self.suspects.rows(group).tolist():

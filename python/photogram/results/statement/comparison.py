@@ -32,10 +32,8 @@ if TYPE_CHECKING:
 
 PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
 """Components that are tested together."""
-MOST = 5000
-"""Check points with a joint covariance: of more every second, third ..."""
-SAME_PLACE = 0.01
-"""Metres between a check point and the control point that it is."""
+MOST = 5000  # Check points with a joint covariance; of more points every second, third ... is used
+SAME_PLACE = 0.01  # Distance of identical check and control points, metres
 
 
 @dataclass(frozen=True, eq=False)

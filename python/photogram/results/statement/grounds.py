@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from photogram import Result
 
 MAX_FIXED_VALUES = 20  # Of a sentence
-Said = list[tuple[str, str]]
-"""Keys of the table of words, and texts."""
+Said = list[tuple[str, str]]  # Codes and texts
 
 
 @dataclass(frozen=True)

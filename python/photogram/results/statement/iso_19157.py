@@ -11,10 +11,8 @@ from typing import Any
 
 from photogram.errors import InputError
 
-ABSOLUTE = "absolute (external) positional accuracy"
-"""Of check points."""
-RELATIVE = "relative (internal) positional accuracy"
-"""Of lengths, and of differences between points."""
+ABSOLUTE = "absolute (external) positional accuracy"  # Of check points
+RELATIVE = "relative (internal) positional accuracy"  # Of lengths, and of differences between points
 MEASURES = {
     "bias": (128, "bias of positions"),
     "le90": (35, "linear map accuracy at 90 % significance level"),
@@ -25,7 +23,6 @@ MEASURES = {
     "rmse_plan": (47, "root mean square error of planimetry"),
     "ellipse": (50, "uncertainty ellipse"),
 }
-"""Number and name of each."""
 
 
 def measures(

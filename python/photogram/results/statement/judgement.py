@@ -23,8 +23,7 @@ from photogram.statistics.distributions import critical_normal
 from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
-NOT_USABLE = 4
-"""Exit code of a statement that must not be handed over as it is."""
+NOT_USABLE = 4  # Exit code
 HEIGHT_KINDS = 10.0
 """Standard deviations of a mean difference beyond which heights of two kinds may have been compared."""
 NAMED = 10
@@ -304,7 +303,6 @@ def _factor(texts: Texts, factor: float, interval: tuple[float, float]) -> dict[
 
 
 def _points(found: Grounds, tests: PointTests) -> Said:
-    """Return which single points disagree, and which were set beside."""
     texts, names, without = found.texts, found.compared.names, found.asked.without
     said = [
         texts.said("point.wrong", point=names[row], p=texts.probability(float(tests.least[row])))

@@ -19,10 +19,8 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
 
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
-FAR = 1 / 3
-"""Of the diagonal: farther from a check point the block is not checked."""
-CELLS = 200
-"""Of the box on each side, at whose middles the area that is far from check points is counted."""
+FAR = 1 / 3  # Distance from check points as a part of the diagonal
+CELLS = 200  # Grid for the area far from check points, along each side
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,6 @@ def _plan(name: str, given: ArrayLike, least: int) -> Floats:
 
 
 def _least_spacing(plan: Floats) -> float:
-    """Return the least distance between two of some points; NaN for one point."""
     if len(plan) < 2:
         return math.nan
     reach = 1.001 * float(np.linalg.norm(np.ptp(plan, axis=0)))
@@ -119,7 +116,6 @@ def _far(plan: Floats, block: Floats, limit: float) -> float:
 
 
 def _heights(own: Floats, block: Floats) -> float:
-    """Return the range of some heights over that of a block, as far as they are known."""
     whole, known = block[np.isfinite(block)], own[np.isfinite(own)]
     extent = np.ptp(whole) if whole.size else 0.0
     return float(np.ptp(known) / extent) if known.size and extent > 0 else math.nan

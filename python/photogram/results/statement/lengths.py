@@ -22,10 +22,8 @@ from photogram.statistics.limits import GlobalTest
 
 LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
 """Asked for: lines, lengths on each, and the longest of all over the diagonal of the volume."""
-ALONG = math.radians(15.0)
-"""Between a line and a diagonal of the volume along which it runs, at the most."""
-REFERENCE = 20.0
-"""Degrees Celsius: the temperature of which calibrated lengths are."""
+ALONG = math.radians(15.0)  # Largest angle between a line and a diagonal of the volume
+REFERENCE = 20.0  # Temperature of calibrated lengths, degrees Celsius
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,10 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.error_radii import circular_error
 
-ENOUGH = 20
-"""Check points that are asked for."""
+ENOUGH = 20  # Required check points
 VERTICAL, RADIAL, EITHER = 1.9600, 1.7308, 2.4477
 """Factors of RMSE_z, of the radial RMSE, and of the mean of the RMSE of both axes."""
-LEAST_RATIO = 0.6
-"""Of the smaller RMSE of an axis to the larger: below it no factor holds."""
+LEAST_RATIO = 0.6  # Ratio of the RMSE of the axes below which the factors are not valid
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from photogram.show.quantity import Table
 if TYPE_CHECKING:
     from photogram import Statement
 
-_CLASSES = {"h": "v", "plan": "h", "all": "3d"}
-"""Parts of the components with classes."""
+_CLASSES = {"h": "v", "plan": "h", "all": "3d"}  # Parts of the components with classes
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -24,12 +24,9 @@ if TYPE_CHECKING:
 
 _AXES = {"x": 0, "y": 1, "z": 2, "e": 0, "n": 1, "h": 2, "east": 0, "north": 1, "height": 2}
 """What coordinates may be called, beside the names that they have in the block."""
-PRINCIPAL = ("f", "fx", "c")
-"""Parameters that are principal distances."""
-MANY = 10_000
-"""Names among which no near one is sought: it takes long."""
-TOGETHER = 256
-"""Points whose distances to all others are computed at a time."""
+PRINCIPAL = ("f", "fx", "c")  # Names of principal distances
+MANY = 10_000  # Larger lists of names are not searched for the nearest name
+TOGETHER = 256  # Points of one block of distances
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +160,6 @@ def _geocentric(x: Any, a: float, b: float) -> Any:
 
 
 def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:
-    """Return a linear function by its gradient."""
     items, parts = [], []
     for item, gradient in gradients.items():
         values = np.asarray(gradient, dtype=float)

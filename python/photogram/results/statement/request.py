@@ -18,11 +18,9 @@ from photogram.results.components import VarianceComponents
 __all__ = ["INDEPENDENT", "METRES", "STANDARDS", "Asked", "length_of", "lengths_in"]
 
 STANDARDS = ("plain", "asprs-2023", "nssda", "vdi-2634", "iso-19157")
-INDEPENDENT = ("yes", "same-base", "no")
-"""What may be declared of the survey of check points."""
+INDEPENDENT = ("yes", "same-base", "no")  # Of the survey of check points from the block
 METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
-METRES["us-ft"] = 1200 / 3937
-"""Metres of the units of length."""
+METRES["us-ft"] = 1200 / 3937  # Metres of the units of length
 _UNPAIRED = re.compile("[\ud800-\udfff]")
 _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([A-Za-z-]*?)(2?)\s*")
 
@@ -227,7 +225,6 @@ _CHECKS: Mapping[str, Callable[[str, Any], Any]] = {
     "limit": _limit,
     "expansion": number,
 }
-"""What checks and converts options; the others are text."""
 
 
 def lengths_in(unit: str) -> float:

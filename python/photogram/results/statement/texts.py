@@ -14,8 +14,7 @@ from photogram.show.page import fixed, probability_written
 from photogram.words import Phrase, Words, table_of
 
 LANGUAGES = ("en", "de")
-NOTHING = "–"
-"""What stands for a number that there is not."""
+NOTHING = "–"  # Missing number
 
 
 def fields_of(sentence: str) -> set[str]:

@@ -7,8 +7,7 @@ from typing import TypeAlias
 
 from photogram.arguments.types import Floats
 
-Box: TypeAlias = tuple[float, float, float, float]
-"""Left, low, right and high side."""
+Box: TypeAlias = tuple[float, float, float, float]  # Left, low, right and high side
 
 
 def free_side(

@@ -93,7 +93,6 @@ def _panel(placed: Placed, name: str) -> str:
 
 
 def _axes(placed: Placed) -> str:
-    """Return the lines of the axes with their numbers and names."""
     panel, (left, top, right, low) = placed.panel, placed.box
     over = placed.at(
         np.column_stack([placed.across.values, np.full(len(placed.across.values), panel.limits[0, 1])])
@@ -138,7 +137,6 @@ def _across(given: Ticks, places: Sequence[float], low: float, *, turned: bool) 
 
 
 def _above(placed: Placed) -> str:
-    """Return the title and the scales under it."""
     panel, (left, top, right, _) = placed.panel, placed.box
     y = top - above(panel, placed.title)
     found = []
@@ -160,7 +158,6 @@ def _notes(placed: Placed) -> str:
 
 
 def _legend(placed: Placed) -> tuple[str, list[Box]]:
-    """Return the legend, and what of the panel it takes."""
     marks = labelled(placed.panel)
     if not placed.panel.legend or not marks:
         return "", []
