@@ -186,13 +186,7 @@ class KeptTrajectory(Stand):
         return cls(*own, given.position_axes, given.angles, given.coefficients)
 
     def original(self) -> Trajectory:
-        """Return the trajectory.
-
-        Raises
-        ------
-        InputError
-            Others than its coefficients.
-        """
+        """Return the trajectory."""
         own_parts = (self.table, self.position, self.rotation, self.body)
         made = Trajectory(self.name, *own_parts, self.position_axes, self.angles)
         own, kept = (

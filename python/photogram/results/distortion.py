@@ -173,17 +173,7 @@ def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> 
 
 
 def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
-    """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them.
-
-    Parameters
-    ----------
-    camera, sd
-        With its parameters, and (k,) their standard deviations.
-    terms
-        Which of them are radial.
-    radii
-        (r,) in the unit of image coordinates.
-    """
+    """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them."""
     own = radial_part(camera)
     bare = own.parameters
     largest = radii.max()

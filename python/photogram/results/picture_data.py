@@ -88,13 +88,7 @@ class PicturedNetwork(Pictured):
 
 
 class PicturedBlock(PicturedNetwork):
-    """What is drawn of an adjusted block: geographic space in axes to east, north and up amid its stations.
-
-    Parameters
-    ----------
-    result
-        The adjusted block.
-    """
+    """The data of plots of a block; geographic space has axes to east, north and up at its stations."""
 
     result: Result
 
