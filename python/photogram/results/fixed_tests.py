@@ -51,7 +51,7 @@ class Held:
 def held_tested(result: Result) -> list[Tested]:
     """Return tests of the fixed stations and points with the worst images, where residuals are too large.
 
-    None where the adjustment is accepted, has not converged, has no covariances, or was done in parts.
+    None if the adjustment is accepted, has not converged, has no covariances, or was done in parts.
     """
     if not result.WHOLE:
         return []
@@ -192,7 +192,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
 
     Rao's score (:mod:`photogram.results.scores`) of radial and tangential terms, principal point and distance
     about the middle of the frame, whatever the model of the camera has; of the radial terms alone where
-    unknowns take up others. 0 where it is not known.
+    unknowns take up others. 0 if it is not known.
     """
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0

@@ -45,7 +45,7 @@ class Removal:
     rivals: tuple[Rival, ...] = ()  # groups that may contain the error instead
     consequences: tuple[Phrase | str, ...] = ()  # further removals and their reasons
     # prediction, prediction_log_probability, prediction_error: T of it, its log-probability, and observed
-    # minus predicted, against the network without it; None where its point or photo is out with it
+    # minus predicted, against the network without it; None if its point or photo is out with it
     prediction: float | None = None
     prediction_log_probability: float | None = None
     prediction_error: tuple[float, ...] = ()

@@ -48,7 +48,7 @@ def snooped(trial: Trial, settings: Settings, afresh: Callable[[], Aside | None]
         How.
     afresh
         Starts the trial anew from a consensus of its observations, for where its adjustment runs off; returns
-        what the consensus does without, None where there is none.
+        what the consensus does without, None if there is none.
     """
     work = begun(trial, settings, afresh)
     take_bad_photos_out(work)

@@ -143,7 +143,7 @@ def start_without(
 def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
     """Return the sizes of residuals in a robust adjustment, and the factor of its standard deviations.
 
-    None where no robust adjustment converges.
+    None if no robust adjustment converges.
 
     The median of all is lifted by many gross errors, whose effects spread: the factor is found anew from
     residuals of the robust adjustment, until it stands.
@@ -235,7 +235,7 @@ def _without(trial: Trial, aside: Aside) -> Out:
 def _decide(work: TakingOut, aside: Aside, before: Standing | None) -> None:
     """Test what a consensus does without against the rest; what agrees takes part.
 
-    `before`: how everything together stood; None where it could not be adjusted.
+    `before`: how everything together stood; None if it could not be adjusted.
     """
     first, tests, start = work.standing, work.tests, work.out
     out, consequences = Out(np.zeros_like(start.rows)), {}

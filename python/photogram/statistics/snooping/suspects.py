@@ -196,7 +196,7 @@ class Trial(Protocol):
         """Test all groups."""
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        """Test what is out of groups; None where it cannot be predicted."""
+        """Test what is out of groups; None if it cannot be predicted."""
 
     def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for the points of some groups, all groups there, residuals of unit weight, and R."""
@@ -207,7 +207,7 @@ class Trial(Protocol):
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for points that are out, all groups there with residuals and R as if they took part.
 
-        Each point by itself, against what the others determine; empty where that is not known.
+        Each point by itself, against what the others determine; empty if that is not known.
         """
 
     def resist(self, scale: float) -> Floats | None:

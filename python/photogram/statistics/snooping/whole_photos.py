@@ -96,7 +96,7 @@ def log_photo(
 ) -> int:
     """Enter a photo that is out, with what has fallen since then; return its place in the log.
 
-    `before` is None where the network has never been adjusted with it.
+    `before` is None if the network has never been adjusted with it.
     """
     suspects = work.suspects
     omega, log_p = math.nan, math.nan
