@@ -18,7 +18,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.statistics.reliability import TESTABLE
-from photogram.statistics.snooping.choosing import Choice
+from photogram.statistics.snooping.conditioning import Chosen
 from photogram.statistics.snooping.log import Removal
 from photogram.statistics.snooping.suspects import Aside, LostSupportError, Out, Standing, Tests, Trial
 from photogram.statistics.snooping.taking_out import Settings, TakingOut, log_probability, take_back
@@ -169,7 +169,7 @@ def _robust_sizes(work: TakingOut) -> tuple[Floats, float] | None:
 
 def _on_points_aside(
     work: TakingOut, points: list[int], candidates: Indices, first: Tests
-) -> tuple[list[Choice], set[int]]:
+) -> tuple[list[Chosen], set[int]]:
     """Adjust without some points and all candidates; choose on these points; tell which were judged."""
     out = work.out.copy()
     out.points |= set(points)

@@ -11,8 +11,8 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import LEVEL, log_chi_square, log_fisher
-from photogram.statistics.snooping.choosing import Choice, Choosing, Level
-from photogram.statistics.snooping.conditioning import UnitWeight
+from photogram.statistics.snooping.choosing import Choosing, Level
+from photogram.statistics.snooping.conditioning import Chosen, UnitWeight
 from photogram.statistics.snooping.log import Removal, Rival, Round
 from photogram.statistics.snooping.suspects import (
     LostSupportError,
@@ -70,14 +70,7 @@ class TakingOut:
     def choosing(self, allowed: Bools, out: int, *, ahead: bool) -> Choosing:
         """Return what chooses among allowed groups when so many are out."""
         return Choosing(
-            trial=self.trial,
-            tests=self.tests,
-            unit=self.unit(),
-            scales=self.scales,
-            allowed=allowed,
-            level=self.level,
-            out=out,
-            ahead=ahead,
+            self.trial, self.tests, self.unit(), self.scales, allowed, self.level, out, ahead=ahead
         )
 
     def note_round(
@@ -131,30 +124,25 @@ class TakingOut:
             limit=self.level.limit(0),
         )
 
-    def entries(self, choices: list[Choice], number: int) -> list[Removal]:
+    def entries(self, choices: list[Chosen], number: int) -> list[Removal]:
         """Return what was chosen as entries of the log."""
         entries = []
         for choice in choices:
-            own = choice.chosen
-            deviations = self.trial.deviations[own.rows]
+            deviations = self.trial.deviations[choice.rows]
             rivals = tuple(
                 Rival(str(self.suspects.name(group)), statistic, dimension, odds)
-                for group, statistic, dimension, odds in own.rivals
+                for group, statistic, dimension, odds in choice.rivals
             )
+            names = ("first_statistic", "statistic", "dimension", "fisher", "log_probability", "limit")
             entries.append(
                 self.entry(
                     choice.group,
-                    own.rows,
+                    choice.rows,
                     number,
-                    first_statistic=choice.first_statistic,
-                    statistic=own.statistic,
-                    dimension=own.dimension,
-                    fisher=own.fisher,
-                    log_probability=own.log_probability,
-                    error=own.error * deviations,
-                    error_sd=np.sqrt(np.diagonal(own.cofactors)) * deviations,
-                    limit=choice.limit,
+                    error=choice.error * deviations,
+                    error_sd=np.sqrt(np.diagonal(choice.cofactors)) * deviations,
                     rivals=rivals,
+                    **{name: getattr(choice, name) for name in names},
                 )
             )
         return entries
