@@ -242,7 +242,7 @@ def finished(
     said = list(outcome.remarks)
     if not math.isinf(largest):
         with suppress(AdjustmentError):
-            said += map(str, held_remark(held(), largest))
+            said += held_remark(held(), largest)
     found = Snooped(
         result=dataclasses.replace(result, messages=[*map(Message, said), *result.messages]),
         outcome=outcome,

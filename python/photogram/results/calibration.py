@@ -147,7 +147,7 @@ class Calibration:
     terms
         Terms as they are kept or left out together, tested at 1 percent, with what they do to images.
     removable
-        The term that may be left out: the least significant one that stands alone; None where all are needed.
+        The term that may be left out: the least significant one that stands alone; None if all are needed.
         Never several at once: without one of them the others have other tests.
     """
 

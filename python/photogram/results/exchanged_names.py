@@ -168,7 +168,7 @@ class _Fit:
         return np.where(np.isfinite(self.block.point_positions[points]), sd, np.inf)
 
     def _squares(self, own: Indices, rows: Indices, points: Indices) -> Floats:
-        """(n,) least sums of squares of (n,) points; infinite where rays do not meet before the cameras.
+        """(n,) least sums of squares of (n,) points; infinite if rays do not meet before the cameras.
 
         Images `rows` are those of the points `own` among these.
         """

@@ -59,7 +59,7 @@ def patterns(
     factor = float(np.nanmedian(np.abs(w))) / MEDIAN
     if not factor > 0:
         return []
-    # ~v = w sqrt(r), of w that are clipped; 0 where nothing is tested.
+    # ~v = w sqrt(r), of w that are clipped; 0 if nothing is tested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy)
     given, (axis, _) = result.given, result._terms().image_axes

@@ -53,7 +53,7 @@ class Inseparable:
     # share
     correlation: float
     # How many minimal detectable errors an error must have to be attributed to the right one of the two in 95
-    # of 100 cases; infinite where nothing tells them apart
+    # of 100 cases; infinite if nothing tells them apart
     factor: float
 
     def __str__(self) -> str:

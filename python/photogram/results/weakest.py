@@ -21,7 +21,7 @@ class WeakestPoint:
     point: str  # Its name
     # The largest of its standard deviations over the smallest, in any directions: the root of the ratio
     # of the eigenvalues of its covariance matrix. Rays that meet at right angles give about 1, nearly
-    # parallel ones 10,000 and more. 1 where a component is held
+    # parallel ones 10,000 and more. 1 if a component is held
     ratio: float
     # From the nearest station that sees it, in the median of these distances; NaN where scanners alone
     # do

@@ -133,7 +133,7 @@ class Estimate:
 
     @property
     def reference(self) -> float:
-        """The component of all image coordinates together; 1 where there are none."""
+        """The component of all image coordinates together; 1 if there are none."""
         own = [each for each in self.components if each.images and each.redundancy > 0]
         weights = [each.redundancy for each in own]
         return float(np.average([each.factor for each in own], weights=weights)) if own else 1.0
@@ -298,7 +298,7 @@ class _Run:
         self.state = self.adjust(self.factors)
 
     def iterate(self) -> bool:
-        """Go on until nothing changes; False where a component had to be held on the way."""
+        """Go on until nothing changes; False if a component had to be held on the way."""
         while True:
             free = self.free
             squares, redundancy = self._sums(self.state.squares), self._sums(self.state.redundancy)

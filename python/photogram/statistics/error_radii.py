@@ -78,11 +78,11 @@ def circular_error(covariances: ArrayLike, probability: float, offsets: ArrayLik
     probability
         Between 0 and 1.
     offsets
-        (n, 2) means of the errors; zero where it is not given.
+        (n, 2) means of the errors; zero if it is not given.
 
     Returns
     -------
-    (n,) in the unit of the standard deviations; NaN where a covariance or an offset is.
+    (n,) in the unit of the standard deviations; NaN if a covariance or an offset is.
 
     Raises
     ------
@@ -368,7 +368,7 @@ def _rule(count: int) -> tuple[Floats, Floats]:
 
 
 def _leg(hypotenuse: Floats, other: Floats) -> Floats:
-    """Return the other leg of right triangles; 0 where there is none."""
+    """Return the other leg of right triangles; 0 if there is none."""
     return np.asarray(np.sqrt(np.maximum((hypotenuse - other) * (hypotenuse + other), 0.0)))
 
 

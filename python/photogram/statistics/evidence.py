@@ -48,7 +48,7 @@ class Test:
     distribution: str  # `chi2`, `F`, `normal`, `t`, ...
     dof: tuple[float, ...]
     value: float
-    # What it may be at least and at most; None where there is no such side
+    # What it may be at least and at most; None if there is no such side
     limits: tuple[float | None, float | None]
     # Probability of a value as far out where nothing is wrong; `log10_p` for those that are no numbers
     p: float
@@ -244,7 +244,7 @@ class Evidence:
 
     @cached_property
     def factor(self) -> float:
-        """By how much residuals are larger than expected; NaN where that is not known."""
+        """By how much residuals are larger than expected; NaN if that is not known."""
         return self.test.factor if self.test is not None else math.nan
 
     def interval(self) -> Phrase:
@@ -386,7 +386,7 @@ def _log10(p: float) -> float:
 
 
 def _largest(tested: Tested, level: float, number: int) -> Test | None:
-    """Return the test of the kind with the least probability; None where nothing is tested."""
+    """Return the test of the kind with the least probability; None if nothing is tested."""
     place = tested.largest()
     return None if place is None else _test_at(tested, place, level, number)
 

@@ -68,7 +68,7 @@ class Series:
     off_sd: Floats
     drift: float  # per unit of time; NaN if all times are equal
     drift_sd: float
-    steps: Floats  # (k - 1,) t of a step before occasions 2 ... k; NaN where there is none
+    steps: Floats  # (k - 1,) t of a step before occasions 2 ... k; NaN if there is none
     test: GlobalTest | None  # Chi-square of the residuals about the mean
     changes: tuple[Change, ...]  # accepted changes, the most certain first
 

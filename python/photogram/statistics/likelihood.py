@@ -63,17 +63,17 @@ def judged(
     given
         Omega of the data as given, positive.
     changed
-        Omega of each hypothesis, positive; infinite where it cannot be fitted.
+        Omega of each hypothesis, positive; infinite if it cannot be fitted.
     degrees_of_freedom
         f.
     parameters
-        How many parameters each fits besides; one more must gain ln f. None where they fit none.
+        How many parameters each fits besides; one more must gain ln f. None if they fit none.
     known_weight
         Whether Omega has the unit weight of given standard deviations, so that it can pass its global test.
 
     Returns
     -------
-    None where no hypothesis improves as much as a mistake would.
+    None if no hypothesis improves as much as a mistake would.
     """
     f = degrees_of_freedom
     counts = [0] * len(changed) if parameters is None else parameters

@@ -223,7 +223,7 @@ def moran(xy: Floats, photos: Indices, residuals: Floats) -> float:
 
     summed over x and y. Neighbours are images in one of 10 x 10 cells of the frame but on different photos,
     since errors of the object make images of one photo alike; w_ij is 1 / (number of neighbours of i). About
-    0 without a pattern; NaN where nothing has a neighbour.
+    0 without a pattern; NaN if nothing has a neighbour.
     """
     if not len(xy):
         return math.nan

@@ -77,6 +77,8 @@ class Chosen:
     cofactors: Floats
     # Places of groups that were significant before and are not after, with T, m' and odds
     rivals: tuple[tuple[int, float, int, float], ...]
+    first_statistic: float = math.nan  # T at the start of the round
+    limit: float = math.nan  # the level that it was compared with
 
 
 class Conditional:

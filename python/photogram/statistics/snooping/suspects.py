@@ -161,8 +161,8 @@ class Aside:
 
     # The groups, by their numbers, that do not meet where most of their point and photo do
     images: tuple[int, ...]
-    photos: dict[int, str]  # Photos whose images agree with no pose, and why that is said
-    found_by: str = "a consensus of resections and intersections"  # What the consensus is of
+    photos: dict[int, str | Phrase]  # Photos whose images agree with no pose, with the reason
+    found_by: str | Phrase = Phrase("snooping.by-consensus")  # The origin of the start
 
 
 class LostSupportError(Exception):
@@ -196,7 +196,7 @@ class Trial(Protocol):
         """Test all groups."""
 
     def predictions(self, groups: Sequence[int]) -> list[Prediction | None]:
-        """Test what is out of groups; None where it cannot be predicted."""
+        """Test what is out of groups; None if it cannot be predicted."""
 
     def blocks(self, groups: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for the points of some groups, all groups there, residuals of unit weight, and R."""
@@ -207,7 +207,7 @@ class Trial(Protocol):
     def gone_blocks(self, points: Sequence[int]) -> list[tuple[list[int], Floats, Floats]]:
         """Return, for points that are out, all groups there with residuals and R as if they took part.
 
-        Each point by itself, against what the others determine; empty where that is not known.
+        Each point by itself, against what the others determine; empty if that is not known.
         """
 
     def resist(self, scale: float) -> Floats | None:
