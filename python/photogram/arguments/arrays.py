@@ -243,9 +243,11 @@ def shown(value: object) -> str:
     return ascii(field)[:80] if isinstance(field, str) else str(field)
 
 
-def argument_error(name: str, code: str, **fields: object) -> InputError:
+def argument_error(name: str, code: str, /, **fields: object) -> InputError:
     """Return the error of an argument: `code` is that of a message on values without `error.`."""
     texts = {key: str(value) if isinstance(value, tuple) else value for key, value in fields.items()}
+    if "value" in fields and not isinstance(fields["value"], Phrase):
+        texts["value"] = value_field(fields["value"])
     return InputError(phrase("error.at", what=name, message=phrase(f"error.{code}", **texts)))
 
 

@@ -18,8 +18,7 @@ from photogram.results.result import Result
 from photogram.statistics.exchanges import are_exchanged
 from photogram.statistics.likelihood import judged
 
-FEWEST = 3
-"""Control points that tell which two of them are exchanged."""
+FEWEST = 3  # Control points that tell which two of them are exchanged
 
 
 def freed(block: Block, points: Indices) -> Block:
