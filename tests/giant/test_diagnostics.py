@@ -160,9 +160,7 @@ def test_section_11_the_first_images_in_the_order_of_frames_are_kept(tmp_path):
     assert named == [("B", "3"), ("B", "2"), ("B", "1"), ("A", "Q")]
     message, *others = project.messages
     assert all(other.code == "giant.ties" for other in others)
-    assert message.text == (
-        "PASS POINTS APPEARING ON MORE THAN 1 PHOTOGRAPHS: 3, 2, 1: of each the first 1 images are kept"
-    )
+    assert message.phrase == phrase("giant.many-photographs", limit=1, names=["3", "2", "1"])
     headings = [warning.heading for warning in error_warnings(project, block, limits)]
     assert "PASS POINTS APPEARING ON MORE THAN 1 PHOTOGRAPHS" in headings
 
