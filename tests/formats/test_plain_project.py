@@ -601,7 +601,7 @@ def test_images_name_the_photos_of_a_project_without_a_table_of_photos(example):
     assert {each.name for each in formats.read(example).block.cameras} >= {name}
     lines[1] = lines[1].removesuffix(name) + "other"
     (example / "images.csv").write_text("\n".join(lines) + "\n")
-    with rejected("another camera"):
+    with rejected("plain.other-camera"):
         formats.read(example)
 
 
