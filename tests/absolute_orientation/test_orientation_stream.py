@@ -125,7 +125,7 @@ def test_the_document_gets_the_points_too(oriented, small_chunks, tmp_path):
         ("1 2 3 A\n4 5 B\n", "record 2: has 3 fields, not 4"),
         ("id,x,y,z\nA,1,2," + "9" * 140_000 + "\n", "record 2: the record has 140006 characters"),
         ("id,x,y,z" + "," * 420_000 + "\nA,1,2,3\n", "record 1: the record has 10000"),
-        ("id,x,y,z,,\nA,1,2,3,,\n", "record 1: the column '' is there twice"),
+        ("id,x,y,z,,\nA,1,2,3,,\n", "record 1: the column '' occurs more than once"),
         ("id,x,y,z,x\nA,1,2,3,4\n", "record 1: the column 'x' occurs more than once"),
         ('id,x,y,z\n"A\nB",1,2,3\n', "record 2: has "),
         ("id,x,y,z\nA,1e308,1e308,3\n", "point A is beyond double precision once transformed"),
@@ -169,7 +169,7 @@ def test_files_that_cannot_be_read(oriented, tmp_path):
         transform_file(oriented.similarity, tmp_path / "latin.csv", tmp_path / "out.csv")
     for text in ("{", '{"scale": 1}', "[]"):
         (tmp_path / "bad.json").write_text(text)
-        with pytest.raises(InputError, match="holds no result"):
+        with pytest.raises(InputError, match="the document must describe a result"):
             read_similarity(tmp_path / "bad.json")
 
 

@@ -174,7 +174,7 @@ def test_what_cannot_be_compared_is_refused(tmp_path):
         compare([first, other])
     for text in ("{}", "[1]", "nonsense", '{"joint": {"correction": 1}}'):
         (tmp_path / "bad.json").write_text(text)
-        with pytest.raises(InputError, match=r"bad\.json: holds no calibration"):
+        with pytest.raises(InputError, match=r"bad\.json: the document must describe a calibration"):
             compare([tmp_path / "bad.json", first])
 
 
@@ -193,7 +193,7 @@ def test_damaged_documents_are_refused_with_what_is_wrong(tmp_path):
         (("joint", "sigma_random_um"), 0.0, "0 is not positive"),
         (("cases", 0, "points", 3), 99, "points|99"),
         (("joint", "cases", 0, "rotation_rad"), "north", "could not convert"),
-        (("plates", 0, "corrected_plate_um", 0), [1.0], "holds no calibration"),
+        (("plates", 0, "corrected_plate_um", 0), [1.0], "the document must describe a calibration"),
     ):
         bad = json.loads(json.dumps(good))
         place = bad
