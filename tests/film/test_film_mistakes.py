@@ -90,7 +90,7 @@ def test_resampled_scans_are_told(folder: Path) -> None:
 
 def test_deviations_of_marks_may_be_said_beside_a_plain_project(folder: Path) -> None:
     changed(folder / "project.toml", "fiducial_images = 0.2\n", "")
-    with pytest.raises(InputError, match=r"give sd, or \[sd\] fiducial_images"):
+    with pytest.raises(InputError, match=r"or as fiducial_images to \[sd\]"):
         read(folder)
     wishes = Wishes(sd=deviations(["fiducial_images=0.3"]))
     observations = read(folder, wishes=wishes).block.observations

@@ -265,7 +265,7 @@ def test_a_user_adds_what_a_project_lacks(run, tmp_path):
     assert (cameras.loc[["f", "k1"], "sd"] > 0).all()
     for words, say in (
         (["--self-calibrate", "k9"], "there is no parameter of a camera 'k9'"),
-        (["--sd", "images=0"], "cannot be without error"),
+        (["--sd", "images=0"], "must be positive"),
         (["--sd", "size=1"], "--sd size=1"),
         (["--control", "own/gnss.csv"], "column point"),
     ):
