@@ -73,7 +73,7 @@ def test_documents_that_were_changed_are_refused(block, run, name, member):
     document = json.loads((run / name).read_text())
     del document[member]
     (run / name).write_text(json.dumps(document))
-    refused(block, run, "was changed after it was written")
+    refused(block, run, "the file was changed after it was written")
 
 
 def test_a_part_in_the_place_of_another_is_refused(block, run):
@@ -84,7 +84,7 @@ def test_a_part_in_the_place_of_another_is_refused(block, run):
 
 def test_a_table_of_another_part_is_refused(block, run):
     shutil.copyfile(run / "parts" / "00001" / "points.parquet", run / "parts" / "00000" / "points.parquet")
-    refused(block, run, r"points\.parquet: is not the file that was written with part\.json")
+    refused(block, run, r"points\.parquet: the checksum differs from part\.json")
 
 
 def test_the_part_of_another_run_is_refused(block, run, tmp_path):

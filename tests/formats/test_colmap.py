@@ -123,7 +123,7 @@ def test_control_by_names_carries_a_model_in_a_frame_of_its_own(run, tmp_path):
         "adjust", "moved", "--control", EXAMPLE / "control.csv", "--sd", "control=0.01", "--sd", "images=0.5"
     )
     assert done.exit_code == 0, done.output
-    assert "carried onto" in done.output
+    assert "the model is transformed to" in done.output
     place = tmp_path / "moved-adjusted"
     assert {"covariances.json", "images.bin", "photo_covariances.bin"} <= {
         each.name for each in (place / "adjusted-colmap").iterdir()

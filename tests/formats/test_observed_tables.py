@@ -123,7 +123,7 @@ def test_tables_that_are_written_by_hand_are_what_they_say(facade):
     ("file", "old", "new", "words"),
     [
         ("level_points", "lake,t", "lake,x", ["level_points.csv", "record 2", "column point", "no point"]),
-        ("level_points", "0.01", "", ["record 2", "column sd", "level_points under [sd]"]),
+        ("level_points", "0.01", "", ["record 2", "error.column sd: table.no-sd level_points"]),
         (
             "level_points",
             "pond",

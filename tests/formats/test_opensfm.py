@@ -192,7 +192,7 @@ def test_a_track_that_a_user_names_is_the_control_point_of_this_name(tmp_path):
             lambda d: next(iter(d[0]["cameras"].values())).update(projection_type="dual"),
             ["projection type 'dual'"],
         ),
-        (lambda d: next(iter(d[0]["cameras"].values())).update(width="x"), ["width", "is no number"]),
+        (lambda d: next(iter(d[0]["cameras"].values())).update(width="x"), ["width", "must be a number"]),
         (lambda d: d.clear(), ["holds no reconstruction"]),
         (
             lambda d: d[0]["points"]["0"].update(coordinates=[1, 2]),

@@ -174,7 +174,7 @@ def test_a_datum_on_three_points_is_held_as_asked_for(run, tmp_path):
     assert (points.loc[[a, c], "sd_Z"] == 0).all()
     assert points.loc[b, "sd_X"] > 0
     assert points.loc[d, "kind"] == "check"
-    for wanted, said in (("nobody=XYZ", "no point of the block"), (f"{a}=XQ", "axes of X, Y and Z")):
+    for wanted, said in (("nobody=XYZ", "points of the block"), (f"{a}=XQ", "POINT=AXES")):
         refused = run("adjust", "own", "--hold", wanted)
         assert refused.exit_code == 1
         assert said in refused.stderr
@@ -240,7 +240,7 @@ def test_a_user_adds_what_a_project_lacks(run, tmp_path):
     assert lines
     missing = run("adjust", "own", "--control", "given.csv")
     assert missing.exit_code == 1
-    assert "control under [sd]" in missing.stderr or "standard deviations" in missing.stderr
+    assert "control in [sd]" in missing.stderr or "standard deviations" in missing.stderr
     done = run("adjust", "own", "--control", "given.csv", "--sd", "control=0.01", "--out", "two", "-q")
     assert done.exit_code == 0, done.output
     one, two = (
@@ -264,8 +264,8 @@ def test_a_user_adds_what_a_project_lacks(run, tmp_path):
     cameras = pd.read_csv(tmp_path / "three" / "cameras.csv").set_index("parameter")
     assert (cameras.loc[["f", "k1"], "sd"] > 0).all()
     for words, say in (
-        (["--self-calibrate", "k9"], "no camera has the parameter k9"),
-        (["--sd", "images=0"], "cannot be without error"),
+        (["--self-calibrate", "k9"], "there is no parameter of a camera 'k9'"),
+        (["--sd", "images=0"], "must be positive"),
         (["--sd", "size=1"], "--sd size=1"),
         (["--control", "own/gnss.csv"], "column point"),
     ):

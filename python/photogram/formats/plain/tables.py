@@ -137,7 +137,7 @@ class Tables:
             found[known] = matrices_of(self.settings, values[known])
         return found
 
-    def known_matrices(self, table: ColumnTable, why: str = "there are no angles") -> Floats:
+    def known_matrices(self, table: ColumnTable) -> Floats:
         """Return (rows, 3, 3) attitudes A, photo to object; a row without one is an error."""
         found = self.matrices(table)
         unknown = np.isnan(found).any(axis=(1, 2))
