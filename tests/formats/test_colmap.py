@@ -16,12 +16,12 @@ from block import (
     with_noise,
 )
 from damaged import check_damaged
-from refusals import refused
 from test_plain_project import EXAMPLE, written
 
 from photogram import Attitudes, Camera, InnerConstraints, adjust, formats
 from photogram.formats.colmap.content import MODELS
 from photogram.formats.self_check import agreement
+from refusals import refused
 
 
 @pytest.mark.parametrize("dress", ["text", "text_legacy", "binary"])
@@ -221,7 +221,7 @@ def test_a_damaged_binary_file_is_named_with_the_record(tmp_path, file, change, 
             "images.txt",
             " 1 DJI_0002.JPG",
             " 2 DJI_0002.JPG",
-            ["images.txt", "record 5", "format.reference", "what=camera other=2"],
+            ["images.txt", "record 5", "format.undefined", "what=camera name=2"],
         ),
         (
             "points3D.txt",
@@ -229,7 +229,7 @@ def test_a_damaged_binary_file_is_named_with_the_record(tmp_path, file, change, 
             "107 -51.7594",
             ["points3D.txt", "record 3", "format.repeated", "what=point name=107"],
         ),
-        ("frames.txt", "10 1 0.0103", "10 9 0.0103", ["frames.txt", "format.reference", "what=rig other=9"]),
+        ("frames.txt", "10 1 0.0103", "10 9 0.0103", ["frames.txt", "format.undefined", "what=rig name=9"]),
     ],
 )
 def test_a_fault_of_a_text_file_is_named_with_its_line(tmp_path, file, old, new, words):

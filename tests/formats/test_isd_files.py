@@ -9,6 +9,7 @@ from support_data import RADIUS, START, along_minus_z, document, unmirrored, wri
 from photogram import InputError
 from photogram.formats.csm import SupportedImage, read_support
 from photogram.network import Polynomial, projected
+from refusals import refused
 
 PLACES = np.array([[10.0, 20.0], [150.0, 200.5], [290.0, 399.0], [0.5, 0.5]])
 """Samples and lines."""
@@ -198,45 +199,45 @@ FAULTS = [
     (without("image_lines"), "image_lines is missing"),
     (setting(0, "image_samples"), "image_samples: is no whole number from 1"),
     (setting("x", "focal_length_model", "focal_length"), "focal_length_model/focal_length: is no number"),
-    (setting(0, "focal_length_model", "focal_length"), "focal_length: is zero"),
+    (setting(0, "focal_length_model", "focal_length"), "format.zero"),
     (without("detector_center", "line"), "detector_center: line is missing"),
     (
         setting([0.0, 0.0, 0.0], "focal2pixel_lines"),
-        "focal2pixel_samples: has no inverse, together with /focal2pixel_lines",
+        "csm.inverse other=/focal2pixel_lines",
     ),
-    (setting(None, "detector_center", "line"), "/detector_center/line: is null, .* must be the line"),
+    (setting(None, "detector_center", "line"), "csm.null"),
     (
         setting(None, "focal_length_model", "focal_length"),
-        "/focal_length_model/focal_length: is null, .* must",
+        "csm.null meaning=the focal length in millimetres",
     ),
-    (setting(None, "focal2pixel_samples"), "/focal2pixel_samples: is null, .* three numbers"),
-    (setting(None, "detector_line_summing"), "/detector_line_summing: is null, .* must be the number"),
-    (setting(None, "center_ephemeris_time"), "/center_ephemeris_time: is null, .* must be the time"),
+    (setting(None, "focal2pixel_samples"), "csm.null"),
+    (setting(None, "detector_line_summing"), "csm.null"),
+    (setting(None, "center_ephemeris_time"), "csm.null"),
     (setting(None, "radii", "semimajor"), "/radii/semimajor: is null and must be a number"),
     (setting([0.0, 1.0], "focal2pixel_lines"), "focal2pixel_lines: has 2 numbers, not 3"),
-    (setting(0, "detector_sample_summing"), "detector_sample_summing: is not positive"),
+    (setting(0, "detector_sample_summing"), "format.positive name=the sum of pixels"),
     (
         setting({"fisheye": {}}, "optical_distortion"),
         "optical_distortion: the lens .?fisheye.? is none of radial",
     ),
-    (setting({}, "optical_distortion"), "optical_distortion: has 0 models"),
+    (setting({}, "optical_distortion"), "format.count n=0 required=1"),
     (setting([1.0], "optical_distortion", "radial", "coefficients"), "radial: .*has 3 coefficients"),
-    (setting({"lineExposureTimes": [1.0]}, "jitter"), "jitter: is known of frames alone"),
-    (setting([], "line_scan_rate"), "line_scan_rate: is empty"),
+    (setting({"lineExposureTimes": [1.0]}, "jitter"), "csm.jitter"),
+    (setting([], "line_scan_rate"), "format.empty"),
     (setting([[0.5, -2.0, 0.0]], "line_scan_rate"), "line_scan_rate: lines are first line"),
     (setting([[0.5, -2.0]], "line_scan_rate"), "line_scan_rate/0: has 2 numbers"),
     (setting("miles", "radii", "unit"), "radii/unit: the unit .?miles.? is none of m, km"),
-    (setting(2e9, "radii", "semiminor"), "radii: are no semi-axes"),
+    (setting(2e9, "radii", "semiminor"), "csm.radii"),
     (without("instrument_position", "positions"), "instrument_position: positions is missing"),
     (
         setting([1.0, 2.0], "instrument_position", "positions", 3),
         "instrument_position/positions/3: has 2 numbers",
     ),
-    (setting([[0, 0, 0]], "instrument_position", "velocities"), "velocities: has 1 records, positions 21"),
-    (setting(8, "instrument_position", "reference_frame"), "instrument_position: reference_frame .* 1, 8"),
+    (setting([[0, 0, 0]], "instrument_position", "velocities"), "format.count n=1 required=21"),
+    (setting(8, "instrument_position", "reference_frame"), "csm.frames names=[1, 8]"),
     (
         setting([0, 0, 0, 2], "instrument_pointing", "quaternions", 1),
-        "quaternions: record 1 has the length 2",
+        "format.length",
     ),
     (
         setting([1.0] * 9, "body_rotation", "constant_rotation"),
@@ -251,7 +252,7 @@ def test_what_is_wrong_is_named(tmp_path, change, said):
     data = json.loads(json.dumps(document()))
     change(data)
     path = written(tmp_path, data)
-    with pytest.raises(InputError, match=said) as caught:
+    with refused(said) as caught:
         read_support(path)
     assert caught.value.file == path
 
@@ -260,11 +261,10 @@ def test_lines_that_the_tables_do_not_reach_are_named(tmp_path):
     data = document()
     data["line_scan_rate"] = [[0.5, -2.0, 0.02]]
     own = image(tmp_path, data)
-    assert own.isd.remarks == (
-        "the 400 lines take 8 s by line_scan_rate, the table of instrument_pointing 4 s: the table is short"
-        " by 50.0 %",
-    )
-    with pytest.raises(InputError, match=r"line 300 of I is at 1006.0 s, the tables reach from .* to 1004.1"):
+    [remark] = own.isd.remarks
+    assert (remark.code, remark.fields["lines"], remark.fields["span"]) == ("csm.duration", 400, 8.0)
+    assert (round(remark.fields["table"], 6), round(remark.fields["percent"], 6)) == (4.0, 50.0)
+    with refused("csm.reach line=300.0 image=I time=1006.0"):
         own.to_ground([100.0, 300.0], [1.0, 1.0])
 
 
@@ -272,7 +272,7 @@ def test_ways_to_count_and_to_join_have_names(tmp_path):
     for how in ({"pixels": "corner"}, {"interpolation": "cubic"}):
         with pytest.raises(InputError, match="is one of isis, csm"):
             image(tmp_path, document(), **how)
-    with pytest.raises(InputError, match="shapes"):
+    with refused("format.shape name=lines required=(2,) got=(1,)"):
         image(tmp_path, document()).coordinates([1.0, 2.0], [1.0])
 
 

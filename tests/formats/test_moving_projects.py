@@ -19,6 +19,7 @@ from photogram.formats.block_contents import motions
 from photogram.formats.plain.batches import Streamed, streamable
 from photogram.network import Lens, Polynomial, Smoothness, Spline, Table, Timed, Trajectory
 from photogram.network.motion import about
+from refusals import refused
 
 GOLDEN = ("rolling_shutter", "pushbroom_strips", "jitter", "three_line", "planetary_pair")
 
@@ -385,11 +386,11 @@ def test_what_tables_cannot_hold(tmp_path):
     curved = lines.replace(timed=[replace(each, line_sensor=lensed) for each in lines.timed])
     with pytest.raises(InputError, match="behind a lens lrolrocnac, which tables of cameras cannot say"):
         formats.to_files(project_of(curved, tmp_path), "plain")
-    with pytest.raises(InputError, match=r"COLMAP.*: the photo L1 is of a line scanner"):
+    with refused("format.scanner photo=L1"):
         formats.to_files(own, "colmap")
     drone = project_of(block, tmp_path, sizes=((3000, 2000),))
     lost = formats.cannot_hold(drone, "colmap")
-    assert "trajectories: 6 photos with the poses that they are about" in lost
+    assert "trajectories: 6 photos with their approximate poses" in lost
 
 
 def test_what_counts_from_where_is_kept(moving_projects):
@@ -433,7 +434,7 @@ def test_adjust_and_info_on_the_command_line(run, moving_projects, tmp_path):
         done = run("adjust", moving_projects / name, "--out", name, "--no-html")
         assert done.exit_code in (0, 4), done.output
         if name == "lines":
-            assert "columns that the table trajectories does not have are not read: colour" in " ".join(
+            assert "columns unknown to the table trajectories are not read: colour" in " ".join(
                 done.output.split()
             )
         result = adjust(formats.read(moving_projects / name).block)

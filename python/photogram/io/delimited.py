@@ -25,6 +25,7 @@ from photogram.io.files import read_beginning, read_text, reading
 from photogram.io.places import Place
 from photogram.io.rows import DELIMITERS, LONGEST_RECORD
 from photogram.messages import listed, quoted
+from photogram.words import Phrase
 
 LARGE = 1 << 20  # Bytes of a table above which the extension module reads it
 PIECE = 1 << 22  # Bytes of a large table that are read at a time
@@ -43,7 +44,7 @@ def read_columns(
     known: Collection[str] = (),
     numbers: Collection[str] = (),
     spelling: Spelling = tuple,
-    hint: Callable[[Sequence[str]], str] | None = None,
+    hint: Callable[[Sequence[str]], str | Phrase] | None = None,
 ) -> ColumnTable:
     """Read a table from a text or Parquet file.
 
@@ -125,7 +126,7 @@ def _head(
     text: str,
     known: Collection[str],
     spelling: Spelling,
-    hint: Callable[[Sequence[str]], str] | None,
+    hint: Callable[[Sequence[str]], str | Phrase] | None,
 ) -> tuple[Place, str]:
     """Find the header: the first line, or the last comment before it where only that names known columns.
 

@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import Interpolation
@@ -184,7 +184,7 @@ class Isd:
     lines: Lines | None = None
     framelets: Framelets | None = None
     jitter: Jitter | None = None
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[Phrase, ...] = ()
     look: Literal[1, -1] = 1
 
     @property

@@ -27,7 +27,7 @@ FORMAT = Format(
     recognises=_recognises,
     read=later(f"{__name__}.assembling", "read"),
     results=later(f"{__name__}.writing", "results"),
-    adjusting=later(f"{__name__}.rejection", "rejecting"),
+    adjusting=later(f"{__name__}.outcome", "rejecting"),
 )
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
