@@ -85,7 +85,7 @@ def test_a_round_trip_keeps_all_but_features_without_point(tmp_path, dress, targ
 def test_what_is_written_of_the_plain_project_adjusts_to_the_same(tmp_path):
     project = formats.read(EXAMPLE)
     lost = " ".join(formats.cannot_hold(project, "colmap"))
-    for word in ("standard deviations", "4 held and 1 check points", "7 observations beside images"):
+    for word in ("standard deviations", "4 control and 1 check points", "7 observations other than images"):
         assert word in lost
     other = formats.read(written(project, tmp_path / "there", "colmap"))
     # names.csv beside the model keeps the names of points.
@@ -263,7 +263,7 @@ def test_rigs_that_cameras_do_not_tell_are_written_as_photos(tmp_path):
     block = project.block
     one = block.replace(photo_cameras=[0] * len(block.photo_ids))
     lost = " ".join(formats.cannot_hold(project.replace(block=one), "colmap"))
-    assert "rigs whose sensors are not told by their cameras" in lost
+    assert "rigs: photos have their own poses" in lost
     assert "rigs" not in " ".join(formats.cannot_hold(project, "colmap"))
     other = formats.read(written(project.replace(block=one), tmp_path, "colmap")).block
     assert not other.mounts
