@@ -18,8 +18,7 @@ from photogram.network.observations import Control
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 from photogram.words import phrase
 
-MOST_TOLD = 12
-"""Trajectories that are told one by one."""
+MOST_TOLD = 12  # Trajectories that are told one by one
 
 
 def posed(block: Block) -> Bools:

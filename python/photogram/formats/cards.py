@@ -14,8 +14,7 @@ from photogram.io.files import read_lines
 from photogram.io.places import Place
 from photogram.words import phrase
 
-END = "-99"
-"""What ends a photo, or a file."""
+END = "-99"  # What ends a photo, or a file
 _UNITS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}
 
 

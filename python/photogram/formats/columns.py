@@ -38,8 +38,7 @@ OURS = (
     *("cov_xy", "cov_xz", "cov_yz", "use", "time", "group"),
 )
 """Columns that a user may name."""
-STRICT = ("control", "gnss")
-"""Tables of which no number may go unread."""
+STRICT = ("control", "gnss")  # Tables of which no number may go unread
 SHORT = {"p": "point", "n": "y", "e": "x", "z": "z", "d": "d", "x": "x", "y": "y", "h": "z"}
 """Letters of orders of columns, as PNEZD."""
 _PLAIN_ROLES = frozenset({"use", "used", "usage", "role", "rolle", "verwendung", "ruolo", "papel", "uso"})

@@ -18,8 +18,7 @@ from photogram.messages import Message
 from photogram.words import phrase
 
 WGS84 = "EPSG:4979"
-SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")
-"""How the first line of a list begins, in capital letters."""
+SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")  # How the first line of a list begins, in capital letters
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 DIFFER = 1e-6
 _IMAGES = ("photo", "point", "column", "row")

@@ -25,12 +25,9 @@ from photogram.network.observations import Position
 from photogram.network.similarity import similarity
 from photogram.words import Phrase, phrase
 
-BETTER = 10.0
-"""How much better control must fit after an exchange for it to be named."""
-FITS = 0.2
-"""Part of the extent of control: what misfits by less is in its place, as far as first values tell."""
-FAR = 100.0
-"""Extents of photos and control that their middles are apart where they are in different systems."""
+BETTER = 10.0  # How much better control must fit after an exchange for it to be named
+FITS = 0.2  # Part of the extent of control: what misfits by less is in its place, as far as first values tell
+FAR = 100.0  # Extents of photos and control that their middles are apart where they are in different systems
 ZONE = 1e6
 
 Exchange = tuple[Phrase, str, Callable[[Floats], Floats]]

@@ -23,13 +23,11 @@ if TYPE_CHECKING:
     import pyproj
 
 GEOCENTRIC, GEOGRAPHIC = "EPSG:4978", "EPSG:4979"
-ORIGIN_DECIMALS = 4
-"""Of the degrees of a chosen origin; its height is rounded to a metre."""
+ORIGIN_DECIMALS = 4  # Of the degrees of a chosen origin; its height is rounded to a metre
 _ENU = re.compile(r"\s*ENU:\s*([-+.\d]+)\s*,\s*([-+.\d]+)\s*(?:,\s*([-+.\d]+)\s*)?", re.IGNORECASE)
 _GEOID = re.compile(r"\+geoid=([-+]?\d+(?:\.\d*)?)\s*$", re.IGNORECASE)
 """Behind a system: the height of the geoid above the ellipsoid, one for all."""
-STEP = 1.0
-"""Metres, for the directions of the axes of a system at a point."""
+STEP = 1.0  # Metres, for the directions of the axes of a system at a point
 
 
 @cache

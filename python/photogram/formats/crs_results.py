@@ -28,10 +28,8 @@ __all__ = ["Placed", "check_place", "placed", "placed_files", "placed_section"]
 
 _ANGLES = ("omega", "phi", "kappa")
 _LOCAL = ("east", "north", "up")
-DEGREE = 180.0 / np.pi
-"""Of a radian."""
-MOST = 500
-"""Points that are listed; the tables have all."""
+DEGREE = 180.0 / np.pi  # Of a radian
+MOST = 500  # Points that are listed; the tables have all
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,12 +25,9 @@ from photogram.network.geometry import (
 from photogram.network.motion import scanners
 from photogram.words import Phrase, phrase
 
-NOMINAL_MM = 0.01
-"""Side of a pixel where nothing says how large they are: rays are the same."""
-ROUND = 100
-"""Pixels: to whole ones of these go widths and heights that nothing says."""
-ROUND_ORIGIN = 1e-4
-"""Degrees to which the origin is rounded; its height is 0."""
+NOMINAL_MM = 0.01  # Side of a pixel where nothing says how large they are: rays are the same
+ROUND = 100  # Pixels: to whole ones of these go widths and heights that nothing says
+ROUND_ORIGIN = 1e-4  # Degrees to which the origin is rounded; its height is 0
 
 
 def in_pixels(project: Project) -> Project:

@@ -23,8 +23,7 @@ from photogram.words import phrase
 
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
 SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
-AMID = 0.1
-"""Marks whose mean is farther from the origin, in parts of the format, are counted from a corner."""
+AMID = 0.1  # Marks whose mean is farther from the origin, in parts of the format, are counted from a corner
 
 
 @dataclass(frozen=True, eq=False)

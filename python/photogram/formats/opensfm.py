@@ -31,10 +31,8 @@ from photogram.words import Phrase, phrase
 
 TITLE = "OpenSfM reconstruction"
 MODEL, TRACKS = "reconstruction.json", "tracks.csv"
-UNKNOWN_DOP = 15.0
-"""Metres: what the package takes where nothing is said."""
-NO_HEIGHT = 1e4
-"""Metres: standard deviation of heights that are no observations."""
+UNKNOWN_DOP = 15.0  # Metres: what the package takes where nothing is said
+NO_HEIGHT = 1e4  # Metres: standard deviation of heights that are no observations
 _VERSIONS = {"OPENSFM_TRACKS_VERSION_v1": 9, "OPENSFM_TRACKS_VERSION_v2": 11}
 _FIRST = 8
 _NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))

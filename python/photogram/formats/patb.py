@@ -42,8 +42,7 @@ from photogram.words import Phrase, phrase
 TITLE = "PATB block"
 IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
 MICROMETRES = 1e-3
-DIGITS = 6
-"""Of principal distances in millimetres: files have three of the micrometre."""
+DIGITS = 6  # Of principal distances in millimetres: files have three of the micrometre
 
 
 def read(path: Path, wishes: Wishes) -> Project:

@@ -13,12 +13,9 @@ from photogram.network.block import Block
 from photogram.network.refraction import METRES_PER_UNIT
 from photogram.words import Phrase, phrase
 
-RADIUS = 6_371_000.0
-"""Of the earth, metres."""
-LIKE_A_PLANE = 1e5
-"""Metres: coordinates that are both larger are those of a map, not of axes of one's own."""
-STEP = 100.0
-"""Metres, over which scales are measured."""
+RADIUS = 6_371_000.0  # Of the earth, metres
+LIKE_A_PLANE = 1e5  # Metres: coordinates that are both larger are those of a map, not of axes of one's own
+STEP = 100.0  # Metres, over which scales are measured
 
 
 @dataclass(frozen=True)

@@ -23,14 +23,11 @@ from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.words import Phrase, option_sd, phrase
 
-BETTER = 3.0
-"""How much better rotations must fit transposed to be taken so."""
-LEAST, MOST = 2.0, 3000.0
-"""Millimetres between which principal distances of cameras lie."""
+BETTER = 3.0  # How much better rotations must fit transposed to be taken so
+LEAST, MOST = 2.0, 3000.0  # Millimetres between which principal distances of cameras lie
 NOMINAL = 100.0
 """Principal distance in millimetres where nothing says how large pixels are: rays are the same."""
-SIDE = -0.02
-"""u3 of unit directions beyond which a perspective camera has no picture."""
+SIDE = -0.02  # u3 of unit directions beyond which a perspective camera has no picture
 
 
 @dataclass

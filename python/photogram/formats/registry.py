@@ -104,8 +104,7 @@ FORMATS_OF_CAMERAS: Mapping[str, Format] = MappingProxyType(
 _TO_WRITE = {**FORMATS, **FORMATS_OF_CAMERAS}
 SD = ("images", "control", "check", "gnss")
 """What of any format may have standard deviations that its files do not say."""
-MOST = 200
-"""Files of a folder that are looked at where the folder itself has no format."""
+MOST = 200  # Files of a folder that are looked at where the folder itself has no format
 
 
 def recognised(path: Path) -> Format:

@@ -20,12 +20,9 @@ from photogram.network.moving_photos import Timed
 from photogram.network.trajectories import Trajectory
 from photogram.words import phrase
 
-MOST = 20_000
-"""Images that are looked at."""
-GROSS, PART = 50.0, 0.1
-"""Pixels, and part of the width, that a median residual must exceed to be doubted."""
-BETTER = 10.0
-"""How much smaller it must be with another convention for that to be named."""
+MOST = 20_000  # Images that are looked at
+GROSS, PART = 50.0, 0.1  # Pixels, and part of the width, that a median residual must exceed to be doubted
+BETTER = 10.0  # How much smaller it must be with another convention for that to be named
 NEARLY_ALL = 0.9
 
 

@@ -20,12 +20,10 @@ from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import Phrase, phrase
 
-SUFFIXES = (".xml", ".psz")
-"""The endings of documents, and of archives with a document."""
+SUFFIXES = (".xml", ".psz")  # The endings of documents, and of archives with a document
 PIECE = 1 << 16
 DEEPEST = 200
-LONGEST = 1 << 20
-"""Bytes of a tag, characters of a text: the parser begins a long tag again with every piece."""
+LONGEST = 1 << 20  # Bytes of a tag, characters of a text: the parser begins a long tag again with every piece
 MOST = 1_000_000
 """Elements that are kept until what holds them is handed over; 64 characters of theirs count as another."""
 CHARACTERS = 64

@@ -24,8 +24,7 @@ from photogram.network.observations import Control, Observation, Position
 from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "LOCAL_CS"
-GEOCENTRIC = 1e6
-"""Metres from the origin beyond which a world is geocentric."""
+GEOCENTRIC = 1e6  # Metres from the origin beyond which a world is geocentric
 _TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
 
 

@@ -36,8 +36,7 @@ ORIENTATIONS = {
     "XUpYLeft": ((0, 1, 0), (-1, 0, 0), (0, 0, 1)),
 }
 """Rows: the axes of a camera orientation in those of the house, x right, y up, z back."""
-CENTER = 0.5
-"""The middle of the first pixel is 0, 0: what is added to count from the corner."""
+CENTER = 0.5  # The middle of the first pixel is 0, 0: what is added to count from the corner
 _TERMS = ("K1", "K2", "K3", "P1", "P2")
 _READINGS: Mapping[str, Callable[[Mapping[str, float]], Mapping[str, float]]] = {
     "P1 and P2 exchanged": lambda own: {"p1": own["p2"], "p2": own["p1"]},

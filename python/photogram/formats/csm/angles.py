@@ -11,11 +11,9 @@ from photogram.io.places import Failing
 from photogram.network.attitudes import Attitudes
 from photogram.words import phrase
 
-RECORDS = 64
-"""Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits."""
+RECORDS = 64  # Parts of a span that polynomials are sampled in: eight neighbours give them to the last digits
 MAX_LENGTH_DIFFERENCE = 1e-3
-BEYOND = 4
-"""Records beyond either end: as many as count on a side."""
+BEYOND = 4  # Records beyond either end: as many as count on a side
 
 
 def of_quaternions(place: Failing, quaternions: Floats) -> Floats:

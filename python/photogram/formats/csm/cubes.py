@@ -28,8 +28,7 @@ from photogram.network.trajectories import Interpolation, increasing, rotations
 from photogram.words import Phrase, phrase
 
 PIECE = 1 << 16
-LONGEST = 1 << 26
-"""Bytes of a label, at most."""
+LONGEST = 1 << 26  # Bytes of a label, at most
 KM = 1000.0
 
 _END = re.compile(rb"(?mi)^[ \t]*End[ \t]*\r?$")

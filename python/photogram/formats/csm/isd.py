@@ -19,8 +19,7 @@ from photogram.words import Phrase
 
 Pixels = Literal["isis", "csm"]
 """How pixels are counted: the middle of the first is 1 (ISIS) or 0.5, half a pixel of the detector apart."""
-HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}
-"""What the corner of the first pixel is counted as."""
+HALF: Mapping[Pixels, float] = {"isis": 0.5, "csm": 0.0}  # What the corner of the first pixel is counted as
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,14 +19,11 @@ from photogram.network.projecting import projected
 from photogram.network.trajectories import Basis, Interpolation, Table, Trajectory
 from photogram.words import phrase
 
-_DOWN = np.array([1.0, -1.0])
-"""Factors of x, y, between y up and y down."""
+_DOWN = np.array([1.0, -1.0])  # Factors of x, y, between y up and y down
 _JOINED: dict[str, Interpolation] = {"csm": "lagrange", "isis": "linear"}
 """How records are joined where they do not say it themselves."""
-_STEPS = 5
-"""Until a shift no longer changes the line that it is of: shifts are less than a line."""
-_EDGE = 1e-6
-"""Rows beyond a framelet that are rounding at its edge."""
+_STEPS = 5  # Until a shift no longer changes the line that it is of: shifts are less than a line
+_EDGE = 1e-6  # Rows beyond a framelet that are rounding at its edge
 
 
 def trajectory_of(

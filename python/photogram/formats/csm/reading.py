@@ -26,8 +26,7 @@ _KINDS = {
     "USGS_ASTRO_FRAME_SENSOR_MODEL": "frame",
     "USGS_ASTRO_PUSH_FRAME_SENSOR_MODEL": "push frame",
 }
-FRAMELETS = 100_000
-"""At most in an image: each is a photo."""
+FRAMELETS = 100_000  # At most in an image: each is a photo
 _MEMBERS = {
     "radial": ("coefficients",),
     "transverse": ("x", "y"),
@@ -37,10 +36,8 @@ _MEMBERS = {
     "radtan": ("coefficients",),
 }
 """Where the coefficients of each lens are; all of them may also stand in `coefficients`."""
-UNITS = {"m": 1.0, "km": 1000.0}
-"""Metres; km where nothing is said."""
-APART = 0.01
-"""Of the span of a table: by how much that of the lines may differ."""
+UNITS = {"m": 1.0, "km": 1000.0}  # Metres; km where nothing is said
+APART = 0.01  # Of the span of a table: by how much that of the lines may differ
 
 
 def read_isd(path: Path) -> Isd:

@@ -25,8 +25,7 @@ from photogram.messages import Message
 from photogram.words import Phrase, option_sd, phrase
 
 TITLE = "PhotoModeler export"
-_HEAD = (2, 9, 10, 10)
-"""Numbers of lines 2 to 5, at least."""
+_HEAD = (2, 9, 10, 10)  # Numbers of lines 2 to 5, at least
 _PHOTO = ("centre and angles", "standard deviations", "covariances", "camera", "standard deviations of it")
 _CAMERA = "c px py width height K1 K2 K3 P1 P2"
 

@@ -25,8 +25,7 @@ from photogram.messages import Message
 from photogram.words import phrase
 
 TITLE = "DBAT script"
-PLAIN, AFFINE = 1, 3
-"""Models: Brown's terms of measured coordinates; the same after an affinity."""
+PLAIN, AFFINE = 1, 3  # Models: Brown's terms of measured coordinates; the same after an affinity
 _TERMS = ("K1", "K2", "K3"), ("P1", "P2")
 _GROUPS = {
     "cc": ("c",),
@@ -287,8 +286,7 @@ def _principal_point(
 IMAGES, PHOTOS, POSES, CONTROL = "markpts.txt", "images.txt", "stations.txt", "control.txt"
 MEASURED, COMPUTED = "-2dpts.txt", "-3dpts.txt"
 _HEADER = "object point id,photo #,"
-_FREE = 10
-"""Lines in which a header is looked for."""
+_FREE = 10  # Lines in which a header is looked for
 
 
 def is_folder(path: Path) -> bool:

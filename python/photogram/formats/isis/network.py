@@ -57,8 +57,7 @@ _WIDTHS = {**dict.fromkeys(_TRIPLES, 3), "apriori_covariance": 6, "adjusted_cova
 _TRUTHS = {"edit_lock", "ignore", "rejected", *_TRIPLES["constrained"]}
 _CODES = {"types", "apriori_source", "apriori_radius_source"}
 _NO_COLUMNS = ("serials", "rest")
-_NAMES = ("ids", "serial", *_NO_COLUMNS)
-"""What is handed to the core apart from the columns of numbers."""
+_NAMES = ("ids", "serial", *_NO_COLUMNS)  # What is handed to the core apart from the columns of numbers
 
 
 class _Columns:

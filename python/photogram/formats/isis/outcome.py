@@ -162,8 +162,7 @@ def spherical(xyz: Floats) -> Floats:
 
 
 DETAILS = "control network"
-PITCHES = 1.4
-"""Standard deviation of image coordinates, in pixels of the detector."""
+PITCHES = 1.4  # Standard deviation of image coordinates, in pixels of the detector
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,10 +214,8 @@ def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
     return found
 
 
-NORMAL = 1.4826
-"""Standard deviations of normal errors in their median absolute deviation."""
-FEWEST = 2
-"""Measures of a point that stay."""
+NORMAL = 1.4826  # Standard deviations of normal errors in their median absolute deviation
+FEWEST = 2  # Measures of a point that stay
 FAINT = 1e6
 """What the standard deviations of rejected measures are multiplied by, so that they have residuals all the
 same, and may come back."""

@@ -16,8 +16,7 @@ from photogram.network.geometry import Cartesian, Spheroid, local_frames
 from photogram.network.observations import Control
 from photogram.words import phrase
 
-_LOCAL = [1, 0, 2]
-"""Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius."""
+_LOCAL = [1, 0, 2]  # Longitude, latitude and radius in the order of jigsaw: latitude, longitude, radius
 
 
 @dataclass(frozen=True, eq=False)

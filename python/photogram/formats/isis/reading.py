@@ -19,14 +19,12 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
 TITLE = "control network (ISIS)"
-LABEL_BYTES = 65536
-"""Bytes of the label of a binary network; zeros follow what it says."""
+LABEL_BYTES = 65536  # Bytes of the label of a binary network; zeros follow what it says
 _FIRST_OBJECT = re.compile(rb"\s*(?:(?:#|/\*)[^\n]*\n\s*)*object\s*=\s*(\w+)", re.IGNORECASE)
 _BINARY, _TEXT = "protobuffer", "controlnetwork"
 _BINARY_VERSIONS = ("2", "5")
 _TEXT_VERSIONS = ("3", "4", "5")
-_OLDEST = "1"
-"""The version of a network that does not say it."""
+_OLDEST = "1"  # The version of a network that does not say it
 _HEADER = {key.lower(): name for key, name in HEADER.items()}
 
 

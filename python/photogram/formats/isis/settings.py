@@ -21,8 +21,7 @@ Sigmas = tuple[float | None, float | None, float | None]
 """Standard deviations of three things, None where they are not weighted."""
 Axes = Literal["latitudinal", "rectangular"]
 
-MOST = 8
-"""The highest degree of a polynomial."""
+MOST = 8  # The highest degree of a polynomial
 
 
 @dataclass(frozen=True)

@@ -127,10 +127,8 @@ _KEYWORDS: Mapping[str, int | None] = {
 }
 """How serial numbers begin, and how many of their keywords, between slashes, name the observation, as in ISIS
 (`ObservationKeys` of `appdata/serialnumbers`); None: all, so that every image is an observation itself."""
-APART = 5.0
-"""Pixels by which poses of one flight may differ from image to image, where their tables overlap."""
-COMPARED = 16
-"""Times at which they are compared."""
+APART = 5.0  # Pixels by which poses of one flight may differ from image to image, where their tables overlap
+COMPARED = 16  # Times at which they are compared
 
 
 def observation_number(serial: str) -> str:

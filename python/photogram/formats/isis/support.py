@@ -22,12 +22,9 @@ from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.trajectories import AdjustedTrajectory
 from photogram.words import phrase
 
-CLOSE = 0.01
-"""Pixels: how far what is seen with the new tables may be from what the trajectory sees."""
-GRID = 32
-"""Samples, and lines, at which both are compared: about a thousand points."""
-HALVINGS = 8
-"""Of the intervals of a table, at most."""
+CLOSE = 0.01  # Pixels: how far what is seen with the new tables may be from what the trajectory sees
+GRID = 32  # Samples, and lines, at which both are compared: about a thousand points
+HALVINGS = 8  # Of the intervals of a table, at most
 
 
 def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:

@@ -18,10 +18,8 @@ from photogram.words import phrase
 __all__ = ["check_map", "map_files"]
 
 GEOPACKAGE, GEOJSON = ".gpkg", (".geojson", ".json")
-WGS84 = "EPSG:4979"
-"""Of GeoJSON (RFC 7946): longitude, latitude, height above the ellipsoid."""
-DECIMALS = 9
-"""Of degrees: 0.1 mm."""
+WGS84 = "EPSG:4979"  # Of GeoJSON (RFC 7946): longitude, latitude, height above the ellipsoid
+DECIMALS = 9  # Of degrees: 0.1 mm
 _STYLES = """
 CREATE TABLE layer_styles (
     id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL,

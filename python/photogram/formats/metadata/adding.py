@@ -35,8 +35,7 @@ from photogram.words import Phrase, option_sd, phrase
 
 SIMILAR = 10.0
 """How much better a model must fit positions in its own frame after a similarity to be carried onto them."""
-DETERMINED = 3.0
-"""How much wider than their misfit positions must spread across their line to turn a model."""
+DETERMINED = 3.0  # How much wider than their misfit positions must spread across their line to turn a model
 
 
 def with_wished_photos(project: Project, wishes: Wishes) -> Project:

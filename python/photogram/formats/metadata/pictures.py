@@ -31,8 +31,7 @@ from photogram.io.places import Place
 from photogram.words import phrase
 
 ENDINGS = (".jpg", ".jpeg", ".tif", ".tiff", ".dng")
-GPS = 0x8825
-"""The tag of EXIF that leads to those of GPS."""
+GPS = 0x8825  # The tag of EXIF that leads to those of GPS
 _EXIF, _TAKEN, _FRACTION = 0x8769, 0x9003, 0x9291
 """Tags of EXIF: to its own tags, and of these DateTimeOriginal and SubSecTimeOriginal."""
 
@@ -44,10 +43,8 @@ RADIAL = (
 )
 DOP_ALONE = "GPSDOP of EXIF gives no metres: it is not taken"
 DJI, PIX4D = "http://www.dji.com/drone-dji/1.0", "http://pix4d.com/camera/1.0"
-LARGEST = 1 << 20
-"""Bytes of a packet at most; those of cameras have a few thousand."""
-_SPELLINGS = {"GpsLongtitude": "GpsLongitude"}
-"""What older cameras write."""
+LARGEST = 1 << 20  # Bytes of a packet at most; those of cameras have a few thousand
+_SPELLINGS = {"GpsLongtitude": "GpsLongitude"}  # What older cameras write
 
 
 def said_by_picture(path: Path) -> list[Said]:

@@ -32,20 +32,16 @@ __all__ = [
 
 Triple = tuple[float, float, float]
 
-ELLIPSOIDAL = "EPSG:4979"
-"""Longitude and latitude of WGS 84, heights above its ellipsoid."""
-UNSAID_SYSTEM = "EPSG:4326"
-"""Longitude and latitude of WGS 84, where nothing says what heights are above."""
+ELLIPSOIDAL = "EPSG:4979"  # Longitude and latitude of WGS 84, heights above its ellipsoid
+UNSAID_SYSTEM = "EPSG:4326"  # Longitude and latitude of WGS 84, where nothing says what heights are above
 
 UNSAID, SEA_LEVEL = "unsaid", "above sea level"
 """Heights of which the source does not say what they are above; and those of which it does, but not where the
 geoid is."""
 
 FIXED = "fixed"
-HIGHEST = 1e5
-"""Metres that a height, or a standard deviation, may be at most."""
-LEAST = 1e-6
-"""Metres that a standard deviation is at least."""
+HIGHEST = 1e5  # Metres that a height, or a standard deviation, may be at most
+LEAST = 1e-6  # Metres that a standard deviation is at least
 
 
 @dataclass(frozen=True)
@@ -243,8 +239,7 @@ SOURCE = "RTKLIB"
 SECONDS_OF_WEEK = 604_800
 HEADER_LINES = 60
 _COMMENT = "%"
-_FLAGS = {1: 50, 2: 34, 5: 16}
-"""Quality of RTKLIB as the flag of DJI: fixed, float, single."""
+_FLAGS = {1: 50, 2: 34, 5: 16}  # Quality of RTKLIB as the flag of DJI: fixed, float, single
 _WORDS = re.compile(r"[,;\s]+")
 _EPOCH = datetime(1980, 1, 6)
 

@@ -36,12 +36,9 @@ from photogram.messages import Message
 from photogram.words import phrase
 
 SOURCE = "reference"
-GEO_TXT = "geo.txt"
-"""Of OpenDroneMap: positions in the system of the first line."""
-WORDS = (3, 4, 7, 9)
-"""How many a line of it may have; what follows the ninth is of no use here."""
-HEAD = 40
-"""Lines in which a header, a row or the name of a system is looked for."""
+GEO_TXT = "geo.txt"  # Of OpenDroneMap: positions in the system of the first line
+WORDS = (3, 4, 7, 9)  # How many a line of it may have; what follows the ninth is of no use here
+HEAD = 40  # Lines in which a header, a row or the name of a system is looked for
 _KNOWN = (*TABLES["gnss"].columns, "enabled")
 _NUMBERS = TABLES["gnss"].numbers
 _REQUIRED = ("photo", *AXES)

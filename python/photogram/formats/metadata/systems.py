@@ -21,13 +21,10 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import Spheroid
 from photogram.words import Phrase, phrase
 
-SHIFT_SD = 0.05
-"""Metres: a priori standard deviation of the shift that positions of a flight have in common."""
-LEVER_SD = 0.01
-"""Metres: that of a lever arm which is already applied."""
+SHIFT_SD = 0.05  # Metres: a priori standard deviation of the shift that positions of a flight have in common
+LEVER_SD = 0.01  # Metres: that of a lever arm which is already applied
 ABOVE = {False: "above the ellipsoid", True: "above the geoid"}
-PHOTOS_CRS, GNSS_CRS = "--photos-crs", "--gnss-crs"
-"""Options that name the system of positions."""
+PHOTOS_CRS, GNSS_CRS = "--photos-crs", "--gnss-crs"  # Options that name the system of positions
 _UNKNOWN = "above the geoid or above the ellipsoid"
 GROUPS = "gnss_groups.csv"
 _COMMENT = (

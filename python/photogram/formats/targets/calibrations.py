@@ -31,10 +31,8 @@ from photogram.targets.start import Start
 from photogram.targets.vision import sensor_pose, vision_poses
 from photogram.words import Phrase, option_sd, phrase
 
-MIDDLE = 0.5
-"""Of the first pixel, from the upper-left corner: projects count from there."""
-NEAR = 1e-6
-"""Of the spacing: what control may be off the points of a board."""
+MIDDLE = 0.5  # Of the first pixel, from the upper-left corner: projects count from there
+NEAR = 1e-6  # Of the spacing: what control may be off the points of a board
 
 
 def read_project(path: Path, wishes: Wishes) -> Project:
