@@ -29,6 +29,7 @@ from photogram.arguments.annotations import check_members
 from photogram.io.seals import seal
 from photogram.network import Level, OnLevel, Shift
 from photogram.results.cameras import AdjustedCamera
+from refusals import refused
 
 parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
 
@@ -385,13 +386,16 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
             lambda document: document["kept"]["block"].update(point_ids="x"),
             "point_ids is 'x', not a sequence",
         ),
-        (lambda document: document["kept"]["block"].update(other=1), "does not hold together: .*'other'"),
-        (lambda document: document["kept"]["block"].pop("spheroid"), "does not hold together: 'spheroid'"),
+        (lambda document: document["kept"]["block"].update(other=1), "results.contradiction .*'other'"),
+        (
+            lambda document: document["kept"]["block"].pop("spheroid"),
+            "results.contradiction reason='spheroid'",
+        ),
     ],
 )
 def test_damaged_summaries_are_refused(folder, change, message):
     resealed(folder, change)
-    with pytest.raises(InputError, match=rf"summary\.json: .*{message}"):
+    with refused("summary.json", message):
         read_result(folder)
 
 

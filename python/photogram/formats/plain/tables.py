@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.formats.column_words import is_angular
 from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, nameless, settled
+from photogram.formats.images import Y_DOWN, is_rotation
 from photogram.formats.plain.common_unknowns import Shared
 from photogram.formats.plain.schema import (
     ALL_ANGLES,
@@ -24,7 +25,6 @@ from photogram.formats.plain.schema import (
     covariance_columns,
 )
 from photogram.formats.plain.settings import Settings
-from photogram.formats.rotations import Y_DOWN, is_rotation
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.places import Place
