@@ -6,7 +6,7 @@ have put them. Images i and j of a photo are exchanged when T of both points as 
 
     T(exchanged) + 2 ln(k / 0.0001),    T(exchanged) < 3 max(1, s^2) chi2(0.999; m)
 
-(:mod:`photogram.statistics.exchanges`): the factor 3 stands for what photos are uncertain by.
+(:mod:`photogram.statistics.likelihood`): the factor 3 stands for what photos are uncertain by.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, meet
-from photogram.statistics.exchanges import are_exchanged
+from photogram.statistics.likelihood import are_exchanged
 from photogram.words import Phrase
 
 MOST = 40  # Largest number of excluded images of a photo
