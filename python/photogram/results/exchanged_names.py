@@ -56,13 +56,10 @@ class Exchange:
         return Phrase("exchange.probable", {"one": one, "other": other, "photos": list(self.photos)})
 
     @property
-    def reason(self) -> str:
-        """Why."""
-        named = f"T {self.as_named:.4g} as named" if math.isfinite(self.as_named) else "rays part as named"
-        return (
-            f"each image fits the other's place ({named}, T {self.exchanged:.4g} exchanged, dimension"
-            f" {self.dimension})"
-        )
+    def reason(self) -> Phrase:
+        """The test values as they are named and exchanged."""
+        fields = {"named": self.as_named, "exchanged": self.exchanged, "dimension": self.dimension}
+        return Phrase(f"exchange.reason{'' if math.isfinite(self.as_named) else '.apart'}", fields)
 
 
 def exchanged_names(block: Block, used: Bools, variance: float = 1.0) -> list[Exchange]:
