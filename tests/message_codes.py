@@ -51,3 +51,8 @@ def fields_of(messages: Any, code: str) -> Mapping[str, Any]:
 def as_check(expected: str | Callable[[Any], bool]) -> Callable[[Any], bool]:
     """Return a check of errors: a check as it is, or that of a sentence of the other readers of files."""
     return expected if callable(expected) else lambda error: re.search(expected, str(error)) is not None
+
+
+def nested_codes(message: Any) -> list[str]:
+    """Return the codes of an error or phrase, the outermost first."""
+    return [each.code for each in phrases(getattr(message, "phrase", message))]

@@ -1,5 +1,10 @@
 """Codes of a message and of the messages in its fields."""
 
+import re
+from contextlib import contextmanager
+
+import pytest
+
 from photogram.words import Phrase
 
 
@@ -10,3 +15,11 @@ def codes(message):
     if isinstance(message, Phrase):
         return [message.code, *(code for field in message.fields.values() for code in codes(field))]
     return [code for part in message or () for code in codes(part)]
+
+
+@contextmanager
+def raises(kind, code):
+    """Require an error with a code; without codes, with a text that matches a pattern."""
+    with pytest.raises(kind) as raised:
+        yield raised
+    assert code in codes(raised.value) or re.search(code, str(raised.value)), raised.value

@@ -18,26 +18,38 @@ def traced(error):
     for value in phrase.fields.values():
         if isinstance(value, Phrase):
             nested.append(traced(value))
+        elif isinstance(value, list | tuple):
+            words.append(",".join(traced(part) if isinstance(part, Phrase) else str(part) for part in value))
         else:
-            words.append(
-                ",".join(traced(part) if isinstance(part, Phrase) else str(part) for part in value)
-                if isinstance(value, list | tuple)
-                else str(value)
-            )
+            words.append(str(value))
     return ": ".join([" ".join(words), *nested])
 
 
+def located(error):
+    """Return file and record of an error before its trace: `gnss.csv, record 3: error.cells 4 5`."""
+    place = [error.file.name] if error.file else []
+    place += [f"record {error.record}"] if error.record else []
+    return f"{', '.join(place)}: {traced(error)}"
+
+
 def check_message(words, error):
-    """Check that codes and values of a message contain some words; without a code, its sentence."""
-    if isinstance(error, Phrase) or error.phrase is not None:
+    """Check that place, codes and values of a message contain some words; without a code, its sentence."""
+    if isinstance(error, Phrase):
         assert words in traced(error), traced(error)
+    elif error.phrase is not None:
+        assert words in located(error), located(error)
     else:
         assert words in str(error) or re.search(words, str(error)), str(error)
 
 
+def check_words(words, error):
+    """Check that the text of an error, or its codes and values, contain some words."""
+    assert words in str(error) or words in traced(error), f"{error} {traced(error)}"
+
+
 @contextmanager
 def rejected(words, kind=InputError):
-    """Expect an error whose codes and values contain some words."""
+    """Expect an error whose place, codes and values contain some words."""
     with pytest.raises(kind) as caught:
         yield caught
     check_message(words, caught.value)

@@ -93,9 +93,9 @@ def test_ground_is_no_plane_and_the_test_says_so(result, names):
     ("wanted", "message"),
     [
         (("circle", ["nowhere", "a", "b"]), "feature f: there is no point 'nowhere'"),
-        (("cone", ["*"]), "feature f: 'cone' is none of distance, line"),
-        ("plane", "feature f: 'plane' is no kind with points"),
-        (("distance", 3), "feature f: a distance takes 2 points, not 3"),
+        (("cone", ["*"]), "feature f: there is no kind of feature 'cone'"),
+        ("plane", "feature f: the definition must be a kind with points"),
+        (("distance", 3), "feature f: a distance requires 2 points, got 3"),
         (("cylinder", 5), "feature f: a cylinder takes 6 points, not 5"),
     ],
 )
@@ -121,10 +121,10 @@ def test_geographic_blocks_are_refused(result, names):
 
 def test_a_scale_that_nothing_gives_is_said(free):
     wanted = {"d": ("distance", free.block.point_ids[:2])}
-    assert "nothing gives the network a scale" in features(free, wanted).remarks[0]
+    assert "do not determine the scale" in features(free, wanted).remarks[0]
     told = with_features(free, wanted)
-    assert any("nothing gives the network a scale" in str(each) for each in told.messages)
-    assert "othing gives the network a scale" in told.report()
+    assert any("do not determine the scale" in str(each) for each in told.messages)
+    assert "do not determine the scale" in told.report()
     minimum = adjust(free.block)
     assert features(minimum, wanted).remarks
 

@@ -460,7 +460,7 @@ def test_a_table_under_another_name_is_remarked_on(example):
 
 def test_a_point_that_is_known_twice_must_be_the_same(example):
     (example / "points.csv").write_text("point,x,y,z\nsouth-1,1,2,3\n")
-    with rejected("south-1 has another x in the table points"):
+    with rejected("plain.other-position south-1 x"):
         formats.read(example)
 
 
@@ -516,10 +516,10 @@ def test_a_geographic_block_whose_frame_nobody_has_said_is_written_in_degrees(tm
     found = formats.read(written(project, tmp_path / "there")).block
     assert found.geographic
     np.testing.assert_allclose(found.photo_positions, block.photo_positions, rtol=1e-12)
-    with rejected("the frame is topocentric, but the block is geographic"):
+    with rejected("plain.frame-of-block topocentric geographic"):
         project.replace(frame=formats.Frame("topocentric"))
     flat = simulate(strips=1, photos_per_strip=3).block
-    with rejected("the frame is geographic, but the block is rectangular"):
+    with rejected("plain.frame-of-block geographic rectangular"):
         project.replace(block=flat, frame=formats.Frame("geographic"))
 
 
@@ -590,7 +590,7 @@ def test_images_name_the_photos_of_a_project_without_a_table_of_photos(example):
     other = rows[1].split(",")
     other[0] = "other"
     (example / "cameras.csv").write_text("\n".join([*rows, ",".join(other)]) + "\n")
-    with rejected("column camera"):
+    with rejected("plain.which-camera"):
         formats.read(example)
     table = [line for line in (example / "images.csv").read_text().splitlines() if not line.startswith("#")]
     name = rows[1].split(",")[0]

@@ -249,7 +249,7 @@ def resect(
     ([390.0, 430.0, 1500.0], [0.02, -0.03, 1.5])
     """
     if spheroid is not None and not isinstance(spheroid, Spheroid):
-        raise argument_error("spheroid", "kind", kind="a Spheroid or None", value=value_field(spheroid))
+        raise argument_error("spheroid", "kind", kind="a Spheroid or None", value=spheroid)
     truth_value("photo_to_ground", photo_to_ground)
     given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
     known = np.concatenate(
@@ -410,7 +410,7 @@ def _known(name: str, value: ArrayLike | None, sd: ArrayLike) -> Floats:
         return np.full(3, np.nan)
     values = shaped(name, value, (3,))
     if not np.isfinite(values).all():
-        raise argument_error(name, "finite", value=value_field(values.tolist()))
+        raise argument_error(name, "finite", value=values.tolist())
     return values
 
 

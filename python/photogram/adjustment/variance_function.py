@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from photogram.adjustment.adjustment import at_least
 from photogram.adjustment.components import Weighing
 from photogram.arguments.annotations import check_arguments
-from photogram.arguments.arrays import argument_error, shaped, value_field
+from photogram.arguments.arrays import argument_error, shaped
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
@@ -138,7 +138,7 @@ def _values(own: Weighing, of: ArrayLike, center: Sequence[float], images: int) 
         return np.asarray(np.linalg.norm(focal_images(own.network) - middle, axis=1))
     values = shaped("of", of, (images,))
     if not ((values >= 0) & np.isfinite(values)).all():
-        raise argument_error("of", "not-negative", value=value_field(values))
+        raise argument_error("of", "not-negative", value=values)
     return np.asarray(values)
 
 

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from photogram.adjustment.first_values import FirstValues
     from photogram.diagnosis.diagnosis import Diagnosis
 
-BAD = 5.0
-"""Sigma0 above which an adjustment that has converged is doubted."""
+BAD = 5.0  # Sigma0 above which an adjustment that has converged is doubted
 
 
 @contextmanager

@@ -23,8 +23,7 @@ TESTABLE, TESTABLE_PRIOR = 0.01, 1e-5
 Precise control at the edge of a block, or a precise distance, has a redundancy of a thousandth; its test
 value still means something.
 """
-BESIDE = "beside images: "
-"""Before the names of further kinds of observations."""
+BESIDE = "beside images: "  # Before the names of further kinds of observations
 
 
 @dataclass(frozen=True)

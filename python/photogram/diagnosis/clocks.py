@@ -16,12 +16,9 @@ from photogram.network.trajectories import Clock
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase
 
-LEAPS = range(13, 19)
-"""GPS - UTC in seconds from 1999 on; 18 since 2017."""
-TAI_GPS, ET_TAI = 19.0, 32.184
-"""TAI - GPS and ET - TAI, seconds; ET is that of SPICE, but for 2 ms."""
-WITHIN = 0.010
-"""Seconds: a shift of time this near to a difference is that."""
+LEAPS = range(13, 19)  # GPS - UTC in seconds from 1999 on; 18 since 2017
+TAI_GPS, ET_TAI = 19.0, 32.184  # TAI - GPS and ET - TAI, seconds; ET is that of SPICE, but for 2 ms
+WITHIN = 0.010  # Seconds: a shift of time this near to a difference is that
 
 
 def differences() -> Iterator[tuple[str, str, float]]:
@@ -46,8 +43,7 @@ def scales_of(shift: float) -> list[Phrase]:
 
 
 SIGNIFICANT = 5.0
-HALVES, NEARLY = (0.5, 1.0), 0.1
-"""Lines."""
+HALVES, NEARLY = (0.5, 1.0), 0.1  # Lines
 
 
 def known_offsets(result: Result) -> list[Message]:

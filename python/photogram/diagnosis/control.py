@@ -9,8 +9,7 @@ from photogram.diagnosis.findings import Finding, Level, Section, Words, finding
 from photogram.results.result import Result
 from photogram.words import phrase
 
-MANY = 0.2
-"""Of the control: when more does not fit, it is hardly the points."""
+MANY = 0.2  # Of the control: when more does not fit, it is hardly the points
 
 
 def control(edited: Edited, words: Words) -> Section:

@@ -36,22 +36,16 @@ from photogram.results.result import Result
 from photogram.statistics.likelihood import judged
 from photogram.words import phrase
 
-MOST = 60
-"""Control points that are compared."""
+MOST = 60  # Control points that are compared
 FEWEST = 3
-TRIPLES = 400
-"""Threes of them that are tried."""
-CLEARLY = 2 * math.log(20)
-"""What explaining it by single points must cost more: odds of 20."""
-PAIRS = 15
-"""Pairs that are exchanged on trial."""
+TRIPLES = 400  # Threes of them that are tried
+CLEARLY = 2 * math.log(20)  # What explaining it by single points must cost more: odds of 20
+PAIRS = 15  # Pairs that are exchanged on trial
 GROWTHS = 5
-NEAR = 6.0
-"""Standard deviations within which a point agrees with a similarity."""
+NEAR = 6.0  # Standard deviations within which a point agrees with a similarity
 STEPS = 30
 CONVERGED = 1e-9
-MANY = 2
-"""Control points that do not fit, for control as a whole to be doubted."""
+MANY = 2  # Control points that do not fit, for control as a whole to be doubted
 
 EXCHANGED = "X and Y exchanged"
 

@@ -49,20 +49,15 @@ from photogram.network.observations import Distance
 from photogram.network.rays import Rays
 from photogram.words import phrase
 
-SUSPICION = 0.35
-"""Misfit m above which photos are looked at more closely."""
+SUSPICION = 0.35  # Misfit m above which photos are looked at more closely
 PASSES, PASSES_ROUGH, ROUGH = 0.2, 0.3, 0.1
 """What the misfit must fall to in the median, where it is then below ROUGH; else poses are rough starts."""
 EACH = 0.5
 """What it must fall to on each photo that does not fit as it is, and in the median of images of control."""
-AS_GOOD = 1.5
-"""Another hypothesis is as good when its misfit is below so many times the least."""
-SLIGHT = float(np.radians(1.0))
-"""Attitudes that differ from resected ones by less are right."""
-CLEARLY = 5.0
-"""So many times nearer to the resected attitudes must those of a rival reading be."""
-PUT_RIGHT = 5
-"""Mistakes that are put right one upon the other, at the most."""
+AS_GOOD = 1.5  # Another hypothesis is as good when its misfit is below so many times the least
+SLIGHT = float(np.radians(1.0))  # Attitudes that differ from resected ones by less are right
+CLEARLY = 5.0  # So many times nearer to the resected attitudes must those of a rival reading be
+PUT_RIGHT = 5  # Mistakes that are put right one upon the other, at the most
 BAR_FACTOR, BAR_WITHIN, BAR_EACH = 1000.0, 0.05, float(np.log(2))
 """A distance in millimetres among metres: within so much in the median, and each (logarithm)."""
 

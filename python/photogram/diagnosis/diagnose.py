@@ -51,10 +51,8 @@ __all__ = ["Manner", "check_block", "diagnose"]
 
 FINAL_STATIONS = 5.0
 """Stations count as adjusted when half the residuals are below so many standard deviations."""
-HARDLY = 10.0
-"""So many times the usual residual before the adjustment comes from coarse stations."""
-MOST_SETS = 5
-"""Mistakes in the control as a whole that are put right one upon the other, at the most."""
+HARDLY = 10.0  # So many times the usual residual before the adjustment comes from coarse stations
+MOST_SETS = 5  # Mistakes in the control as a whole that are put right one upon the other, at the most
 
 
 @dataclass(frozen=True)

@@ -26,14 +26,11 @@ from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[AK]\d")
 POINT = ("xp", "yp")
-CHANCE = 1e-4
-"""Of any hint where nothing is wrong."""
-EXPLAINED = 0.8
-"""Of what the sum of squares would fall by if nothing were known of the camera."""
+CHANCE = 1e-4  # Of any hint where nothing is wrong
+EXPLAINED = 0.8  # Of what the sum of squares would fall by if nothing were known of the camera
 NEAR, WITHIN = 0.3, 3.0
 """How near images have the opposite of what is given: in parts of it, or in standard deviations."""
-TAKEN_UP = 1e-6
-"""Images say nothing of what they check by a smaller part."""
+TAKEN_UP = 1e-6  # Images say nothing of what they check by a smaller part
 
 
 @dataclass(frozen=True)

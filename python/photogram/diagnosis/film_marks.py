@@ -33,8 +33,7 @@ from photogram.words import phrase
 CERTIFICATE = "certificate"
 ALIKE = 0.7
 """What has at least this part of the largest test value is named beside it: less may be its consequence."""
-FEWEST_FAILING = 3
-"""Marks of a photo that all fail."""
+FEWEST_FAILING = 3  # Marks of a photo that all fail
 
 
 @dataclass(frozen=True)
@@ -122,14 +121,11 @@ def _rows(kind: ObservedKind | None) -> Iterator[tuple[int, np.ndarray]]:
         yield from zip(kind.rows.tolist(), np.abs(np.nan_to_num(kind.standardized)), strict=True)
 
 
-FEWEST = 4
-"""Marks of a photo: three are alike along any axis."""
-CHANCE = 1e-3
-"""Of a hint where nothing is wrong."""
+FEWEST = 4  # Marks of a photo: three are alike along any axis
+CHANCE = 1e-3  # Of a hint where nothing is wrong
 EXPLAINED = 0.7
 """Of the weighted sum of squares of a photo's marks that is explained at least: half of it by one of four."""
-ALONE = 1e-6
-"""Part of the largest column that the others must leave of one."""
+ALONE = 1e-6  # Part of the largest column that the others must leave of one
 
 
 @dataclass(frozen=True)

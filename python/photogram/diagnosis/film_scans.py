@@ -26,12 +26,9 @@ from photogram.messages import Message
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase
 
-FEWEST_OF_HALVES = 12
-"""Images of a photo."""
-EXPLAINED = 0.4
-"""Of the sum of squares of a photo's residuals that a shift of one half explains at least."""
-BEYOND = 2.0
-"""Standard deviations of a reading by which halves are shifted at least."""
+FEWEST_OF_HALVES = 12  # Images of a photo
+EXPLAINED = 0.4  # Of the sum of squares of a photo's residuals that a shift of one half explains at least
+BEYOND = 2.0  # Standard deviations of a reading by which halves are shifted at least
 
 
 def seam_hints(result: Result) -> list[Message]:
@@ -76,18 +73,13 @@ def _step(away: Floats, residuals: Floats, sd: Floats, axis: int) -> tuple[float
     return best
 
 
-FEWEST = 20
-"""Images of a photo."""
-WINDOWS = tuple(0.001 * 2.0**k for k in range(7))
-"""How far apart lines are, in parts of the scan."""
-FAR = 2
-"""So many of these on are those that are far."""
-CHANCE = 1e-3
-"""Of a hint where nothing is wrong."""
+FEWEST = 20  # Images of a photo
+WINDOWS = tuple(0.001 * 2.0**k for k in range(7))  # How far apart lines are, in parts of the scan
+FAR = 2  # So many of these on are those that are far
+CHANCE = 1e-3  # Of a hint where nothing is wrong
 OTHERWISE = 2.0
 """Times by which z is larger than that of lines across: what is alike in both is no matter of lines."""
-WORTH = 0.5
-"""Standard deviations of a reading that lines have in common at least."""
+WORTH = 0.5  # Standard deviations of a reading that lines have in common at least
 TINY = 1e-9
 
 

@@ -18,32 +18,25 @@ from photogram.network.rays import Rays, meet
 from photogram.results.result import Result
 from photogram.words import phrase
 
-BAD_PHOTO = 4.0
-"""A photo is bad when its median residual is so many times that of the median photo, ..."""
+BAD_PHOTO = 4.0  # A photo is bad when its median residual is so many times that of the median photo,
 BAD_PHOTO_SD = 4.3
 """... and stands out among all photos by so many robust standard deviations (of the logarithm)."""
-BREAK = 10.0
-"""A break in the pattern: so many robust standard deviations from what its photo suggests."""
-FLAGRANT = 24.0
-"""A break so large that it is grave though no single image explains it."""
-CHANCE = 2.0
-"""A break so many times the least one is grave with three rays too."""
+BREAK = 10.0  # A break in the pattern: so many robust standard deviations from what its photo suggests
+FLAGRANT = 24.0  # A break so large that it is grave though no single image explains it
+CHANCE = 2.0  # A break so many times the least one is grave with three rays too
 EXPLAINED = 0.35
 """Leaving out one ray, or exchanging two names, explains a point when so much is left of its residuals."""
 CONTROL_GRAVE, CONTROL_LOOK = 12.0, 6.0
 """Control differences that stand out by so many robust standard deviations."""
-FEWEST_CONTROL = 4
-"""Control points that a comparison needs."""
+FEWEST_CONTROL = 4  # Control points that a comparison needs
 FEWEST_ERRORS, ERRORS_OF_PHOTO = 5, 0.3
 """So many gross errors, and such a part of its images, condemn a photo as a whole."""
-CANDIDATES = 5
-"""Photos with the largest residuals that are left out on trial."""
+CANDIDATES = 5  # Photos with the largest residuals that are left out on trial
 IMAGE_KINDS = ("gross-error", "exchanged-points", "name-used-twice")
 """Findings on images, which the adjusted stations may disprove."""
 PARTED, FEWEST_OF_TWO = 0.1, 2
 """One name is of two points when so much is left of its residuals in two groups of so many rays or more."""
-AS_WELL = 3.0
-"""And so many times less than leaving out one ray leaves."""
+AS_WELL = 3.0  # And so many times less than leaving out one ray leaves
 MOST_PHOTOS = 20
 MOST_ON_PHOTO = 30
 

@@ -14,12 +14,10 @@ from photogram.network.attitudes import Attitudes, Representation
 from photogram.network.block import Block
 from photogram.words import Phrase, phrase
 
-FOOT = 0.3048
-"""Metres; the survey foot differs by two millionths."""
+FOOT = 0.3048  # Metres; the survey foot differs by two millionths
 _TO_VISION: Floats = np.diag([1.0, -1.0, -1.0])
 _HALF_TURN = np.pi / 2
-_BEYOND = 1e4
-"""Radians: no angle that was meant is larger after it was turned into degrees once more."""
+_BEYOND = 1e4  # Radians: no angle that was meant is larger after it was turned into degrees once more
 
 TURNS: dict[str, list[list[float]]] = {
     "y down": [[1, 0], [0, -1]],
@@ -32,21 +30,17 @@ TURNS: dict[str, list[list[float]]] = {
 }
 """V, observed = V predicted, by the name of the mistake."""
 
-PIXELS = 8.0
-"""Images so many times too large, or more, are in another unit; less is a principal distance."""
+PIXELS = 8.0  # Images so many times too large, or more, are in another unit; less is a principal distance
 _SCALED, _SHIFTED = 0.15, 0.25
 """A scale further from 1, a shift of a larger part of half of the format are no matter of rough poses."""
 _ALIKE = 0.05
 """Scatter of the scale over photos, relative, and of the shift, in halves of the format, at the most."""
-_CORNER = 0.5
-"""The middle of all images is further from the origin than this part of half of their extent."""
+_CORNER = 0.5  # The middle of all images is further from the origin than this part of half of their extent
 _WIDEST, _FINEST = 4.0, 10.0
 """Half of the extent of images, in principal distances, beyond which they are wider than a camera's, and what
 its inverse may be at the most,"""
-_SCALES = 60
-"""with so many steps in between."""
-_EXPLAINED = 0.2
-"""e, what a regression leaves, at the most."""
+_SCALES = 60  # with so many steps in between
+_EXPLAINED = 0.2  # e, what a regression leaves, at the most
 
 
 Change = Callable[[Block], Block]

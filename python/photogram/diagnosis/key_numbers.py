@@ -14,8 +14,7 @@ from photogram.results.result import Result
 from photogram.statistics.evidence import WITHHELD, Evidence
 from photogram.words import phrase
 
-VARIANCE = (0.5, 2.0)
-"""Variance of unit weight between which the weights count as realistic."""
+VARIANCE = (0.5, 2.0)  # Variance of unit weight between which the weights count as realistic
 
 
 def key_numbers(edited: Edited, words: Words) -> Section:

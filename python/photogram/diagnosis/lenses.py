@@ -20,10 +20,8 @@ from photogram.words import Phrase, phrase
 
 RADIAL = re.compile(r"[Kk]([1-6])")
 SIGNIFICANT = 5.0
-PITCH = (1e-3, 3e-2)
-"""Sizes of a pixel that cameras have, millimetres."""
-HALF, NEARLY = 0.5, 0.1
-"""Pixels."""
+PITCH = (1e-3, 3e-2)  # Sizes of a pixel that cameras have, millimetres
+HALF, NEARLY = 0.5, 0.1  # Pixels
 
 
 def lenses_put_right(block: Block, findings: list[Finding], adjusted: Adjuster) -> Block:

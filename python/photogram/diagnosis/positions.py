@@ -32,12 +32,9 @@ from photogram.results.result import Result
 from photogram.statistics.likelihood import RIVAL, TESTED, judged, likelihood
 from photogram.words import Phrase, phrase
 
-FEWEST = 5
-"""Observed positions that can be judged as a whole."""
-EQUAL = 0.15
-"""Relative difference within which a lever arm is the given one with other signs or axes."""
-WORST = 1e6
-"""What cannot be adjusted as it is leaves so many times what the worst hypothesis does."""
+FEWEST = 5  # Observed positions that can be judged as a whole
+EQUAL = 0.15  # Relative difference within which a lever arm is the given one with other signs or axes
+WORST = 1e6  # What cannot be adjusted as it is leaves so many times what the worst hypothesis does
 
 
 @dataclass(frozen=True)

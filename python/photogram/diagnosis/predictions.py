@@ -17,8 +17,7 @@ from photogram.network.rays import Rays
 from photogram.results.result import Result
 from photogram.statistics.likelihood import are_exchanged, judged
 
-FEWEST = 3
-"""Control points that tell which two of them are exchanged."""
+FEWEST = 3  # Control points that tell which two of them are exchanged
 
 
 def freed(block: Block, points: Indices) -> Block:

@@ -17,8 +17,7 @@ from photogram.results.result import Result
 from photogram.show.page import Column, Table
 from photogram.words import phrase
 
-FEWEST = 20
-"""Images of a photo that a test of its pattern needs."""
+FEWEST = 20  # Images of a photo that a test of its pattern needs
 WORTH = 0.3
 """A pattern of all photos matters from this part of the standard deviation of an image coordinate on."""
 ROUNDING = 0.01

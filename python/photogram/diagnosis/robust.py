@@ -10,10 +10,8 @@ import numpy as np
 from photogram.arguments.types import Floats
 
 MAD_TO_SD = 1 / NormalDist().inv_cdf(0.75)
-ROUNDING = 1e-9
-"""Of the largest residual: a median below it is rounding."""
-TUKEY = 4.685
-"""Tuning constant of Tukey's biweight: 95 % efficiency for normal errors."""
+ROUNDING = 1e-9  # Of the largest residual: a median below it is rounding
+TUKEY = 4.685  # Tuning constant of Tukey's biweight: 95 % efficiency for normal errors
 
 
 def mad_sd(values: Floats) -> float:

@@ -37,10 +37,8 @@ from photogram.results.scores import Scores
 from photogram.statistics.limits import externally_studentized
 from photogram.words import Phrase, phrase
 
-SIGNIFICANT = 5.0
-"""Standard deviations: of a readout time below zero, and of what a shutter explains."""
-LONGEST = 1.0
-"""Seconds: no shutter reads for longer; such a number is one of milliseconds."""
+SIGNIFICANT = 5.0  # Standard deviations: of a readout time below zero, and of what a shutter explains
+LONGEST = 1.0  # Seconds: no shutter reads for longer; such a number is one of milliseconds
 MILLISECOND = 1e-3
 OTHER: dict[Direction, Direction] = {"down": "up", "up": "down", "right": "left", "left": "right"}
 
@@ -142,10 +140,8 @@ def _ends(block: Block, axis: int) -> tuple[float, float]:
 EXPLAINED = 0.8
 """Of what readout, lens and affinity explain together the readout explains this part alone, at least; and
 beside these it is significant."""
-FEWEST = 4
-"""Photos of a camera that move."""
-MOST = 3
-"""Cameras that are looked at, those with the most photos."""
+FEWEST = 4  # Photos of a camera that move
+MOST = 3  # Cameras that are looked at, those with the most photos
 READ = {(1, True): "down", (1, False): "up", (0, True): "right", (0, False): "left"}
 """Direction of the readout, by the axis of the coordinate and the sign of the readout time."""
 

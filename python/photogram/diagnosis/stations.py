@@ -19,20 +19,13 @@ from photogram.words import phrase
 
 LOOK, GRAVE = 8.0, 20.0
 """Departures from the path, in robust standard deviations of all departures of their kind."""
-FEW = 4
-"""So many free departures double what is allowed."""
-MOVED = 10.0
-"""The same for the change from the initial to the adjusted station."""
-TINY = 1e-9
-"""A spread below this is rounding: radians, or the linear unit."""
-UPRIGHT = 0.8
-"""Vertical component of the z axis of a photo that looks down, at least."""
-FEWEST = 5
-"""Photos of a strip whose path can be judged."""
-CURVED = 15
-"""Photos of a strip whose path may be curved."""
-SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3
-"""Departures that are never remarked on: of the base, and radians."""
+FEW = 4  # So many free departures double what is allowed
+MOVED = 10.0  # The same for the change from the initial to the adjusted station
+TINY = 1e-9  # A spread below this is rounding: radians, or the linear unit
+UPRIGHT = 0.8  # Vertical component of the z axis of a photo that looks down, at least
+FEWEST = 5  # Photos of a strip whose path can be judged
+CURVED = 15  # Photos of a strip whose path may be curved
+SMOOTH_POSITION, SMOOTH_ANGLE = 1e-3, 1e-3  # Departures that are never remarked on: of the base, and radians
 QUANTITIES = ("across the strip", "height", "omega", "phi", "kappa")
 """The angles are those between the photo and its strip, ground-to-photo."""
 
@@ -194,12 +187,9 @@ def _base(block: Block) -> float:
     return float(np.median(steps)) if steps.size else 0.0
 
 
-NEIGHBOURS = 8
-"""Points that a local plane rests on."""
-DEPARTURE = 6.0
-"""Departures from the plane in robust standard deviations of all."""
-PER_CELL = 4
-"""Points of a cell of the search grid, on average."""
+NEIGHBOURS = 8  # Points that a local plane rests on
+DEPARTURE = 6.0  # Departures from the plane in robust standard deviations of all
+PER_CELL = 4  # Points of a cell of the search grid, on average
 
 
 def two_ray_heights(result: Result) -> Section:

@@ -223,14 +223,10 @@ def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Blo
     return block.replace(image_xy=xy)
 
 
-LEAST = 4
-"""Points with a place that a photo which is looked at has."""
-MOST = 12
-"""Photos that are looked at."""
-POINTS = 300
-"""Points of each of them."""
-SEEN = 0.8
-"""Of the points of a photo its trajectory must pass more than this part."""
+LEAST = 4  # Points with a place that a photo which is looked at has
+MOST = 12  # Photos that are looked at
+POINTS = 300  # Points of each of them
+SEEN = 0.8  # Of the points of a photo its trajectory must pass more than this part
 
 
 def flown_view(block: Block) -> tuple[Block, Indices]:

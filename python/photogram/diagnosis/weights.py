@@ -15,10 +15,8 @@ from photogram.results.result import Result
 from photogram.statistics import global_test
 from photogram.words import Phrase, phrase
 
-LEAST_REDUNDANCY = 10.0
-"""Of a kind whose standard deviations are judged."""
-NOTABLE = 1.5
-"""Standard deviations that are wrong by this factor, in the mean and in the median."""
+LEAST_REDUNDANCY = 10.0  # Of a kind whose standard deviations are judged
+NOTABLE = 1.5  # Standard deviations that are wrong by this factor, in the mean and in the median
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from photogram.io.files import read_text
 from photogram.io.numbers import Marks, finite_number, marks_of
 from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import missing_columns
+from photogram.messages import missing_columns, unknown_name
 from photogram.words import Phrase, phrase
 
 TRUE, FALSE = (
@@ -85,6 +85,13 @@ class ColumnTable:
     def cell_error(self, row: int, column: str, code: str, **fields: Any) -> InputError:
         """Return an error of a cell, by the code of its message."""
         return self.error(row, phrase("error.column", column=column, message=Phrase(code, fields)))
+
+    def unknown_error(
+        self, row: int, column: str, kind: str, name: str, names: Collection[str]
+    ) -> InputError:
+        """Return the error of a name that does not exist."""
+        message = unknown_name(kind, name, names)
+        return self.error(row, phrase("error.column", column=column, message=message))
 
     def renamed(self, names: Mapping[str, str]) -> ColumnTable:
         """Return the table with other names of some columns."""

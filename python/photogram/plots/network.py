@@ -11,7 +11,6 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.plots.picture_data import Pictured, Plan
 from photogram.show.pictures import round_length
-from photogram.show.sketch.colours import hexadecimal, rgb
 from photogram.show.sketch.declared import Panel, ScaleBar
 from photogram.show.sketch.marks import (
     NOWHERE,
@@ -24,6 +23,8 @@ from photogram.show.sketch.marks import (
     Polygons,
     Shades,
     ellipse_axes,
+    hexadecimal,
+    rgb,
 )
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION

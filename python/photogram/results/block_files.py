@@ -39,6 +39,7 @@ from photogram.results.result_files import (
     written,
 )
 from photogram.results.tables import TABLES
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
@@ -186,7 +187,7 @@ class KeptTrajectory(Stand):
         return cls(*own, given.position_axes, given.angles, given.coefficients)
 
     def original(self) -> Trajectory:
-        """Return the trajectory."""
+        """Return the trajectory; the coefficients in the file must be those of its table and bases."""
         own_parts = (self.table, self.position, self.rotation, self.body)
         made = Trajectory(self.name, *own_parts, self.position_axes, self.angles)
         own, kept = (
@@ -194,7 +195,7 @@ class KeptTrajectory(Stand):
             for both in (made.coefficients, self.coefficients)
         )
         if own != kept:
-            raise InputError(f"the trajectory {self.name} has not the coefficients that stand with it")
+            raise InputError(phrase("adjusted.coefficients", name=self.name))
         object.__setattr__(made, "coefficients", self.coefficients)
         return made
 

@@ -13,6 +13,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.show.summary import Brief
+from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import _photocore
@@ -81,9 +82,7 @@ class AdjustedCamera(Brief):
             Its knots were estimated, too: their covariance has no place in a camera.
         """
         if self.given.knot_unknowns:
-            raise InputError(
-                f"the knots of {self.name} were estimated: they are no observations of another block"
-            )
+            raise InputError(phrase("adjusted.knots", camera=self.name))
         rows = self.estimated
         names = [self.names[k] for k in rows]
         covariance = (names, self.covariance[np.ix_(rows, rows)]) if names else None

@@ -173,7 +173,10 @@ def curve_deviations(covariance: Floats, terms: list[int], partials: Floats) -> 
 
 
 def radial_curve(camera: Camera, sd: Floats, terms: list[int], radii: Floats) -> tuple[Floats, Floats]:
-    """Return the curve of the radial terms alone, and its partials by these: the curve is linear in them."""
+    """Return the (r,) curve of the radial terms alone, and its partials by these terms.
+
+    `sd` are the (k,) standard deviations of all parameters, `terms` the indices of the radial ones.
+    """
     own = radial_part(camera)
     bare = own.parameters
     largest = radii.max()

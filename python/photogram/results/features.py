@@ -27,6 +27,7 @@ __all__ = ["KINDS", "Definition", "Feature", "Features", "Quantity", "named_poin
 T = TypeVar("T", "Quantity", "Feature")
 _UNIT = "unit of values, residuals and deviations of this row; empty if dimensionless"
 _EXPANDED = "expanded uncertainty, k times the standard deviation"
+MAX_SEARCHED_NAMES = 10_000
 KINDS = ("distance", "line", "plane", "circle", "sphere", "cylinder")
 
 Definition = tuple[str, str | Sequence[str]]
@@ -35,27 +36,17 @@ Definition = tuple[str, str | Sequence[str]]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a feature.
+    """A quantity of a feature."""
 
-    Attributes
-    ----------
-    name
-        `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
-        `sphericity`, `cylindricity`.
-    value, sd
-        The value with its standard deviation; components of axes and normals are plain numbers, all others
-        are lengths.
-    expanded
-        U = k sd.
-    unit
-        The linear unit of the block; empty for plain numbers.
-    """
-
+    # `distance`, `diameter`, `centre x`, `axis x` or `normal x`, `straightness`, `flatness`, `roundness`,
+    # `sphericity`, `cylindricity`
     name: str
+    # The value with its standard deviation; components of axes and normals are plain numbers, all others are
+    # lengths
     value: float
     sd: float
-    expanded: float
-    unit: str
+    expanded: float  # U = k sd
+    unit: str  # The linear unit of the block; empty for plain numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +220,7 @@ def directions(kind: str) -> tuple[str, ...]:
 
 
 def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Return points by names and patterns, each once, in the order in which they are asked for."""
+    """Return points by names and patterns, each once, in the order of the request."""
     known, found = set(names), {}
     for each in wanted:
         if each in known:
@@ -237,9 +228,9 @@ def named_points(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
             continue
         matching = [name for name in names if fnmatchcase(name, each)]
         if not matching:
-            if {*"*?["} & {*each} or len(names) > 10_000:
-                raise InputError(phrase("error.absent", kind="point", name=each))
-            raise InputError(unknown_name("point", each, names))
+            searched = len(names) < MAX_SEARCHED_NAMES and not {*"*?["} & {*each}
+            absent = phrase("error.absent", kind="point", name=each)
+            raise InputError(unknown_name("point", each, names) if searched else absent)
         found |= dict.fromkeys(matching, True)
     return list(found)
 

@@ -88,7 +88,7 @@ class PicturedNetwork(Pictured):
 
 
 class PicturedBlock(PicturedNetwork):
-    """The data of plots of a block; geographic space has axes to east, north and up at its stations."""
+    """The data of an adjusted block: geographic space in axes to east, north and up amid its stations."""
 
     result: Result
 

@@ -25,7 +25,7 @@ from photogram.results.network_tables import (
 )
 from photogram.results.observation_kinds import ObservedKind
 from photogram.results.unknowns import AdjustedUnknown
-from photogram.show.quantity import Axis, Quantity, component, joined, long
+from photogram.show.quantity import Axis, Quantity, attribute, component, joined, long
 from photogram.statistics.reliability import TESTABLE
 
 if TYPE_CHECKING:
@@ -40,24 +40,11 @@ def check_points(result: Result) -> list[Quantity]:
     statistic, p = checks.statistics
     return [
         *_compared(result, checks.rows, checks.differences, checks.given_sd),
+        attribute(checks, "assumed", about="whether standard deviations of control are assumed"),
         Quantity(
-            checks.assumed,
-            name="assumed",
-            member="assumed",
-            about="whether nothing was given: standard deviations of control are assumed",
+            statistic, name="statistic", member="statistic", about="T, or F if the unit weight is estimated"
         ),
-        Quantity(
-            statistic,
-            name="statistic",
-            member="statistic",
-            about="of the test: T, or F where the unit weight is estimated",
-        ),
-        Quantity(
-            p,
-            name="probability",
-            member="p",
-            about="of a statistic as large where nothing is wrong",
-        ),
+        Quantity(p, name="probability", member="p", about="of a larger statistic without errors"),
     ]
 
 

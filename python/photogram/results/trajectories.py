@@ -13,6 +13,7 @@ from photogram.arguments.arrays import freeze_fields, shaped, standard_deviation
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import unknown_name
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
@@ -23,6 +24,7 @@ from photogram.network.trajectories import Coefficient, Trajectory
 from photogram.results.cameras import AdjustedCamera
 from photogram.results.covariance import Covariances
 from photogram.results.unknowns import AdjustedUnknown
+from photogram.words import phrase
 
 __all__ = [
     "AdjustedTrajectory",
@@ -157,7 +159,7 @@ class AdjustedTrajectory:
         outside = ~((own >= first) & (own <= last))
         if own.ndim != 1 or outside.any():
             bad = own.ravel()[np.argmax(outside)] if outside.any() else times
-            raise InputError(f"the trajectory {self.name} reaches from {first} to {last} s, not to {bad}")
+            raise InputError(phrase("adjusted.time", name=self.name, first=first, last=last, time=bad))
         return own
 
 
@@ -189,7 +191,7 @@ def project(
     """
     timed = {each.photo: row for row, each in enumerate(block.timed)}
     if photo not in timed:
-        raise InputError(f"the photo {photo} is on no trajectory, or is not there")
+        raise InputError(unknown_name("photo on a trajectory", photo, timed))
     row = timed[photo]
     adjusted = {id(each.given): (each.position, each.attitude) for each in unknowns}
     index = block.photo_ids.index(photo)

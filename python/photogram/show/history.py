@@ -32,9 +32,6 @@ def history_part(history: History, whose: str, about: str = "", **members: objec
     return Document(
         what="",
         title=whose,
-        judgements=[],
-        advice=[],
-        highlights=[],
         sections=[Section.of(series(history, about)), Section.of(values(history))],
         members={
             **members,

@@ -211,10 +211,10 @@ class Document:
     # Kind of the document, and title of the job
     what: str
     title: str
-    judgements: Sequence[Judgement]  # One for each adjusted thing
-    advice: Sequence[Phrase | str]  # Next steps
-    highlights: Sequence[Fact]  # Key figures
-    sections: Sequence[Section]
+    judgements: Sequence[Judgement] = ()  # One for each adjusted thing
+    advice: Sequence[Phrase | str] = ()  # Next steps
+    highlights: Sequence[Fact] = ()  # Key figures
+    sections: Sequence[Section] = ()
     members: Mapping[str, object] = field(default_factory=dict)  # Members of JSON besides tables
     details: Sequence[Section] = ()  # Sections that pages omit
     phases: Mapping[str, float] = field(default_factory=dict)  # Seconds in phases of the engine

@@ -31,12 +31,7 @@ LONGEST = 30  # Longest word that is not broken, characters
 def page_pdf(page: Document, *, author: str = "") -> bytes:
     """Return a document as PDF: tagged, with bookmarks, page numbers and embedded fonts.
 
-    Parameters
-    ----------
-    page : Document
-        The document.
-    author : str, optional
-        Author in the properties of the file.
+    `author` is a property of the file.
     """
     titled = replace(page, title=page.title or page.what, members={}, phases={})
     footer = f"{page.what} – {page.title}" if page.title else page.what

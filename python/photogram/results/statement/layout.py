@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.hull import area, hull, outside
+from photogram.results.statement.request import invalid
 
 SHARE_ASKED, SPACING_ASKED = 0.2, 0.1
 FAR = 1 / 3  # Distance from check points as a part of the diagonal
@@ -62,7 +62,7 @@ def layout(points: ArrayLike, extent: ArrayLike, control: ArrayLike) -> Layout:
     low, high = block[:, :2].min(axis=0), block[:, :2].max(axis=0)
     diagonal = math.hypot(*(high - low))
     if not diagonal > 0:
-        raise InputError("extent: all positions lie at one place in plan")
+        raise invalid("extent", "request.identical-positions")
     above = own[:, :2] > (low + high) / 2
     quadrants = np.bincount(above[:, 0] + 2 * above[:, 1], minlength=4) / len(own)
     return Layout(
@@ -85,12 +85,12 @@ def _plan(name: str, given: ArrayLike, least: int) -> Floats:
     """Return (n, 2 or more) positions that are finite in plan."""
     found = numbers(name, given, missing=True)
     if found.ndim != 2 or found.shape[1] not in (2, 3):
-        raise InputError(f"{name} has the shape {found.shape}, not (n, 3)")
+        raise invalid(name, "error.shape", shape="(n, 3)", actual=str(found.shape))
     if len(found) < least:
-        raise InputError(f"{name} has no position")
+        raise invalid(name, "error.empty")
     bad = ~np.isfinite(found[:, :2]).all(axis=1)
     if bad.any():
-        raise InputError(f"{name}[{np.argmax(bad)}] is not finite in plan")
+        raise invalid(f"{name}[{np.argmax(bad)}]", "error.finite", found[bad][0, :2].tolist())
     return found
 
 

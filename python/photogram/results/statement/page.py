@@ -38,8 +38,6 @@ def statement_document(found: Statement) -> Document:
         what=texts("page.what"),
         title=asked.title or found.result.block.title,
         judgements=[Judgement(mark, found.headline, [text for _, text in judged.sentences], tone)],
-        advice=[],
-        highlights=[],
         sections=[
             Section("figures", texts("page.figures"), [*localized(texts, _figures(found)), *_notes(found)]),
             Section("assumptions", texts("page.assumptions"), [assumed, _map(found)]),
