@@ -25,9 +25,9 @@ MOVED = {"bundler", "bal", "patb", "bingo"}
 """Formats whose coordinates are those of a camera without distortion: weights are other ones."""
 SENTENCES = (
     "no photo",
-    "only cameras that are known and free of distortion",
-    "observations beside images, which are not taken there",
-    "are not known: photogram.first_values finds initial values",
+    "known cameras without distortion, in mm, are required",
+    "are not supported",
+    "are unknown: photogram.first_values finds initial values",
 )
 
 
