@@ -23,6 +23,7 @@ from photogram.network import (
 )
 from photogram.network.motion import at_rest, flown_by, focal_images, of_pictures, scanners, timed_photos
 from photogram.network.subset import of_photos
+from photogram.words import Phrase
 
 
 def table():
@@ -121,8 +122,8 @@ def test_a_scanner_with_pixels():
 
 def test_what_is_on_trajectories():
     block = scanned(photos=True)
-    assert flown_by(block) == "the photo S1 is on a trajectory"
-    assert flown_by(block.replace(timed=())) == "observations are of the trajectory strip 1"
+    assert flown_by(block) == Phrase("block.moving.photo", {"photo": "S1"})
+    assert flown_by(block.replace(timed=())) == Phrase("block.moving.record", {"trajectory": "strip 1"})
     assert timed_photos(block).all()
     assert scanners(block).tolist() == [True, True, False, False, False]
     assert not timed_photos(at_rest(block)).any()

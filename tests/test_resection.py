@@ -168,7 +168,7 @@ def test_a_prior_chooses_among_the_poses_of_three_points():
     photo = resect(triangle, xy, C)
     poses = [photo.position, *(other.position for other in photo.alternatives)]
     assert len(poses) == 4
-    assert "3 other poses fit about as well" in str(photo.messages[0])
+    assert (photo.messages[0].code, photo.messages[0].phrase.fields["n"]) == ("resection.alternatives", 3)
     assert "no redundancy" in str(photo.messages[-1])
     for pose in poses:
         chosen = resect(triangle, xy, C, position=pose, position_sd=1.0)

@@ -143,7 +143,7 @@ def test_one_step_and_two_are_the_same_where_marks_alone_tell(tmp_path: Path) ->
 
 
 def test_a_local_reseau_needs_its_grid(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"films.csv, record 2: .*200 are the most"):
+    with pytest.raises(InputError, match=r"films.csv, record 2: .*must be at most 200"):
         archive(tmp_path, WHOLE.removesuffix("6,6") + "11,11")
     with pytest.raises(InputError, match=r"column grid_rows: is empty, and the pattern local needs it"):
         archive(tmp_path, WHOLE.removesuffix("6"))
