@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
+from photogram.words import Phrase
 
 COMPRESSED: dict[bytes, Callable[[BinaryIO], BinaryIO]] = {
     b"BZh": lambda file: cast("BinaryIO", bz2.BZ2File(file)),
@@ -69,7 +70,7 @@ def whole(numbers: Floats) -> NDArray[np.bool_]:
     return np.asarray((numbers >= 0) & (numbers == np.floor(numbers)) & (numbers < 2**53))
 
 
-def at(path: Path, index: int, message: str) -> InputError:
+def at(path: Path, index: int, message: str | Phrase) -> InputError:
     """Return an error at the line that holds the word of the given index."""
     words = lines = 0
     if not path.is_file():
