@@ -22,7 +22,7 @@ from photogram.network.unknowns import Sensor, Unknown
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram.network.block import Block
+    from photogram import Block
 
 __all__ = ["LineSensor", "Lines", "Moment", "Shutter", "Timed", "checked_timed", "own_trajectories"]
 
