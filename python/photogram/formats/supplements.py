@@ -41,10 +41,8 @@ from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
 if TYPE_CHECKING:
     from photogram.formats.control_lists import ControlList
 
-SAME = 1e-3
-"""Pixels that two measurements of a point on a photo may be apart to be one."""
-SIMILAR = 10.0
-"""How much better control must fit a model after a similarity for the model to be carried over."""
+SAME = 1e-3  # Pixels that two measurements of a point on a photo may be apart to be one
+SIMILAR = 10.0  # How much better control must fit a model after a similarity for the model to be carried over
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:

@@ -57,8 +57,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
 from photogram.words import Phrase, option_sd, phrase
 
-DIFFER = 1e-6
-"""What the positions of a point in two tables may differ by."""
+DIFFER = 1e-6  # What the positions of a point in two tables may differ by
 _USES = ("control", "check", "off")
 
 

@@ -21,16 +21,12 @@ from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
-BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}
-"""What is not affine in films, by their model."""
+BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}  # What is not affine in films, by their model
 _BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
 _WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
-UM = 1e-3
-"""In millimetres."""
-KNOWN = 1e-6
-"""Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)."""
-LOCAL = "local"
-"""The pattern of films each of whose photos has a grid of its own."""
+UM = 1e-3  # In millimetres
+KNOWN = 1e-6  # Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)
+LOCAL = "local"  # The pattern of films each of whose photos has a grid of its own
 
 
 @dataclass(frozen=True)

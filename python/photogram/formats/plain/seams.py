@@ -30,8 +30,7 @@ class Seam:
     at: float
 
 
-Seams = Mapping[str, Seam]
-"""By the names of photos."""
+Seams = Mapping[str, Seam]  # By the names of photos
 
 
 def with_seams(tables: Tables) -> tuple[Tables, Seams]:

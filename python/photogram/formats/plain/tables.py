@@ -37,8 +37,7 @@ from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
 _Named = TypeVar("_Named")
-DEGREE = 180 / np.pi
-"""Of a radian."""
+DEGREE = 180 / np.pi  # Of a radian
 
 
 def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:

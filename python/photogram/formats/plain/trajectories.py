@@ -32,8 +32,7 @@ _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
     "body_rotations",
 )
-Groups = Mapping[tuple[str, ...], Indices]
-"""Rows of a table by what they are of."""
+Groups = Mapping[tuple[str, ...], Indices]  # Rows of a table by what they are of
 
 
 def read_trajectories(tables: Tables) -> dict[str, Trajectory]:

@@ -25,8 +25,7 @@ from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
 from photogram.words import phrase
 
-Place = tuple[str, str, int]
-"""Trajectory, position or rotation, and the number of a coefficient."""
+Place = tuple[str, str, int]  # Trajectory, position or rotation, and the number of a coefficient
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
