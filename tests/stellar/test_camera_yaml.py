@@ -112,7 +112,7 @@ def test_a_file_of_opencv(tmp_path):
         ("image_height: 480\n", "", "image_height is missing"),
         ("camera_matrix", "matrix", "camera_matrix is missing"),
         ("distortion_coefficients", "lens", "distortion_coefficients is missing"),
-        ("0., 0., 1. ]", "0., 0., 1., 3. ]", "has 10 numbers, not 9"),
+        ("0., 0., 1. ]", "0., 0., 1., 3. ]", "must have 9 values, got 10"),
         ("[ 6.5e+02, 0.,", "[ 6.5e+02, 2.,", "/camera_matrix: must be a camera matrix without skew"),
         ("       0. ]", "       0., 0.1, 0.2 ]", "has more terms than k1, k2, p1, p2, k3"),
         ("flags: 0", "distortion_model: fov", "choose one of plumb_bob, equidistant"),

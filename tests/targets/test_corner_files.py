@@ -98,7 +98,7 @@ def test_table_with_levels_cameras_views_and_times(tmp_path):
     ("lines", "record", "said"),
     [
         (["image,point,x,y", "a,6,1,2"], 2, "no point '6'"),
-        (["image,point,x,y", "a,0,1,"], 2, "column y: is empty"),
+        (["image,point,x,y", "a,0,1,"], 2, "column y: must have a value"),
         (["image,point,x,y", "a,0,1,wide"], 2, "column y"),
         (["image,point,x,y,sd", "a,0,1,2,0"], 2, "positive"),
         (["image,point,y", "a,0,1"], 1, "column x is missing"),
@@ -119,7 +119,7 @@ def test_corners_that_a_table_calls_off_do_not_count(tmp_path):
     ]
     found = read_table(written(tmp_path / "c.csv", "image,point,x,y,use", *lines), SMALL)
     assert np.flatnonzero(~found.use).tolist() == [4]
-    with pytest.raises(InputError, match="column use: 'maybe' is neither true nor false"):
+    with pytest.raises(InputError, match="column use: must be true or false, got 'maybe'"):
         read_table(written(tmp_path / "d.csv", "image,point,x,y,use", "a,0,1,2,maybe"), SMALL)
 
 
