@@ -270,7 +270,7 @@ def folder(tmp_path):
 
 
 def test_damaged_folders_are_refused_with_the_file(folder):
-    with pytest.raises(InputError, match=r"nothing/summary\.json: cannot be read"):
+    with pytest.raises(InputError, match=r"nothing/summary\.json: the file cannot be read"):
         read_result(folder / "nothing")
     images = folder / "images.parquet"
     whole = images.read_bytes()

@@ -54,9 +54,18 @@ class Tables:
     messages: list[Message]  # Remarks
     names: Collection[str] = ()  # Points that have images, where they are known before the tables are read
     shared: Shared = field(default_factory=Shared)  # Common unknowns that rows of all tables name
+    _tables: dict[str, ColumnTable | None] = field(default_factory=dict, init=False)
 
     def read(self, name: str) -> ColumnTable | None:
-        """Return a table that is there."""
+        """Return a table that is there. It is parsed once, except images, which are too large to store."""
+        if name in self._tables:
+            return self._tables[name]
+        table = self._parsed(name)
+        if name != "images":
+            self._tables[name] = table
+        return table
+
+    def _parsed(self, name: str) -> ColumnTable | None:
         if name not in self.settings.tables:
             return self._photos_of_images() if name == "photos" and "images" in self.settings.tables else None
         schema, path = TABLES[name], self.settings.tables[name]
