@@ -245,11 +245,16 @@ class ColumnTable:
             code = "table.no-sd" if table else "error.empty"
             raise self.cell_error(row, columns[column], code, table=table)
 
-    def words(self, column: str, known: Sequence[str], default: str | None = None) -> list[str]:
-        """Return a column of known words in small letters; empty cells have the default, or the first."""
+    def words(
+        self, column: str, known: Sequence[str], default: str | None = None, *, optional: bool = False
+    ) -> list[str]:
+        """Return a column of known words in small letters; empty cells have the default, or the first.
+
+        `optional`: the default of empty cells needs not be a known word.
+        """
         words = [word.lower() for word in self.texts(column, known[0] if default is None else default)]
         for row, word in enumerate(words):
-            if word not in known:
+            if word not in known and not (optional and word == default):
                 raise self.cell_error(row, column, "error.choice", names=list(known), value=word)
         return words
 
