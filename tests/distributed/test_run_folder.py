@@ -62,7 +62,11 @@ def test_a_finished_run_is_taken_up(block, run):
 @pytest.mark.parametrize("name", ["progress.json", "run.json", "parts/00000/part.json"])
 def test_documents_that_are_none_of_a_run_are_refused(block, run, name, content):
     (run / name).write_bytes(content)
-    refused(block, run, rf"{name.rsplit('/')[-1]}: (is no|cannot be read|was changed)")
+    refused(
+        block,
+        run,
+        rf"{name.rsplit('/')[-1]}: (is no|the file cannot be read|the checksum differs|the file must be valid)",
+    )
 
 
 @pytest.mark.parametrize(

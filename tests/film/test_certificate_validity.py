@@ -82,7 +82,9 @@ def test_certificates_of_which_none_can_be_chosen_are_refused(folder: Path) -> N
     with pytest.raises(InputError, match=r"1980.toml: has no date"):
         dated(folder, 1980, 1983)
     (folder / "1986.toml").write_text((folder / "1986.toml").read_text().replace("rc10-2345", "rc10-99"))
-    with pytest.raises(InputError, match=r"the camera rc10-2345 belong to several cameras: rc10-2345, rc10-99"):
+    with pytest.raises(
+        InputError, match=r"the camera rc10-2345 belong to several cameras: rc10-2345, rc10-99"
+    ):
         dated(folder, 1983, 1986)
     with pytest.raises(InputError, match=r"--set film.flown=May 1983: \[film\] flown: must be a date"):
         dated(folder, 1983, flown="May 1983")

@@ -166,7 +166,9 @@ def test_photos_name_the_certificate_of_their_camera(tmp_path: Path) -> None:
     own = read(tmp_path)
     assert own.block.cameras[0].parameters == whole.block.cameras[0].parameters
     (tmp_path / "photos.csv").write_text("\n".join([*rows[:-1], rows[-1].replace("rc10.toml", "other.toml")]))
-    with pytest.raises(InputError, match=r"has the certificate 'rc10.toml' in a row above; define a camera for each"):
+    with pytest.raises(
+        InputError, match=r"has the certificate 'rc10.toml' in a row above; define a camera for each"
+    ):
         read(tmp_path)
 
 

@@ -205,7 +205,7 @@ def test_a_damaged_binary_file_is_named_with_the_record(tmp_path, file, change, 
     ("file", "old", "new", "words"),
     [
         ("cameras.txt", "FULL_OPENCV", "FULL_OPENCW", ["cameras.txt", "record 2", "FULL_OPENCW"]),
-        ("cameras.txt", " 3612.5 3612.5", " 3612,5 3612.5", ["record 2", "'3612,5' is not a number"]),
+        ("cameras.txt", " 3612.5 3612.5", " 3612,5 3612.5", ["record 2", "must be a number, got '3612,5'"]),
         ("images.txt", "1395.3837490217622 ", "x ", ["images.txt", "record 4", "feature 1", "'x'"]),
         ("images.txt", "10 0.0103", "10 0.9103", ["images.txt", "record 3", "quaternion", "length"]),
         ("images.txt", " 1 DJI_0002.JPG", " 2 DJI_0002.JPG", ["images.txt", "record 5", "camera 2"]),

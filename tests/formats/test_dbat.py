@@ -163,7 +163,7 @@ def test_photos_with_another_camera_have_their_own(tmp_path):
     ("line", "change", "words"),
     [
         (2, lambda line: " 0.0005 20", ["record 2", "how many pixels", "width and height"]),
-        (4, lambda line: line.replace("8.67", "8,67"), ["record 4", "'8,67' is not a number"]),
+        (4, lambda line: line.replace("8.67", "8,67"), ["record 4", "must be a number, got '8,67'"]),
         (4, lambda line: "-" + line, ["record 4", "principal distance of -8.67 mm"]),
         (7, lambda line: line.replace("0 -33.0", "7 -33.0"), ["record 7", "is of photo 7, not of 0"]),
         (12, lambda line: line.replace("1 C", "0 C"), ["record 12", "photo 0 is there twice"]),
@@ -304,7 +304,7 @@ def test_a_script_says_what_is_unknown_and_held(roma, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("351, 410", "351, x", ["sxb.xml", "record 6", "'x' is not a whole number"]),
+        ("351, 410", "351, x", ["sxb.xml", "record 6", "must be an integer, got 'x'"]),
         (">keep<", ">drop<", ["record 9", "'drop' is neither keep nor remove"]),
         ("id,im,x,y", "id,im,x", ["markpts.txt", "record 2", "4 cells, but the table has 3 columns"]),
         ("smartpts.txt", "smart.txt", ["smart.txt", "cannot be read"]),

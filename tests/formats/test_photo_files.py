@@ -216,7 +216,7 @@ def test_a_project_names_the_folder_itself(flown):
     toml.write_text(text + '[photos]\ndirectory = "photos"\n')
     assert len(positions(formats.read(folder))) == 6
     toml.write_text(text + '[photos]\ndirectory = "nowhere"\n')
-    with pytest.raises(InputError, match="there is no folder nowhere"):
+    with pytest.raises(InputError, match="there is no folder 'nowhere'"):
         formats.read(folder)
     toml.write_text(text + '[photos]\ndirectory = "photos"\nmrk_antenna = 3\n')
     with pytest.raises(InputError, match="true or false"):

@@ -321,7 +321,7 @@ def test_a_table_of_another_result_is_refused(folder, tmp_path_factory, table):
             read_result(folder)
     assert not same or table in ("control", "observations")
     (folder / f"{table}.parquet").unlink()
-    with pytest.raises(InputError, match=rf"{table}\.parquet: cannot be read"):
+    with pytest.raises(InputError, match=rf"{table}\.parquet: the file cannot be read"):
         read_result(folder)
 
 
@@ -372,10 +372,16 @@ def test_columns_that_hold_something_else_are_named(folder, table, column, value
         (lambda document: document.update(format=1), "is of the format 1"),
         (lambda document: document.update(kind="other"), "of a kind that is not known: 'other'"),
         (lambda document: document.pop("kept"), "is not the summary of a result"),
-        (lambda document: document["kept"]["block"].update(frame={"is": "Path"}), "is unknown to this version"),
-        (lambda document: document["kept"]["block"].update(frame={"was": 1}), "does not say what"),
-        (lambda document: document["kept"]["result"].update(loss={"same": 10**6}), "is no same"),
-        (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "is no map"),
+        (
+            lambda document: document["kept"]["block"].update(frame={"is": "Path"}),
+            "is unknown to this version",
+        ),
+        (lambda document: document["kept"]["block"].update(frame={"was": 1}), "an object of an unknown kind"),
+        (
+            lambda document: document["kept"]["result"].update(loss={"same": 10**6}),
+            "must be of the kind same",
+        ),
+        (lambda document: document["kept"]["result"].update(dropped={"map": 3}), "must be of the kind map"),
         (lambda document: document["kept"].update(state={"tuple": []}), "keeps no state"),
         (lambda document: document["kept"]["result"].update(cameras=["x"]), "cameras.0. is 'x', not a Adj"),
         (

@@ -281,7 +281,7 @@ def test_catalogue_and_prior_from_files(result, folder):
     assert "Given" in [column.head for column in known.document().table("parameters").columns]
     assert inputs(file)[1:] == [folder / "images.csv", folder / "stars.csv", folder / "camera.json"]
     (folder / "stars.csv").write_text(f"{head}\nx,1,2,3,4,5,\n")
-    with pytest.raises(InputError, match="magnitude is blank"):
+    with pytest.raises(InputError, match="column magnitude: must have a value"):
         read_night(file)
 
 
@@ -367,19 +367,19 @@ def test_results_do_not_replace_the_input(folder, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[station]", "[sation]", "there is no table sation"),
-        ("latitude_deg", "lattitude_deg", r"\[station\] has no lattitude_deg"),
+        ("[station]", "[sation]", "there is no table 'sation'"),
+        ("latitude_deg", "lattitude_deg", r"\[station\]: there is no key 'lattitude_deg'"),
         ("latitude_deg = 47.05", "latitude_deg = 147.05", "not between -90 and 90"),
         ("field_of_view_deg = 36.9", "field_of_view_deg = 236.9", "the field of view is 236.9 degrees"),
-        ("field_of_view_deg", "fov", r"\[camera\] has no fov"),
+        ("field_of_view_deg", "fov", r"\[camera\]: there is no key 'fov'"),
         ('utc = "2024-03-05T20:10:00.00"', 'utc = "yesterday"', "is not a UTC time"),
         ('utc = "2024-03-05T20:10:00.00"', 'utc = "2024-13-05T20:10:00.00"', "bad month"),
-        ('name = "2"', 'name = "1"', r"\[exposures 1\] name is '1': two exposures have the same name"),
+        ('name = "2"', 'name = "1"', r"\[exposures 1\] name: is '1': two exposures have the same name"),
         ('name = "2"', 'name = "6"', "there is no exposure 2"),
         ('file = "images.csv"', 'file = "nothing.csv"', "cannot be read"),
-        ('file = "images.csv"', 'files = "images.csv"', "has no files"),
+        ('file = "images.csv"', 'files = "images.csv"', "there is no key 'files'"),
         ("sd_px = 0.1", "sd_px = 0.0", "must be positive"),
-        ("sd_px = 0.1", 'sd_px = "small"', r"\[images\] sd_px is 'small', not a number"),
+        ("sd_px = 0.1", 'sd_px = "small"', r"\[images\] sd_px: must be a number, got 'small'"),
         ("[labels]", "[labels", "Expected"),
     ],
 )
@@ -397,7 +397,7 @@ def test_bad_rows_are_named(folder):
     lines = file.read_text().splitlines()
     for row, message in (
         ("1,12,x", "column y_px: must be a number, got 'x'"),
-        ("1,12,", "y_px is blank"),
+        ("1,12,", "column y_px: must have a value"),
         ("9,1,1", "exposure 9"),
     ):
         file.write_text("\n".join([*lines[:5], row, *lines[5:]]))
