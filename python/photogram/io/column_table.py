@@ -116,7 +116,7 @@ class ColumnTable:
         return replace(self, cells={**self.cells, column: texts}, ready=ready)
 
     def require(self, *columns: str) -> None:
-        """Refuse a table without these columns."""
+        """Reject a table without these columns."""
         if missing := [column for column in columns if column not in self.columns]:
             raise self.head.error(missing_columns(missing, self.columns))
 
@@ -238,7 +238,7 @@ class ColumnTable:
         return values
 
     def check_given(self, values: Floats, columns: Sequence[str], table: str = "") -> None:
-        """Refuse NaN among (rows, k) numbers of some columns; `[sd]` may have those of a named table."""
+        """Reject NaN among (rows, k) numbers of some columns; `[sd]` may have those of a named table."""
         missing = np.argwhere(np.isnan(values))
         if len(missing):
             row, column = missing[0].tolist()

@@ -180,7 +180,7 @@ def _unused(
 
 
 def _check_features(settings: Settings, names: Sequence[str]) -> None:
-    """Refuse features through points that are not there."""
+    """Reject features through points that are not there."""
     for name, (_, wanted) in settings.features.items():
         try:
             named_points(wanted, names)

@@ -212,7 +212,7 @@ class Rigs:
         return None if first is None or first[0] != rig else (rig, first[1], name)
 
     def tables(self, block: Block) -> dict[str, dict[str, Any]]:
-        """Return the tables of rigs, frames and bases; none where there are no rigs."""
+        """Return the tables of rigs, frames and bases."""
         if not self._sensors:
             return {}
         rows: list[tuple[str, str, Sensor | None]] = []

@@ -126,7 +126,7 @@ class Tables:
         return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
 
     def attitudes(self, table: ColumnTable) -> Floats:
-        """Return (rows, k) numbers of attitudes, angles in radians; NaN where there are none."""
+        """Return (rows, k) numbers of attitudes, angles in radians; NaN without."""
         names = ANGLES[self.settings.attitude]
         others = [each for each in table.columns if each in ALL_ANGLES and each not in names]
         if others and not set(names) <= set(table.columns):
@@ -136,7 +136,7 @@ class Tables:
         return vectors_of(table, names, None if plain else self.angle)
 
     def matrices(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) attitudes A, photo to object; NaN where there are none."""
+        """Return (rows, 3, 3) attitudes A, photo to object; NaN without."""
         values = self.attitudes(table)
         found = np.full((len(values), 3, 3), np.nan)
         known = np.flatnonzero(~np.isnan(values).any(axis=1))
@@ -181,7 +181,7 @@ class Tables:
         return turned
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
-        """Refuse quaternions without length and matrices that are no rotations, with their rows."""
+        """Reject quaternions without length and matrices that are no rotations, with their rows."""
         kind = self.settings.attitude
         for row in known.tolist():
             if kind == "quaternion":

@@ -175,7 +175,7 @@ class _Bases:
         return replace(basis, value=values, sd=deviations)
 
     def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
-        """Refuse what is no basis, and what is said of another."""
+        """Reject what is no basis, and what is said of another."""
         kind = self.kind
         if word not in _COLUMNS:
             raise self.table.cell_error(row, kind, "error.choice", names=list(_COLUMNS), value=word)

@@ -40,7 +40,7 @@ def shared_trajectories(block: Block) -> list[Trajectory]:
 
 
 def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
-    """Return the tables of the trajectories of a block; none where there are none."""
+    """Return the tables of the trajectories of a block."""
     own = shared_trajectories(block)
     if not own:
         return {}
