@@ -303,7 +303,7 @@ def test_a_script_says_what_is_unknown_and_held(roma, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("351, 410", "351, x", ["sxb.xml", "record 6", "'x' is not a whole number"]),
+        ("351, 410", "351, x", ["sxb.xml", "record 6", "must be an integer, got 'x'"]),
         (">keep<", ">drop<", ["record 9", "'drop' is neither keep nor remove"]),
         ("id,im,x,y", "id,im,x", ["markpts.txt", "record 2", "4 cells, but the table has 3 columns"]),
         ("smartpts.txt", "smart.txt", ["smart.txt", "cannot be read"]),

@@ -186,7 +186,7 @@ def test_names_that_are_numbers_with_decimals_are_refused_with_file_and_column(t
     shutil.copytree(EXAMPLE, tmp_path, dirs_exist_ok=True)
     (tmp_path / "control.csv").unlink()
     parquet(tmp_path / "control.parquet", point=[1.5, 2.5], x=[1.0, 2.0], y=[1.0, 2.0], z=[1.0, 2.0])
-    with pytest.raises(InputError, match=r"control\.parquet: the column point holds numbers with decimals"):
+    with pytest.raises(InputError, match=r"control\.parquet: the column point contains decimal numbers"):
         formats.read(tmp_path)
     parquet(tmp_path / "control.parquet", x=[1.0, 2.0], y=[1.0, 2.0], z=[1.0, 2.0])
     with pytest.raises(InputError, match=r"control\.parquet: the column point is missing"):
@@ -201,7 +201,7 @@ def test_empty_and_infinite_numbers_of_parquet_are_those_of_text(tmp_path):
     assert table.numbers("x", 7.0, read=lambda text: 2 * float(text)).tolist() == [2.0, 7.0]
     assert table.texts("use", "none") == ["none", "none"]
     assert table.numbers("y", infinite=True)[1] == np.inf
-    with pytest.raises(InputError, match=r"a\.parquet, record 2: column y: is not a finite number"):
+    with pytest.raises(InputError, match=r"a\.parquet, record 2: column y: must be a finite number"):
         table.numbers("y")
 
 

@@ -198,7 +198,7 @@ def test_a_track_that_a_user_names_is_the_control_point_of_this_name(tmp_path):
         (lambda d: d.clear(), ["holds no reconstruction"]),
         (
             lambda d: d[0]["points"]["0"].update(coordinates=[1, 2]),
-            ["points/0/coordinates", "2 numbers, not 3"],
+            ["points/0/coordinates", "must have 3 values, got 2"],
         ),
     ],
 )

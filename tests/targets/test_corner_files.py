@@ -128,7 +128,7 @@ def test_corners_that_a_table_calls_off_do_not_count(tmp_path):
     ]
     found = read_table(written(tmp_path / "c.csv", "image,point,x,y,use", *lines), SMALL)
     assert np.flatnonzero(~found.use).tolist() == [4]
-    with pytest.raises(InputError, match="column use: 'maybe' is neither true nor false"):
+    with pytest.raises(InputError, match="column use: must be true or false, got 'maybe'"):
         read_table(written(tmp_path / "d.csv", "image,point,x,y,use", "a,0,1,2,maybe"), SMALL)
 
 

@@ -207,7 +207,7 @@ def _several(hint: Any) -> Check | None:
 
 
 def _name(name: str, value: Any) -> Any:
-    """Refuse what cannot be a name: text that is none, and what is neither text nor number."""
+    """Reject what cannot be a name: text that is none, and what is neither text nor number."""
     if isinstance(value, str):
         return _text(name, value)
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
@@ -250,7 +250,7 @@ def _text(name: str, value: Any) -> str:
 
 
 def _array(name: str, value: Any) -> Any:
-    """Refuse what is no array of real numbers, and arrays with masked ones."""
+    """Reject what is no array of real numbers, and arrays with masked ones."""
     if value is None:
         raise _refused(name, value, "an array of numbers")
     try:

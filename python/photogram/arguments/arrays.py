@@ -215,7 +215,7 @@ def truth_value(name: str, value: object) -> bool:
 
 
 def one_of(name: str, value: object, choices: Sequence[str]) -> None:
-    """Refuse what is not one of some words."""
+    """Reject what is not one of some words."""
     if not (isinstance(value, str) and value in choices):
         raise InputError(phrase("argument.choice", name=name, names=list(choices), value=shown(value)))
 

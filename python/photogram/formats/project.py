@@ -34,11 +34,9 @@ from photogram.words import Phrase, option_sd, phrase
 __all__ = ["DatumName", "Frame", "Options", "Project", "Size", "Unused", "assembled"]
 
 DatumName = Literal["control", "minimum", "inner"]
-Size = tuple[int, int]
-"""Width and height of the pictures of a camera, pixels."""
+Size = tuple[int, int]  # Width and height of the pictures of a camera, pixels
 
-ASSUMED_SD = {"px": 1.0, "mm": 0.010}
-"""Of image coordinates where nothing says how good they are."""
+ASSUMED_SD = {"px": 1.0, "mm": 0.010}  # Of image coordinates where nothing says how good they are
 
 
 def frame_of(block: Block) -> Frame:

@@ -26,6 +26,7 @@ from photogram.formats.project import Frame, Project, Repeated
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
+from photogram.network.block import Block
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
 from photogram.network.wider_models import (
@@ -41,10 +42,8 @@ from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
 if TYPE_CHECKING:
     from photogram.formats.control_lists import ControlList
 
-SAME = 1e-3
-"""Pixels that two measurements of a point on a photo may be apart to be one."""
-SIMILAR = 10.0
-"""How much better control must fit a model after a similarity for the model to be carried over."""
+SAME = 1e-3  # Pixels that two measurements of a point on a photo may be apart to be one
+SIMILAR = 10.0  # How much better control must fit a model after a similarity for the model to be carried over
 
 
 def deviations(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
@@ -138,12 +137,17 @@ def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
     block, again = project.block, project.repeated
     if not again.points:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
-    place = {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
+    place = _image_rows(block)
     pairs = [place.get(pair, -1) for pair in zip(again.photos, again.points, strict=True)]
     rows = np.array(pairs, dtype=np.int64)
     there = np.flatnonzero(rows >= 0)
     return rows[there], there
+
+
+def _image_rows(block: Block) -> dict[tuple[str, str], int]:
+    """Return the row of each image observation by the names of photo and point."""
+    ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
+    return {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
 
 
 def self_calibrated(project: Project, names: Sequence[str]) -> Project:
@@ -268,13 +272,7 @@ def _known_photos(project: Project, given: ControlList) -> ColumnTable:
 
 def _present_rows(project: Project, table: ColumnTable) -> set[int]:
     """Return the rows of measurements that the project has at the same place in the photo."""
-    block = project.block
-    known = {
-        (block.photo_ids[photo], block.point_ids[point]): row
-        for row, (photo, point) in enumerate(
-            zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
-        )
-    }
+    known = _image_rows(project.block)
     pairs = list(zip(table.texts("photo"), table.texts("point"), strict=True))
     if not any(pair in known for pair in pairs):
         return set()

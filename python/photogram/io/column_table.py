@@ -116,7 +116,7 @@ class ColumnTable:
         return replace(self, cells={**self.cells, column: texts}, ready=ready)
 
     def require(self, *columns: str) -> None:
-        """Refuse a table without these columns."""
+        """Reject a table without these columns."""
         if missing := [column for column in columns if column not in self.columns]:
             raise self.head.error(missing_columns(missing, self.columns))
 
@@ -238,18 +238,23 @@ class ColumnTable:
         return values
 
     def check_given(self, values: Floats, columns: Sequence[str], table: str = "") -> None:
-        """Refuse NaN among (rows, k) numbers of some columns; `[sd]` may have those of a named table."""
+        """Reject NaN among (rows, k) numbers of some columns; `[sd]` may have those of a named table."""
         missing = np.argwhere(np.isnan(values))
         if len(missing):
             row, column = missing[0].tolist()
             code = "table.no-sd" if table else "error.empty"
             raise self.cell_error(row, columns[column], code, table=table)
 
-    def words(self, column: str, known: Sequence[str], default: str | None = None) -> list[str]:
-        """Return a column of known words in small letters; empty cells have the default, or the first."""
+    def words(
+        self, column: str, known: Sequence[str], default: str | None = None, *, optional: bool = False
+    ) -> list[str]:
+        """Return a column of known words in small letters; empty cells have the default, or the first.
+
+        `optional`: the default of empty cells needs not be a known word.
+        """
         words = [word.lower() for word in self.texts(column, known[0] if default is None else default)]
         for row, word in enumerate(words):
-            if word not in known:
+            if word not in known and not (optional and word == default):
                 raise self.cell_error(row, column, "error.choice", names=list(known), value=word)
         return words
 

@@ -104,7 +104,7 @@ class Table:
         return replace(self, columns=tuple(names))
 
     def require(self, *columns: str) -> None:
-        """Refuse a table without these columns."""
+        """Reject a table without these columns."""
         there = set(self.columns)
         if missing := [column for column in columns if column not in there]:
             raise self.head.error(missing_columns(missing, self.columns))

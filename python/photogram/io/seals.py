@@ -23,13 +23,13 @@ def seal(document: Mapping[str, Any]) -> str:
 
 
 def check_sealed(document: Mapping[str, Any], path: Path) -> None:
-    """Refuse a document that is not the one which was sealed."""
+    """Reject a document that is not the one which was sealed."""
     if document.get(SEAL) != seal(document):
         raise InputError(phrase("file.changed"), file=path)
 
 
 def check_seal(path: Path, expected: object, of: str) -> None:
-    """Refuse a file whose checksum differs from the one that the file `of` states."""
+    """Reject a file whose checksum differs from the one that the file `of` states."""
     with reading(path), path.open("rb") as file:
         found = hashlib.file_digest(file, "sha256").hexdigest()
     if found != expected:

@@ -176,7 +176,7 @@ class Table:
         return Table(value, f"{self.name}.{key}", self.source)
 
     def only(self, keys: Collection[str]) -> None:
-        """Refuse other keys."""
+        """Reject other keys."""
         for key in self.values:
             if key not in keys:
                 message = phrase("error.at", what=f"[{self.name}]", message=unknown_name("key", key, keys))

@@ -59,7 +59,7 @@ def test_other_commands_know_networks(given, tmp_path):
     ("words", "sentence"),
     [
         (("--jigsaw", "CAMSOLV=all"), "did you mean CAMSOLVE"),
-        (("--jigsaw", "nowhere.txt"), "nowhere.txt: cannot be read"),
+        (("--jigsaw", "nowhere.txt"), "nowhere.txt: the file cannot be read"),
     ],
 )
 def test_wrong_settings_end_the_command(given, words, sentence):

@@ -39,17 +39,14 @@ from photogram.network.core_arrays import CoreOptions
 from photogram.network.observations.photos import with_epochs
 from photogram.words import phrase
 
-TIES = ("distances", "height_differences", "coordinate_differences")
-"""Tables of observations between points."""
+TIES = ("distances", "height_differences", "coordinate_differences")  # Tables of observations between points
 HELD = (
     *("cameras", "photos", "control", "gnss", "gnss_groups", "attitudes", "attitude_groups"),
     *("relative_poses", "instruments", *TIES),
 )
 """Tables that are held in memory."""
-BATCH = 2**18
-"""Rows that are read at once."""
-BUCKET = 2**22
-"""Rows of a bucket, about: one is in memory at a time."""
+BATCH = 2**18  # Rows that are read at once
+BUCKET = 2**22  # Rows of a bucket, about: one is in memory at a time
 
 
 def streamable(path: Path) -> bool:

@@ -35,8 +35,7 @@ OTHER_LENS = 5.0
 """Millimetres by which a principal distance that is given differs from a certificate of another lens cone."""
 _SD = ("sd_radial", "sd_tangential")
 _DISTANCES = ("c", "f", "fx", "fy")
-SMALLEST_DISTANCE = 0.1
-"""Smallest principal distance, as a part of the width of the image."""
+SMALLEST_DISTANCE = 0.1  # Smallest principal distance, as a part of the width of the image
 
 
 @dataclass(frozen=True)

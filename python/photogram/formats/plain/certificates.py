@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 _MODELS = ("brown_forward", "brown")
 _ITSELF = "a camera of another year is a camera by itself"
-SD_MARK = 0.002
-"""mm, of places in a certificate that does not say it: they are printed to 0.001."""
+SD_MARK = 0.002  # mm, of places in a certificate that does not say it: they are printed to 0.001
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:

@@ -90,7 +90,7 @@ class Covariances:
         return made(table, matrix.rows[0], lambda: camera.replace(sd=sd, covariance=(names, found)))
 
     def names(self, kind: str, name: str) -> set[str]:
-        """Return the words for components that are there of a thing; none where it is not there."""
+        """Return the words for components that are there of a thing."""
         own = self.matrices.get((kind, name), _Matrix())
         return {word for pair in own.values for word in pair}
 

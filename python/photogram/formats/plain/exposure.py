@@ -22,10 +22,8 @@ from photogram.network.moving_photos import Direction, LineSensor, Shutter
 from photogram.network.trajectories import Readout
 from photogram.words import phrase
 
-LINE = "line"
-"""The model of a line of sensors behind the lens `brown`."""
-OF_LINES = ("x0", "y0", "s0")
-"""Columns of a line of sensors that some models have as parameters."""
+LINE = "line"  # The model of a line of sensors behind the lens `brown`
+OF_LINES = ("x0", "y0", "s0")  # Columns of a line of sensors that some models have as parameters
 Exposure = Shutter | LineSensor | None
 
 

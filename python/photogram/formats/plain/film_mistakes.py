@@ -18,16 +18,11 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.film import Certificate
 
-SHRUNK = 0.01
-"""No film has changed its size by more."""
-INCH = 25.4
-"""Millimetres."""
-SAME = 0.5
-"""Pixels within which the marks of all photos of a resampled scan lie."""
-SHORTEST = 4
-"""Angles of a table of distortion that has a curve."""
-FEWEST = 4
-"""Marks of a photo that tell whether they are named a quarter turn round."""
+SHRUNK = 0.01  # No film has changed its size by more
+INCH = 25.4  # Millimetres
+SAME = 0.5  # Pixels within which the marks of all photos of a resampled scan lie
+SHORTEST = 4  # Angles of a table of distortion that has a curve
+FEWEST = 4  # Marks of a photo that tell whether they are named a quarter turn round
 
 
 def scale_message(photo: ScannedPhoto, places: Floats, *, mirrored: bool) -> Phrase | None:

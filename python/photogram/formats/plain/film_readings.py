@@ -19,12 +19,9 @@ from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import phrase
 
-BETTER = 4.0
-"""Times by which images must be farther from their places in every other way to lie."""
-NEAR = 0.1
-"""How far they may be in the best, in parts of the format: poses and points are start values."""
-TIES = 4
-"""Points that two photos have in common at least."""
+BETTER = 4.0  # Times by which images must be farther from their places in every other way to lie
+NEAR = 0.1  # How far they may be in the best, in parts of the format: poses and points are start values
+TIES = 4  # Points that two photos have in common at least
 
 
 @dataclass(frozen=True)

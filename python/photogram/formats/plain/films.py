@@ -43,8 +43,7 @@ from photogram.network.films import (
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 from photogram.words import phrase
 
-LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}
-"""Marks that determine a film."""
+LEAST = {"conformal": 2, "affine": 3, "bilinear": 4, "projective": 4}  # Marks that determine a film
 _START = ("start_t1", "start_t2", "start_theta")
 
 

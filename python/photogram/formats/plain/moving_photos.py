@@ -73,7 +73,7 @@ def read_timed(
 
 
 def _check(table: ColumnTable, row: int, given: Mapping[str, Any]) -> None:
-    """Refuse what does not belong together."""
+    """Reject what does not belong together."""
     flown = "trajectory" in given
     if flown and "velocity" in given:
         raise table.error(row, phrase("plain.motion-columns"))
@@ -186,7 +186,7 @@ def _motion_columns(own: Sequence[Timed | None]) -> dict[str, Any]:
 
 
 def line_times_table(block: Block) -> dict[str, Any]:
-    """Return the table of times of lines; none where there are no line scanners."""
+    """Return the table of times of lines."""
     own = [each for each in block.timed if each.lines is not None]
     if not own:
         return {}

@@ -42,8 +42,7 @@ from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Instrument, Level, Line, Plane, PlumbLine, Unknown
 from photogram.words import phrase
 
-_THROUGH = "through"
-"""The field that is a place, in the frame of the project."""
+_THROUGH = "through"  # The field that is a place, in the frame of the project
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.features import named_points
 from photogram.words import Phrase, option_sd, phrase
 
-DIFFER = 1e-6
-"""What the positions of a point in two tables may differ by."""
+DIFFER = 1e-6  # What the positions of a point in two tables may differ by
 _USES = ("control", "check", "off")
 
 
@@ -181,7 +180,7 @@ def _unused(
 
 
 def _check_features(settings: Settings, names: Sequence[str]) -> None:
-    """Refuse features through points that are not there."""
+    """Reject features through points that are not there."""
     for name, (_, wanted) in settings.features.items():
         try:
             named_points(wanted, names)

@@ -23,10 +23,8 @@ from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.words import phrase
 
-FRAME = "frame itself"
-"""What the first sensor of a rig is called where sensors have names of their own."""
-ZERO = 1e-6
-"""What the pose of the first sensor of a rig may differ from zero by."""
+FRAME = "frame itself"  # What the first sensor of a rig is called where sensors have names of their own
+ZERO = 1e-6  # What the pose of the first sensor of a rig may differ from zero by
 
 
 def read_rigs(tables: Tables, cameras: Sequence[str]) -> Mapping[str, Rig]:
@@ -214,7 +212,7 @@ class Rigs:
         return None if first is None or first[0] != rig else (rig, first[1], name)
 
     def tables(self, block: Block) -> dict[str, dict[str, Any]]:
-        """Return the tables of rigs, frames and bases; none where there are no rigs."""
+        """Return the tables of rigs, frames and bases."""
         if not self._sensors:
             return {}
         rows: list[tuple[str, str, Sensor | None]] = []

@@ -21,16 +21,12 @@ from photogram.network.observations import KnownTogether
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
-BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}
-"""What is not affine in films, by their model."""
+BENDS = {"bilinear": ("h1", "h2"), "projective": ("g1", "g2")}  # What is not affine in films, by their model
 _BEND_SD = {"bilinear": 5e-7, "projective": 2e-7}
 _WEIGHTS = tuple(f"w{k}" for k in range(1, 11))
-UM = 1e-3
-"""In millimetres."""
-KNOWN = 1e-6
-"""Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)."""
-LOCAL = "local"
-"""The pattern of films each of whose photos has a grid of its own."""
+UM = 1e-3  # In millimetres
+KNOWN = 1e-6  # Deviation of what a singular covariance of a scanner has as known (mm, a ratio, radians)
+LOCAL = "local"  # The pattern of films each of whose photos has a grid of its own
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ class FilmKind:
 
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
-    """Read the table of scanners; nothing where there is none."""
+    """Read the table of scanners."""
     table = tables.rows("scanners")
     names = table.names_once("scanner")
     counts = table.given(("pitch_mm", "origin_column", "origin_row"))
@@ -100,11 +96,11 @@ class _Numbers:
     half: Floats  # (2,) half ranges of the polynomials, mm
     # (2,) where these count from, mm from the origin of readings
     zero: Floats = field(default_factory=lambda: np.zeros(2))
-    covariance: Floats | None = None  # (21, 21); None where there is none
+    covariance: Floats | None = None  # (21, 21); None without
 
 
 def _check_alone(table: ColumnTable, row: int, name: str, covariances: Covariances) -> None:
-    """Refuse what a calibration says beside it."""
+    """Reject what a calibration says beside it."""
     for column in (*DEVICE, *CURVES, "hx", "hy", *(f"sd_{each}" for each in (*DEVICE, *CURVES))):
         if not math.isnan(table.numbers(column, infinite=True)[row]):
             raise table.cell_error(row, column, "plain.calibrated-scanner", scanner=name)
@@ -209,7 +205,7 @@ def _bends(model: str) -> tuple[float, float]:
 
 
 def _pattern(table: ColumnTable, row: int, film: str) -> Pattern | None:
-    """Return the pattern of a film; None where it has none."""
+    """Return the pattern of a film; None without."""
     kind = table.texts("pattern", "none")[row]
     if kind not in PATTERNS:
         raise table.unknown_error(row, "pattern", "pattern", kind, (*PATTERNS, LOCAL))

@@ -11,12 +11,10 @@ from photogram.lazy_dataclasses import dataclass, field
 
 AXES = ("x", "y", "z")
 ROTATIONS = ("rotation_x", "rotation_y", "rotation_z")
-POSE = (*AXES, *ROTATIONS)
-"""Components of poses: small rotations are about the axes of the photo."""
+POSE = (*AXES, *ROTATIONS)  # Components of poses: small rotations are about the axes of the photo
 VELOCITY, RATE = ("vx", "vy", "vz"), ("rate_x", "rate_y", "rate_z")
 BIAS = ("bias_x", "bias_y", "bias_z")
-BASES = ("position", "rotation")
-"""What a trajectory has coefficients of."""
+BASES = ("position", "rotation")  # What a trajectory has coefficients of
 FACTORS = ("factor_0", "factor_1", "factor_2", "factor_3")
 """Of neighbouring coefficients, whose sum was observed."""
 ANGLES: Mapping[str, tuple[str, ...]] = {
@@ -29,8 +27,7 @@ ANGLES: Mapping[str, tuple[str, ...]] = {
     "matrix": ("m11", "m12", "m13", "m21", "m22", "m23", "m31", "m32", "m33"),
 }
 """Columns of each representation of attitudes."""
-OPK = ANGLES["omega_phi_kappa"]
-"""That which is written."""
+OPK = ANGLES["omega_phi_kappa"]  # That which is written
 ALL_ANGLES = tuple(dict.fromkeys(name for names in ANGLES.values() for name in names))
 
 
@@ -75,19 +72,15 @@ class Schema:
 
 SD_AXES, SD_ROTATIONS = deviation_columns(AXES), deviation_columns(ROTATIONS)
 ENDS, DIFFERENCE = ("from", "to"), ("dx", "dy", "dz")
-DEVICE = ("sx", "sy", "alpha_rad")
-"""Scales and obliqueness of a scanner."""
+DEVICE = ("sx", "sy", "alpha_rad")  # Scales and obliqueness of a scanner
 CURVES = tuple(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj")
 """Coefficients of its polynomials."""
 GRID = ("grid_x", "grid_y", "grid_dx", "grid_dy", "grid_columns", "grid_rows")
 """Numbers of a pattern of shifts of nodes."""
 FILM_MODELS = ("affine", "conformal", "bilinear", "projective")
-BENDS = ("bend_x", "bend_y")
-"""Deflections of a board."""
-PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")
-"""Lengths of a board."""
-_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])
-"""Of angles about axes."""
+BENDS = ("bend_x", "bend_y")  # Deflections of a board
+PITCHES = ("spacing_x", "spacing_y", "tag_size", "tag_spacing")  # Lengths of a board
+_SD_ANGLES = deviation_columns(ALL_ANGLES[:9])  # Of angles about axes
 _PARAMETERS = tuple(sorted({name.lower() for _, facts in _photocore.camera_models() for name, _ in facts[1]}))
 _ACROSS = ("sd", "sd_x", "sd_y", "cov_xy")
 _CLOCK = ("time_offset", "sd_time_offset")

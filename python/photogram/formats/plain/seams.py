@@ -30,8 +30,7 @@ class Seam:
     at: float
 
 
-Seams = Mapping[str, Seam]
-"""By the names of photos."""
+Seams = Mapping[str, Seam]  # By the names of photos
 
 
 def with_seams(tables: Tables) -> tuple[Tables, Seams]:
@@ -49,7 +48,7 @@ def with_seams(tables: Tables) -> tuple[Tables, Seams]:
             raise table.error(row, phrase("plain.seam-without-film", photo=names[row]))
         axis = int(np.isnan(places[row, 0]))
         found[names[row]] = Seam(f"{names[row]} half 2", _LINES[axis], float(places[row, axis]))
-    own = {each.name: getattr(tables, each.name) for each in fields(tables)}
+    own = {each.name: getattr(tables, each.name) for each in fields(tables) if each.init}
     return _Divided(**own, seams=found), found
 
 

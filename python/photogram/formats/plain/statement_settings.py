@@ -27,8 +27,7 @@ KEYS: Mapping[str, tuple[str, ...]] = {
 CLASS = "class_"
 _NAMES = {"length_limit": "limit"}
 """Keys that are called otherwise in :class:`photogram.results.statement.request.Asked`."""
-SENTENCES = "sentences.toml"
-"""The file that sentences are written to."""
+SENTENCES = "sentences.toml"  # The file that sentences are written to
 
 SOME_LENGTH = {"line": "1", "from": "A", "to": "B", "length": 1.0, "sd": 0.0}
 

@@ -75,7 +75,7 @@ def _lengths(tables: Tables, points: Mapping[str, int]) -> tuple[Mapping[str, An
 
 
 def lengths_table(lengths: Collection[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the columns of the table of lengths; none without any."""
+    """Return the columns of the table of lengths."""
     if not lengths:
         return {}
     columns = {name: [each[name] for each in lengths] for name in ("line", *ENDS, "length", "sd")}

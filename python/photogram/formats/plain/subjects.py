@@ -92,7 +92,7 @@ def subject_columns(
 def scalars(
     tables: Tables, table: ColumnTable, kind: type[_Scalar], titles: Sequence[str], usual: float = 0.0
 ) -> list[_Scalar | None]:
-    """Return the clock of each row, or the factor of its line rate, as a rule 1; None where nothing is said.
+    """Return the clock of each row, or the factor of its line rate, as a rule 1; None without.
 
     One without a name is called by its title.
     """
@@ -107,7 +107,7 @@ def scalars(
 
 
 def scalar_columns(kind: type[Clock | Readout], own: Sequence[Clock | Readout | None]) -> dict[str, Any]:
-    """Return the columns of clocks, or of factors of line rates; none where there are none."""
+    """Return the columns of clocks, or of factors of line rates."""
     if not any(own):
         return {}
     word, number = _COLUMNS[kind]

@@ -37,8 +37,7 @@ from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
 _Named = TypeVar("_Named")
-DEGREE = 180 / np.pi
-"""Of a radian."""
+DEGREE = 180 / np.pi  # Of a radian
 
 
 def _spelled(known: Collection[str], own: Sequence[str]) -> list[str]:
@@ -55,9 +54,18 @@ class Tables:
     messages: list[Message]  # Remarks
     names: Collection[str] = ()  # Points that have images, where they are known before the tables are read
     shared: Shared = field(default_factory=Shared)  # Common unknowns that rows of all tables name
+    _tables: dict[str, ColumnTable | None] = field(default_factory=dict, init=False)
 
     def read(self, name: str) -> ColumnTable | None:
-        """Return a table that is there."""
+        """Return a table that is there. It is parsed once, except images, which are too large to store."""
+        if name in self._tables:
+            return self._tables[name]
+        table = self._parsed(name)
+        if name != "images":
+            self._tables[name] = table
+        return table
+
+    def _parsed(self, name: str) -> ColumnTable | None:
         if name not in self.settings.tables:
             return self._photos_of_images() if name == "photos" and "images" in self.settings.tables else None
         schema, path = TABLES[name], self.settings.tables[name]
@@ -118,7 +126,7 @@ class Tables:
         return {"deg": math.radians(value), "gon": value * math.pi / 200, "rad": value}[unit]
 
     def attitudes(self, table: ColumnTable) -> Floats:
-        """Return (rows, k) numbers of attitudes, angles in radians; NaN where there are none."""
+        """Return (rows, k) numbers of attitudes, angles in radians; NaN without."""
         names = ANGLES[self.settings.attitude]
         others = [each for each in table.columns if each in ALL_ANGLES and each not in names]
         if others and not set(names) <= set(table.columns):
@@ -128,7 +136,7 @@ class Tables:
         return vectors_of(table, names, None if plain else self.angle)
 
     def matrices(self, table: ColumnTable) -> Floats:
-        """Return (rows, 3, 3) attitudes A, photo to object; NaN where there are none."""
+        """Return (rows, 3, 3) attitudes A, photo to object; NaN without."""
         values = self.attitudes(table)
         found = np.full((len(values), 3, 3), np.nan)
         known = np.flatnonzero(~np.isnan(values).any(axis=1))
@@ -173,7 +181,7 @@ class Tables:
         return turned
 
     def _check_rows(self, table: ColumnTable, values: Floats, known: Indices) -> None:
-        """Refuse quaternions without length and matrices that are no rotations, with their rows."""
+        """Reject quaternions without length and matrices that are no rotations, with their rows."""
         kind = self.settings.attitude
         for row in known.tolist():
             if kind == "quaternion":

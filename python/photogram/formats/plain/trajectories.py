@@ -32,8 +32,7 @@ _OTHERS = (
     *("trajectory_positions", "trajectory_attitudes", "trajectory_knots", "trajectory_coefficients"),
     "body_rotations",
 )
-Groups = Mapping[tuple[str, ...], Indices]
-"""Rows of a table by what they are of."""
+Groups = Mapping[tuple[str, ...], Indices]  # Rows of a table by what they are of
 
 
 def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
@@ -176,7 +175,7 @@ class _Bases:
         return replace(basis, value=values, sd=deviations)
 
     def _check(self, row: int, name: str, word: str, rows: Indices | None) -> None:
-        """Refuse what is no basis, and what is said of another."""
+        """Reject what is no basis, and what is said of another."""
         kind = self.kind
         if word not in _COLUMNS:
             raise self.table.cell_error(row, kind, "error.choice", names=list(_COLUMNS), value=word)

@@ -25,8 +25,7 @@ from photogram.network.observations.unknowns import smoothness_of
 from photogram.network.trajectories import Basis, Polynomial, Spline, Trajectory
 from photogram.words import phrase
 
-Place = tuple[str, str, int]
-"""Trajectory, position or rotation, and the number of a coefficient."""
+Place = tuple[str, str, int]  # Trajectory, position or rotation, and the number of a coefficient
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
@@ -41,7 +40,7 @@ def shared_trajectories(block: Block) -> list[Trajectory]:
 
 
 def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
-    """Return the tables of the trajectories of a block; none where there are none."""
+    """Return the tables of the trajectories of a block."""
     own = shared_trajectories(block)
     if not own:
         return {}

@@ -293,7 +293,7 @@ def _images(
 
 
 def control_table(project: Project) -> dict[str, Any]:
-    """Return the columns of control and check points; none where there are no such points."""
+    """Return the columns of control and check points."""
     block = project.block
     held = np.isfinite(block.point_sd)
     rows = {int(row): "control" for row in np.flatnonzero(held.any(axis=1))} | dict.fromkeys(
