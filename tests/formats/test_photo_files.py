@@ -11,9 +11,9 @@ from example_scripts import load
 from formats.photographs import EXAMPLE, ORIGIN, block_with_pictures, dji, packet, picture, tags
 from photogram import Position, formats
 from photogram.formats import PhotoFiles, Wishes, read_metadata
+from photogram.formats.metadata.adding import located
 from photogram.formats.metadata.pictures import DOP_ALONE, RADIAL
 from photogram.formats.metadata.search import Photos
-from photogram.formats.metadata.systems import located
 from photogram.words import Phrase, option_sd
 from refusals import refused
 

@@ -105,7 +105,7 @@ def metadata(
     order holds for positions and standard deviations separately.
     """
     from photogram.formats import read_metadata
-    from photogram.formats.metadata.systems import gnss_files
+    from photogram.formats.metadata.adding import gnss_files
     from photogram.formats.supplements import deviations
 
     given = deviations(sd or [])

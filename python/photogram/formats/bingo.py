@@ -40,10 +40,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     images = folder / IMAGES if path.is_dir() else path
     table = wishes.cameras or folder / CAMERAS
     if wishes.cameras is None and not table.is_file():
-        raise InputError(
-            phrase("format.cameras"),
-            file=images,
-        )
+        raise InputError(phrase("format.cameras"), file=images)
     given = read_cameras(Tables(Settings(images, tables={"cameras": table}, image="mm"), []))
     known = {each.name: each for each in given.cameras}
     found = Reduced(cameras=known)

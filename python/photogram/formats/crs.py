@@ -53,20 +53,13 @@ def _transformer(source: str, target: str) -> Any:
             first, second, always_xy=True, only_best=True, allow_ballpark=False
         )
     except pyproj.exceptions.ProjError as error:
-        raise InputError(
-            phrase(
-                "crs.transformation",
-                source=source,
-                target=target,
-                reason=str(error),
-                hint=_hint(source, target),
-            )
-        ) from None
+        raise _no_transformation(source, target, error) from None
 
 
-def _hint(source: str, target: str) -> list[Phrase]:
+def _no_transformation(source: str, target: str, error: Exception) -> InputError:
     compound = _system(source).is_compound or _system(target).is_compound
-    return [phrase("crs.grid")] if compound else []
+    fields = {"source": source, "target": target, "reason": str(error)}
+    return InputError(phrase("crs.transformation", **fields, hint=[phrase("crs.grid")] if compound else []))
 
 
 def _transformed(source: str, target: str, xyz: Floats) -> Floats:
@@ -76,15 +69,7 @@ def _transformed(source: str, target: str, xyz: Floats) -> Floats:
     try:
         found = np.column_stack(transformer.transform(*xyz.T, errcheck=True))
     except pyproj.exceptions.ProjError as error:
-        raise InputError(
-            phrase(
-                "crs.transformation",
-                source=source,
-                target=target,
-                reason=str(error),
-                hint=_hint(source, target),
-            )
-        ) from None
+        raise _no_transformation(source, target, error) from None
     if not np.isfinite(found).all():
         row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
         raise InputError(phrase("crs.outside", position=xyz[row].tolist(), source=source, target=target))

@@ -36,12 +36,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     block = block.replace(refraction=job_refraction(found.common))
     messages = list(found.messages)
     if found.common.intersection_only:
-        messages.append(
-            Message(
-                phrase("format.intersection"),
-                path,
-            )
-        )
+        messages.append(Message(phrase("format.intersection"), path))
     count = len(block.cameras)
     return Project(
         block=block,

@@ -13,8 +13,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.block_contents import correlated_control, posed
 from photogram.formats.format import Format, Wishes
-from photogram.formats.images import Y_DOWN, sizes_of, to_corner
-from photogram.formats.lenses import lens_of
+from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
 from photogram.formats.losses import losses
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras

@@ -71,18 +71,8 @@ def plane_remarks(block: Block, path: Path, starts: Floats | None = None) -> lis
 
         if not is_projected(frame.crs):
             return []
-        return [
-            Message(
-                phrase("planes.projected", crs=frame.crs, bend=bend(known, frame.crs).phrase),
-                path,
-            )
-        ]
+        return [Message(phrase("planes.projected", crs=frame.crs, bend=bend(known, frame.crs).phrase), path)]
     like_a_map = (np.abs(np.median(known[:, :2], axis=0)) > LIKE_A_PLANE).all()
     if not like_a_map or np.abs(known[:, 2]).max() > LIKE_A_PLANE:
         return []
-    return [
-        Message(
-            phrase("planes.map", bend=bend(known).phrase),
-            path,
-        )
-    ]
+    return [Message(phrase("planes.map", bend=bend(known).phrase), path)]

@@ -14,6 +14,7 @@ from photogram.formats.format import Wishes
 from photogram.formats.losses import losses
 from photogram.formats.models import complete_positions
 from photogram.formats.plain.writing import attitude_matrices, known_cameras
+from photogram.formats.point_table import PointTable
 from photogram.formats.project import Project, assembled
 from photogram.formats.self_check import agreement
 from photogram.io.places import Place
@@ -66,19 +67,18 @@ def project_of(
     for name, (centre, matrix) in found.poses.items():
         if name in rows:
             centres[rows[name]], matrices[rows[name]] = centre, matrix
-    positions, sd = np.full((len(points), 3), np.nan), np.full((len(points), 3), np.inf)
-    lacks = []
+    table, lacks = PointTable(points), []
     held = [name for name, (_, used) in found.control.items() if used.any()]
     if held and "control" not in wishes.sd:
         lacks.append(Phrase("read.control", {"number": len(held), "option": option_sd("control")}))
-    check_sd = np.full_like(positions, np.nan)
     for name, (position, used) in found.control.items():
         # What is not held of a control point is not known; a check point is known altogether.
-        positions[places[name]] = np.where(used | ~used.any(), position, np.nan)
+        row = places[name]
+        table.positions[row] = table.starts[row] = np.where(used | ~used.any(), position, np.nan)
         if used.any() and "control" in wishes.sd:
-            sd[places[name]] = np.where(used, wishes.sd["control"], np.inf)
+            table.sd[row] = np.where(used, wishes.sd["control"], np.inf)
         elif not used.any():
-            check_sd[places[name]] = wishes.sd.get("check", wishes.sd.get("control", np.nan))
+            table.check_sd[row] = wishes.sd.get("check", wishes.sd.get("control", np.nan))
     cameras = {camera: row for row, camera in enumerate(found.cameras)}
     return assembled(
         path=path,
@@ -89,19 +89,12 @@ def project_of(
         photo_cameras=[cameras[camera] for camera in found.photos.values()],
         centres=centres,
         matrices=matrices,
-        point_ids=points,
-        starts=positions.copy(),
-        point_positions=positions,
-        point_sd=sd,
-        point_check_sd=check_sd,
+        **table.arguments(),
         image_photos=np.array([rows[each[0]] for each in found.images], dtype=np.int64),
         image_points=np.array([places[each[1]] for each in found.images], dtype=np.int64),
         image_xy=np.array([each[2:] for each in found.images], dtype=float).reshape(-1, 2),
         lacks=lacks,
-        messages=[
-            *messages,
-            Message(phrase("reduced.assumed")),
-        ],
+        messages=[*messages, Message(phrase("reduced.assumed"))],
     )
 
 
@@ -119,10 +112,7 @@ def with_fitting_rotations(project: Project) -> Project:
     transposed = _misfit(other)
     limit = 0.1 * float(np.median(block.camera_scales()))
     if min(as_read, transposed) > limit:
-        raise InputError(
-            phrase("reduced.rays", as_read=as_read, transposed=transposed),
-            file=project.path,
-        )
+        raise InputError(phrase("reduced.rays", as_read=as_read, transposed=transposed), file=project.path)
     if transposed * BETTER < as_read:
         remark = Message(phrase("reduced.transposed"))
         return other.replace(messages=(*project.messages, remark))

@@ -14,13 +14,14 @@ from photogram.formats.agisoft import TITLE
 from photogram.formats.format import Wishes
 from photogram.formats.images import Y_DOWN, checked_rotation
 from photogram.formats.plain.tables import covariances_of
+from photogram.formats.point_table import PointTable
 from photogram.formats.project import Frame, Project, Size, assembled
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.cameras import Camera
-from photogram.network.observations import Control, Observation, Position
+from photogram.network.observations import Observation, Position
 from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "LOCAL_CS"
@@ -55,7 +56,7 @@ def read(path: Path, wishes: Wishes) -> Project:
     given = _accuracies(chunk, wishes)
     names = [each.attributes["label"] for each in shots]
     observations, lacks = _gnss(positions, shots, names, given["gnss"])
-    points, starts, held, sd, check_sd, full = _markers(positions, list(markers.values()), given["control"])
+    points = _markers(positions, list(markers.values()), given["control"])
     rows = {each.attributes["id"]: row for row, each in enumerate(shots)}
     photos, owners, xy = _locations(chunk, rows, {key: row for row, key in enumerate(markers)})
     order = {key: row for row, key in enumerate(sensors)}
@@ -69,15 +70,11 @@ def read(path: Path, wishes: Wishes) -> Project:
         photo_cameras=[order[each.attributes["sensor_id"]] for each in shots],
         centres=centres,
         matrices=matrices,
-        point_ids=points,
-        starts=starts,
-        point_positions=held,
-        point_sd=sd,
-        point_check_sd=check_sd,
+        **points.arguments(),
         image_photos=photos,
         image_points=owners,
         image_xy=xy,
-        observations=[*full, *observations],
+        observations=[*points.observations, *observations],
         frame=frame,
         lacks=[Phrase("read.ties"), *lacks],
         messages=messages,
@@ -325,38 +322,27 @@ def _gnss(
     return [Position(names[row], place, covariance=own) for row, place, own in each], lacks
 
 
-def _markers(
-    positions: _Positions, markers: list[Element], default: Floats
-) -> tuple[list[str], Floats, Floats, Floats, Floats, list[Observation]]:
-    names: list[str] = []
-    count = len(markers)
-    starts, sd = np.full((count, 3), np.nan), np.full((count, 3), np.inf)
-    held, check_sd = starts.copy(), starts.copy()
-    observed: list[Observation] = []
-    for row, each in enumerate(markers):
-        name = each.attributes.get("label") or f"marker {row}"
-        if name in names or not name.isprintable() or not name.strip():
-            raise each.error(phrase("format.name", what="marker", name=name))
-        names.append(name)
-        reference = positions.reference(each, default)
+def _markers(positions: _Positions, markers: list[Element], default: Floats) -> PointTable:
+    names = [each.attributes.get("label") or f"marker {row}" for row, each in enumerate(markers)]
+    points = PointTable(names)
+    for row, (name, marker) in enumerate(zip(names, markers, strict=True)):
+        if name in names[:row] or not name.isprintable() or not name.strip():
+            raise marker.error(phrase("format.name", what="marker", name=name))
+        reference = positions.reference(marker, default)
         if reference is None:
             continue
-        enabled = _enabled(each)
-        if enabled and not (reference[1] > 0).all():
-            raise each.error(phrase("format.sd", name=name, option=option_sd("control")))
-        found, turned = positions.carried(reference[0][np.newaxis], np.nan_to_num(reference[1])[np.newaxis])
-        starts[row] = held[row] = found[0]
-        if not enabled:
-            check_sd[row] = np.where(reference[1] > 0, np.sqrt(np.diag(turned[0])), np.nan)
-            continue
-        if (turned[0] == np.diag(np.diag(turned[0]))).all():
-            sd[row] = np.sqrt(np.diag(turned[0]))
-        elif is_covariance(turned[0]):
-            held[row] = np.nan
-            observed.append(Control(name, found[0], covariance=(turned[0] + turned[0].T) / 2))
+        [xyz], [covariance] = positions.carried(
+            reference[0][np.newaxis], np.nan_to_num(reference[1])[np.newaxis]
+        )
+        if not _enabled(marker):
+            points.check(row, xyz, np.where(reference[1] > 0, np.diag(covariance), 0.0))
+        elif not (reference[1] > 0).all():
+            raise marker.error(phrase("format.sd", name=name, option=option_sd("control")))
+        elif not is_covariance(covariance) and (covariance != np.diag(np.diag(covariance))).any():
+            raise marker.error(phrase("agisoft.accuracy", name=name))
         else:
-            raise each.error(phrase("agisoft.accuracy", name=name))
-    return names, starts, held, sd, check_sd, observed
+            points.control(row, xyz, covariance)
+    return points
 
 
 def _locations(

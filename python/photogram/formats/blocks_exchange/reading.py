@@ -272,8 +272,7 @@ def _project(path: Path, found: _Found, srs: str) -> Project:
     for name, photo in zip(names, photos, strict=True):
         if not name.strip() or not name.isprintable():
             raise photo.place.error(phrase("format.name", what="ImagePath", name=name))
-    points = _names(found)
-    starts, positions, sd, check_sd, observed = frames.points(found.points, points)
+    points = frames.points(found.points, _names(found))
     of_photo = np.array([each.group for each in photos], dtype=np.int64)
     image_photos = np.array([rows[each[0]] for each in images], dtype=np.int64)
     return assembled(
@@ -286,15 +285,11 @@ def _project(path: Path, found: _Found, srs: str) -> Project:
         photo_cameras=of_photo,
         centres=centres,
         matrices=matrices,
-        point_ids=points,
-        starts=starts,
-        point_positions=positions,
-        point_sd=sd,
-        point_check_sd=check_sd,
+        **points.arguments(),
         image_photos=image_photos,
         image_points=np.array([each[1] for each in images], dtype=np.int64),
         image_xy=_corner(found, images, of_photo[image_photos]),
-        observations=[*observed, *frames.gnss(photos, names, found.wishes)],
+        observations=[*points.observations, *frames.gnss(photos, names, found.wishes)],
         frame=frames.frame,
         lacks=frames.lacks,
         messages=messages,

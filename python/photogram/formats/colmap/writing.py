@@ -12,8 +12,7 @@ from photogram.errors import InputError
 from photogram.formats.block_contents import posed
 from photogram.formats.colmap import content
 from photogram.formats.colmap.files import binary_files, text_files
-from photogram.formats.images import Y_DOWN, sizes_of, to_corner
-from photogram.formats.lenses import lens_of
+from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
 from photogram.formats.losses import losses
 from photogram.formats.models import complete_positions
 from photogram.formats.names import names_file, numbered

@@ -207,10 +207,7 @@ def serial_number(label: Group, path: Path) -> str:
     apollo = _APOLLO.fullmatch(spacecraft)
     if apollo and name == "METRIC":
         return f"APOLLO{apollo[1]}/METRIC/{instrument['StartTime'].text()}"
-    raise InputError(
-        phrase("csm.serial", instrument=name, spacecraft=spacecraft),
-        file=path,
-    )
+    raise InputError(phrase("csm.serial", instrument=name, spacecraft=spacecraft), file=path)
 
 
 def read_cube(path: Path) -> Isd:
@@ -228,10 +225,7 @@ def read_cube(path: Path) -> Isd:
     known = _CAMERAS.get(_named(instrument))
     if known is None:
         spacecraft, name = _named(instrument)
-        raise InputError(
-            phrase("csm.instrument", instrument=name, spacecraft=spacecraft),
-            file=path,
-        )
+        raise InputError(phrase("csm.instrument", instrument=name, spacecraft=spacecraft), file=path)
     return known(label, cube, instrument, path)
 
 

@@ -31,10 +31,7 @@ from photogram.words import Phrase, option_sd, phrase
 def read(path: Path, wishes: Wishes) -> Project:
     """Read a control network, and the support data of the images that a list names."""
     if wishes.cubes is None:
-        raise InputError(
-            phrase("isis.cubes"),
-            file=path,
-        )
+        raise InputError(phrase("isis.cubes"), file=path)
     settings = read_settings(wishes.jigsaw or "")
     network = read_network(path)
     files = read_list(wishes.cubes)

@@ -60,6 +60,11 @@ _NO_COLUMNS = ("serials", "rest")
 _NAMES = ("ids", "serial", *_NO_COLUMNS)  # What is handed to the core apart from the columns of numbers
 
 
+def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
+    if np.shape(values) != shape:
+        raise InputError(phrase("format.shape", name=name, required=str(shape), got=str(np.shape(values))))
+
+
 class _Columns:
     """Points or measures: all columns have as many rows."""
 
@@ -74,13 +79,8 @@ class _Columns:
             if each.name in _NO_COLUMNS:
                 continue
             shape = (rows, _WIDTHS[each.name]) if each.name in _WIDTHS else (rows,)
-            found = np.shape(getattr(self, each.name))
-            if found != shape:
-                raise InputError(phrase("format.shape", name=each.name, required=str(shape), got=str(found)))
-        if self.rest[1].shape != (rows + 1,):
-            raise InputError(
-                phrase("format.shape", name="rest[1]", required=str((rows + 1,)), got=str(self.rest[1].shape))
-            )
+            _check_shape(each.name, getattr(self, each.name), shape)
+        _check_shape("rest[1]", self.rest[1], (rows + 1,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,15 +191,7 @@ class ControlNetwork:
     header_rest: bytes = b""
 
     def __post_init__(self) -> None:
-        if self.firsts.shape != (len(self.points) + 1,):
-            raise InputError(
-                phrase(
-                    "format.shape",
-                    name="firsts",
-                    required=str((len(self.points) + 1,)),
-                    got=str(self.firsts.shape),
-                )
-            )
+        _check_shape("firsts", self.firsts, (len(self.points) + 1,))
 
     @property
     def point_of_measure(self) -> NDArray[np.int64]:

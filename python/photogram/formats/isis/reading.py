@@ -79,10 +79,7 @@ def _check_names(ids: Sequence[str], path: Path) -> None:
 
 def _check_version(version: str, known: tuple[str, ...], what: str, path: Path) -> None:
     if version not in known:
-        raise InputError(
-            phrase("isis.version", kind=what, version=version, names=list(known)),
-            file=path,
-        )
+        raise InputError(phrase("isis.version", kind=what, version=version, names=list(known)), file=path)
 
 
 @dataclass

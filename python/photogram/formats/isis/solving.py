@@ -196,6 +196,5 @@ def _check(first: Isd, other: Isd) -> None:
     turn = float(np.linalg.norm(axes - turned, axis=(1, 2)).max()) / np.sqrt(2.0) / pixel
     if not max(shift, turn) < APART:
         raise InputError(
-            phrase("isis.flight", path=first.path, shift=shift, turn=turn, limit=APART),
-            file=other.path,
+            phrase("isis.flight", path=first.path, shift=shift, turn=turn, limit=APART), file=other.path
         )

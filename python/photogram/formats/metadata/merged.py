@@ -32,17 +32,6 @@ from photogram.show.sections import Section
 from photogram.show.summary import Brief
 from photogram.words import phrase
 
-__all__ = [
-    "WITHOUT",
-    "Metadata",
-    "PhotoRecord",
-    "counts",
-    "metadata_of",
-    "read_metadata",
-    "remarks_on",
-    "told",
-]
-
 WITHOUT = "without"
 
 
@@ -239,10 +228,7 @@ def read_gnss_file(
     elif is_reference(path):
         said = read_reference(path, messages)
     else:
-        raise InputError(
-            phrase("photos.positions"),
-            file=path,
-        )
+        raise InputError(phrase("photos.positions"), file=path)
     flights = dict.fromkeys(said, path.stem)
     return metadata_of(path, {name: [one] for name, one in said.items()}, flights, [path], [], messages)
 
@@ -261,15 +247,11 @@ def _of_exposures(
             continue
         if number in names:
             raise InputError(
-                phrase("photos.exposure", number=number, names=[names[number], photo]),
-                file=path,
+                phrase("photos.exposure", number=number, names=[names[number], photo]), file=path
             )
         names[number] = photo
     if not names:
-        raise InputError(
-            phrase("photos.numbers", numbers=list(exposures), names=list(photos)),
-            file=path,
-        )
+        raise InputError(phrase("photos.numbers", numbers=list(exposures), names=list(photos)), file=path)
     if left := len(exposures) - len(names):
         messages.append(Message(phrase("photos.unused", n=left, total=len(exposures)), path))
     return {photo: exposures[number].said(antenna) for number, photo in names.items()}

@@ -17,19 +17,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
 from photogram.words import phrase
 
-__all__ = [
-    "ELLIPSOIDAL",
-    "FIXED",
-    "SEA_LEVEL",
-    "UNSAID",
-    "UNSAID_SYSTEM",
-    "Said",
-    "Triple",
-    "fix_of",
-    "geographic_position",
-    "usable_deviations",
-]
-
 Triple = tuple[float, float, float]
 
 ELLIPSOIDAL = "EPSG:4979"  # Longitude and latitude of WGS 84, heights above its ellipsoid

@@ -170,7 +170,6 @@ def _of_flight(
     likely = named or [each for each in paths if number in exposures[each]]
     if len(likely) > 1:
         raise InputError(
-            phrase("photos.flight", photo=key, names=[path.name for path in likely]),
-            file=paths[0].parent,
+            phrase("photos.flight", photo=key, names=[path.name for path in likely]), file=paths[0].parent
         )
     return likely[0] if likely else None

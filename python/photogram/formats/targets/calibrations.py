@@ -106,10 +106,7 @@ def calibration_of(project: Project) -> Calibration:
         if not (isinstance(each, Prior) and isinstance(each.unknown, Knot))
     ]
     if others:
-        raise InputError(
-            phrase("board-project.observations", names=others),
-            file=project.path,
-        )
+        raise InputError(phrase("board-project.observations", names=others), file=project.path)
     (board,) = project.boards.values()
     number = _numbers_of(project, board)
     assumed = bool(project.details.get(ASSUMED))
